@@ -1,4 +1,4 @@
-"""What a scheme says of itself: each has one `traits`, and nothing else is asked for."""
+"""Traits of a scheme: each has one `traits`, and nothing else is asked for."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

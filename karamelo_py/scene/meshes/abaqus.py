@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.scene.meshes.data import FACE_TYPES, Cells, Mesh
+from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 _MOST = 2**31  # bytes of a deck and of what it includes
@@ -470,7 +470,7 @@ class _Deck:
 
 
 def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool = False):
-    """What stands for the numbers `of` (n,) in a table; unknown ones are left out, or -1."""
+    """Look up the numbers `of` (n,) in a table; unknown ones are left out, or -1."""
     numbers, stands = table
     if not len(numbers):
         return np.full(len(of), -1) if keep else np.empty(0, np.int64)
@@ -480,7 +480,7 @@ def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool 
 
 
 class _Found:
-    """What all bodies have together: elements are numbered from 0 as they come."""
+    """Nodes, elements and sets of all bodies; elements are numbered from 0 as they come."""
 
     def __init__(self) -> None:
         self.points: list[np.ndarray] = []
@@ -505,8 +505,10 @@ class _Found:
             family, count = _kind(label) or ("", 0)
             name = family if count == _CORNERS[family] else f"{family}{count}"
             numbers.append(np.concatenate([n for n, _ in parts]))
-            cells.append(Cells(name, np.concatenate([nodes for _, nodes in parts]), label=label))
-        faces: dict[str, list[Cells]] = {}
+            cells.append(
+                CellBlock(name, np.concatenate([nodes for _, nodes in parts]), label=label)
+            )
+        faces: dict[str, list[CellBlock]] = {}
         for name, items in self.surfaces.items():
             for side, held in items:
                 for block, of in zip(cells, numbers, strict=True):
@@ -514,7 +516,7 @@ class _Found:
                     nodes = block.nodes[np.isin(of, held)]
                     if side < len(corners) and len(nodes):
                         kind = FACE_TYPES[len(corners[side])]
-                        faces.setdefault(name, []).append(Cells(kind, nodes[:, corners[side]]))
+                        faces.setdefault(name, []).append(CellBlock(kind, nodes[:, corners[side]]))
         every = [*cells, *(cell for parts in faces.values() for cell in parts)]
         none = [np.zeros(len(cell.nodes), bool) for cell in every]
         sets = {}

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.scene.meshes.data import Cells, Mesh
+from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
@@ -103,7 +103,7 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """What a file of Gmsh says that Gmsh forgets.
+    """Parts of a file of Gmsh that its library forgets.
 
     These are names of groups that are empty, and, in versions 1 and 2, the group of each element:
     Gmsh gives all elements of one geometrical entity to the groups of that entity.
@@ -155,7 +155,7 @@ def _taken(gmsh: Any, only_groups: bool = False, of_file: _Header | None = None)
         family = _FAMILIES.get(name.split()[0], name.split()[0].lower())
         natural = np.reshape(reference, (count, -1))[:, :dim] if dim else None
         nodes = np.concatenate([nodes for nodes, _ in parts])
-        cells.append(Cells(family if count == primary else f"{family}{count}", nodes, natural))
+        cells.append(CellBlock(family if count == primary else f"{family}{count}", nodes, natural))
         for key, masks in sets.items():
             of = [n for (d, n), name in names.items() if d == dim and key in (name, str(n))]
             masks.append(np.concatenate([np.isin(groups, of).any(axis=1) for _, groups in parts]))

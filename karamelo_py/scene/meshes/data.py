@@ -13,8 +13,8 @@ DIMENSIONS = {
 }  # fmt: skip
 
 
-class Cells(NamedTuple):
-    """Cells of one type."""
+class CellBlock(NamedTuple):
+    """CellBlock of one type."""
 
     type: str  # as meshio names it, such as tetra10
     nodes: np.ndarray  # (n, c) their numbers, from 0; corners come first
@@ -33,12 +33,12 @@ class Cells(NamedTuple):
 
 class Mesh(NamedTuple):
     points: np.ndarray  # (N, 3)
-    cells: list[Cells]
+    cells: list[CellBlock]
     sets: dict[str, list[np.ndarray]]  # per name a mask (n,) for each item of `cells`
     node_sets: dict[str, np.ndarray]  # per name a mask (N,)
     left_out: dict[str, int]  # elements that no solid has, such as springs: how many of each type
 
-    def chosen(self, group: str | int | None) -> list[Cells]:
+    def chosen(self, group: str | int | None) -> list[CellBlock]:
         """The cells of a named set, or all.
 
         A set of nodes stands for the outer faces all of whose nodes it has. An unknown set and an
@@ -96,7 +96,7 @@ FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 FACE_TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
 
 
-def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[Cells]:
+def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[CellBlock]:
     """The faces with nodes in `held` (N,) alone that belong to one element only."""
     highest = max((cells.dimension for cells in mesh.cells if cells.family in FACES), default=0)
     faces: dict[int, list[np.ndarray]] = {}
@@ -113,7 +113,7 @@ def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[Cells]:
         )
         outer = nodes[first[count == 1]]
         if len(outer):
-            found.append(Cells(FACE_TYPES[corners], outer))
+            found.append(CellBlock(FACE_TYPES[corners], outer))
     if not found:  # single nodes: no face has them alone
-        found.append(Cells("vertex", np.flatnonzero(held)[:, None]))
+        found.append(CellBlock("vertex", np.flatnonzero(held)[:, None]))
     return found

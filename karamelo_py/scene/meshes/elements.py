@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.scene.meshes.data import Cells, Mesh
+from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 # A shape of this part of size^dimension is flat: its volume is rounding.
@@ -130,7 +130,7 @@ def elements_of(
     return found
 
 
-def _in_order(cells: Cells) -> Cells:
+def _in_order(cells: CellBlock) -> CellBlock:
     """Pixels and voxels, whose nodes go row by row, and prisms with six sides, by halves."""
     order = {
         "pixel": ("quad", [[0, 1, 3, 2]]),
@@ -140,10 +140,10 @@ def _in_order(cells: Cells) -> Cells:
     if cells.type not in order:
         return cells
     name, parts = order[cells.type]
-    return Cells(name, np.concatenate([cells.nodes[:, part] for part in parts]))
+    return CellBlock(name, np.concatenate([cells.nodes[:, part] for part in parts]))
 
 
-def _reference(cells: Cells) -> tuple[tuple[float, ...], ...]:
+def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
     """Natural coordinates of the nodes that count: of corners alone where no more are known."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from karamelo_py.scene.meshes.data import Cells, Mesh
+from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 
@@ -40,7 +40,7 @@ def read_obj(path: Path) -> Mesh:
                 expected="v x y z, f a b c ..., and what else .obj files have",
             ) from None
     kinds = [n for n in faces if faces[n]]
-    cells = [Cells({3: "triangle", 4: "quad"}[n], np.array(faces[n])) for n in kinds]
+    cells = [CellBlock({3: "triangle", 4: "quad"}[n], np.array(faces[n])) for n in kinds]
     known = dict.fromkeys(name for n in kinds for of in owners[n] for name in of)
     sets = {name: [np.array([name in of for of in owners[n]]) for n in kinds] for name in known}
     return Mesh(np.array(points, float).reshape(-1, 3), cells, sets, {}, {})

@@ -18,7 +18,7 @@ import numpy as np
 from karamelo_py.language.kinds import InputFile
 from karamelo_py.scene.meshes.abaqus import read_deck
 from karamelo_py.scene.meshes.by_gmsh import NoGmsh, mesh_geometry, read_by_gmsh
-from karamelo_py.scene.meshes.data import Cells, Mesh
+from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.scene.meshes.obj import read_obj
 from karamelo_py.script.errors import FAILURES, ScriptError
@@ -174,7 +174,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
         raise _unreadable(path, (why or "") + reason) from None
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    cells = [Cells(block.type, np.asarray(block.data)) for block in mesh.cells]
+    cells = [CellBlock(block.type, np.asarray(block.data)) for block in mesh.cells]
     return Mesh(points, cells, dict(_sets_of(mesh)), {}, {})
 
 
