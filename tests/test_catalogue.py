@@ -90,7 +90,7 @@ def test_help_finds_an_argument_and_what_it_may_be(capsys, word):
     status, out, _ = call(capsys, "help", word)
     assert status == 0
     assert "argument of run, run_time, run_until, run_while" in out
-    assert "back to its last good state and halves" in " ".join(out.split())
+    assert "returns to its last good state and halves" in " ".join(out.split())
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Commands about space and what fills it: dimension, boundary, region, solid, group."""
+"""Commands that define the domain and its bodies: dimension, boundary, region, solid, group."""
 
 from collections.abc import Sequence
 from typing import Literal
@@ -29,10 +29,10 @@ CREATE_DOMAIN_WITHOUT_H = Forms(
 def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
-    The domain is a box that holds everything. A point that leaves it ends the run, unless boundary
-    says otherwise. Strain is uniaxial in 1D, and plane (unit thickness) in 2D. The grid starts at
-    the lower corner and covers the whole domain. Where a side is no multiple of the cell size, no
-    node lies at its upper end, so that a wall there would be too far out.
+    All points must stay inside the domain. A point that leaves it ends the run, unless boundary
+    says otherwise. Strain is uniaxial in 1D and plane (unit thickness) in 2D. The grid starts at
+    the lower corner and covers the whole domain. If a side is not a multiple of the cell size, no
+    node lies at its upper end, and a wall there would be too far out.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
         1, 2 or 3.
     bounds
         In 1D ``xmin, xmax, h``; in 2D ``xmin, xmax, ymin, ymax, h``; in 3D
-        ``xmin, xmax, ymin, ymax, zmin, zmax, h``, with the cell size h. Left out altogether in
-        the older language, where create_domain follows.
+        ``xmin, xmax, ymin, ymax, zmin, zmax, h``, with the cell size h. Omit them in older
+        scripts that use create_domain.
 
     Example
     -------
@@ -49,7 +49,7 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
 
     Notes
     -----
-    Comes once, before regions and solids.
+    Once only, before regions and solids.
 
     See Also
     --------
@@ -73,13 +73,13 @@ dimension.syntax = "1|2|3, xmin, xmax[, ymin, ymax[, zmin, zmax]], h"
 
 
 def create_domain(hub: Hub, *bounds: Argument) -> None:
-    """Set the domain: the older form of dimension.
+    """Set the domain (older form; see dimension).
 
     Parameters
     ----------
     bounds
         ``xmin, xmax``, in 2D and 3D followed by ``ymin, ymax``, in 3D followed by
-        ``zmin, zmax``; then perhaps the cell size h. Without h the first solid sets it.
+        ``zmin, zmax``; then optionally the cell size h. Without h the first solid sets it.
 
     Example
     -------
@@ -88,8 +88,8 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
 
     Notes
     -----
-    Without ``dimension(1|2|3)`` before it, the number of arguments tells the dimension. New
-    scripts say it all with dimension.
+    Without ``dimension(1|2|3)`` before it, the number of arguments sets the dimension. New scripts
+    need only dimension.
 
     See Also
     --------
@@ -105,7 +105,7 @@ create_domain.syntax = "xmin, xmax[, ymin, ymax[, zmin, zmax]][, h]"
 
 
 def axisymmetric(hub: Hub, active: bool) -> None:
-    """Say whether x is a radius and y the axis of symmetry.
+    """Make x the radius and y the axis of symmetry.
 
     Parameters
     ----------
@@ -119,9 +119,9 @@ def axisymmetric(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Needs two dimensions, no part of the domain below x = 0, and comes before the first solid.
-    Points carry the volume and mass of one radian: forces and energies of the whole body are 2 pi
-    times those of the log.
+    Comes before the first solid. Needs two dimensions and a domain with x >= 0. Points carry the
+    volume and mass of one radian: multiply forces and energies in the log by 2 pi for the whole
+    body.
 
     See Also
     --------
@@ -150,14 +150,14 @@ def axisymmetric(hub: Hub, active: bool) -> None:
 
 
 def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
-    """Say what happens to points that reach the edge of the domain.
+    """Set what happens to points that reach the edge of the domain.
 
     Parameters
     ----------
     style
-        ``error`` (the default): the run ends, with an explanation. ``delete``: the point is taken
-        out of the run, with its mass and momentum. ``reflect``: the point is put back inside, as
-        far from the edge as it was beyond, and its velocity across the edge is turned round.
+        ``error`` (the default): the run ends with an explanation. ``delete``: the point is removed,
+        with its mass and momentum. ``reflect``: the point is mirrored back inside at the edge, and
+        its normal velocity is reversed.
 
     Example
     -------
@@ -165,20 +165,20 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
 
     Notes
     -----
-    ``delete`` and ``reflect`` are for splashes. A body that rests against a wall needs fix
-    velocity_nodes there. A warning names the first point, and the end of a run says how many there
-    were.
+    ``delete`` and ``reflect`` are for splashes. For a body that rests against a wall, use fix
+    velocity_nodes. A warning names the first point, and the end of a run reports the number of
+    points.
 
-    The program deletes a point before the step in which it would leave. Dumps omit it. Other ids
-    stay. The program goes back to its last kept state, by a hundred steps at most. It repeats these
-    steps with their hooks in Python. A run in which points leave in every step takes about six
+    A point is deleted before the step in which it would leave. Dumps omit it. The other ids do not
+    change. The run returns to its last stored state, at most a hundred steps back, and repeats
+    these steps with their Python hooks. A run in which points leave in every step takes about six
     times as long.
 
-    A reflected point keeps its stress and the velocity along the edge. Neighbours that still press
-    outwards may bring it back to the edge. A body that meets the edge as a whole loses most of its
-    motion across it.
+    A reflected point retains its stress and tangential velocity. Neighbours that still push
+    outwards may return it to the edge. A body that hits the edge as a whole loses most of its
+    normal velocity.
 
-    Methods whose solids have grids of their own (tlmpm, tlcpdi) have no edge.
+    Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 
     See Also
     --------
@@ -189,16 +189,16 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
 
 
 def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) -> None:
-    """Name a part of space, to be filled by a solid or to choose the members of a group.
+    """Name a part of the domain, to fill with a solid or to select the members of a group.
 
     Parameters
     ----------
     ID
         Name of the region.
     style
-        The shape, or how it is made of other regions.
+        The shape, or how other regions are combined.
     arguments
-        What the style asks for, see the page of the style.
+        Arguments of the style; see its page.
 
     Example
     -------
@@ -206,7 +206,7 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
 
     Notes
     -----
-    Surfaces belong to a region. The word ``exterior`` at the end of block, cylinder and sphere
+    A region includes its surface. The word ``exterior`` at the end of block, cylinder and sphere
     inverts the region, for groups and for solids.
 
     See Also
@@ -269,7 +269,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
 
 
 def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:
-    """Make a body of material points: fill a region with them, or put them into a mesh.
+    """Create a body of material points from a region or a mesh.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
     kind
         Where the points come from.
     arguments
-        What the style asks for, see the page of the style. For ``region``:
+        Arguments of the style; see its page. For ``region``:
         ``regionID, ppc, material, h[, T0]``: the region to fill, the points per cell in each
         direction, the material, the cell size of the domain, and the initial temperature (default:
         the material's). For ``mesh``: ``file, material, h[, T0]``.
@@ -289,7 +289,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
 
     Notes
     -----
-    The method, the domain, the region and the material come before.
+    The method, domain, region and material must already be defined.
 
     See Also
     --------
@@ -328,7 +328,7 @@ solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, m
 
 
 def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
-    """Tell of the form that gave the number of points along each direction of a region."""
+    """Explain the old form, with the number of points along each direction of a region."""
     region, *counts, material, h = (argument.text for argument in arguments)
     if len(counts) == hub.domain.dimension > 1:
         raise ScriptError(
@@ -351,25 +351,24 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    Points belong to a group by their reference positions when the line is read. Nodes belong by
-    their positions. Own nodes of solids that are made later also belong, unless solids are named.
-    The group ``all`` always exists.
+    Points belong to a group by their reference positions when the command is read. Nodes belong by
+    their positions. The separate nodes of solids that are made later also belong, unless solids are
+    named. The group ``all`` always exists.
 
     Parameters
     ----------
     ID
-        Name of the group. A name that is in use gets the new members, too.
+        Name of the group. An existing group also gets the new members.
     kind
         ``particles`` or ``nodes``.
     by
         The word ``region``.
     region
-        ID of the region, which says who belongs.
+        ID of the region that selects the members.
     of
         ``all``, or ``solid`` followed by the IDs of the solids whose points may belong.
     solids
-        IDs of solids. Where these share one grid, for nodes it makes no difference which are
-        named.
+        IDs of solids. For nodes, solids that use the same grid give the same group.
 
     Example
     -------
@@ -412,7 +411,7 @@ def group(
     if found or region.unknown:
         return
     if kind == "nodes" and not solids and own_grids(hub):
-        members.awaits_solids = True  # the run tells when none came
+        members.awaits_solids = True  # the run warns if none came
     else:
         none_yet = "no solid is made yet: groups of particles come after the solids"
         hub.warn(

@@ -1,4 +1,4 @@
-"""Commands that define what acts and what is measured: fix, compute, functions of groups."""
+"""Commands that define loads and measurements: fix, compute, functions of groups."""
 
 from typing import Any, Literal
 
@@ -17,16 +17,16 @@ from karamelo_py.styles.fixes.measuring import COME_FIRST, Measuring
 
 
 def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
-    """Define something that acts on the run: a support, a load, an initial state.
+    """Define a support, a load or an initial state.
 
     Parameters
     ----------
     ID
-        Name of the fix. A name that is in use replaces the fix.
+        Name of the fix. A fix with the same name is replaced.
     style
         What it does.
     arguments
-        What the style asks for, beginning with the group it acts on; see its page.
+        Arguments of the style, beginning with the group it acts on; see its page.
 
     Example
     -------
@@ -42,7 +42,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
 
 
 def delete_fix(hub: Hub, ID: str) -> None:
-    """Remove a fix. Its published values stay as they are.
+    """Remove a fix. Its published values stay available.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def delete_fix(hub: Hub, ID: str) -> None:
 
 
 def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) -> None:
-    """Define something to measure whenever the log is written.
+    """Define a quantity to measure whenever the log is written.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     style
         What it measures.
     arguments
-        What the style asks for, beginning with the group it measures; see its page.
+        Arguments of the style, beginning with the group it measures; see its page.
 
     Example
     -------
@@ -84,7 +84,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
 
 
 def delete_compute(hub: Hub, ID: str) -> None:
-    """Remove a compute. Its published values stay as they are.
+    """Remove a compute. Its published values stay available.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def delete_compute(hub: Hub, ID: str) -> None:
 def _define(
     hub: Hub, own: Catalogue, others: Catalogue, ID: str, style: str, arguments: tuple
 ) -> Any:
-    """Make a fix or a compute, and publish its values."""
+    """Make a fix or a compute and publish its values."""
     kind = own.kind
     _refuse_wrong_order(kind, ID, style, arguments)
     with signature.in_new_words(kind, ID, style, arguments):
@@ -135,7 +135,7 @@ def _define(
 
 
 def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argument, ...]) -> None:
-    """Tell of a style behind the group, as in LAMMPS."""
+    """Explain that the style comes before the group, unlike in LAMMPS."""
     if registry.knows(kind, style) or registry.knows(kind, ID):
         return
     third = arguments[0].word() if arguments else None
@@ -146,11 +146,11 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
             expected=f"{kind}({ID}, {third}, {style}, ...)",
         )
     if third and instead(kind, third):
-        registry.find(kind, third)  # says what to write in its place
+        registry.find(kind, third)  # its error suggests the name
 
 
 def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
-    """A value that is published must not hide what a name means already."""
+    """Refuse a published value that would hide an existing name."""
     for suffix in style.published:
         name = f"{ID}_{suffix}" if suffix else ID
         if name in MEANINGS or name in SEEDS:
@@ -173,7 +173,7 @@ Direction = Literal["x", "y", "z"]
 
 
 def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the centre of mass of a group, as a formula that follows it.
+    """Give the centre of mass of a group, as a formula that stays up to date.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
 
     Notes
     -----
-    It is measured when the log is written and where a condition asks for it, as a compute is.
+    Measured like a compute: when the log is written or a condition reads it.
 
     See Also
     --------
@@ -202,7 +202,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
 
 
 def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the force that acts in a group, as a formula that follows it.
+    """Give the internal force of a group, as a formula that stays up to date.
 
     Parameters
     ----------
@@ -218,9 +218,9 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Of nodes: the sum of what points give to them, the divergence of stress and the forces of fixes
-    on points (contact, tools, tractions). At held nodes that hardly accelerate it is the opposite
-    of the reaction. Of points: the rate of their momentum in the last step, sum m a. Before the
+    Nodes: the sum of the forces from the points, i.e. the divergence of stress and the forces of
+    fixes on points (contact, tools, tractions). At held nodes with little acceleration it is minus
+    the reaction. Points: the rate of change of their momentum in the last step, sum m a. Before the
     first step it is 0.
 
     See Also
@@ -236,7 +236,7 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
 
 def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the force that fixes apply to a group, as a formula that follows it.
+    """Give the force that fixes apply to a group, as a formula that stays up to date.
 
     Parameters
     ----------
@@ -252,10 +252,10 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Of nodes: what fixes such as body_force and force_nodes add to the force of the nodes. Of
-    points: what fixes put on the points (contact, tools, tractions). Velocities that are
-    prescribed are no forces: the fixes publish their reactions. Before the first step it is 0.
-    Karamelo gives the internal force here.
+    Nodes: the forces that fixes such as body_force and force_nodes add to the nodes. Points: the
+    forces of fixes on the points (contact, tools, tractions). Prescribed velocities are not
+    included: those fixes publish their reactions. Before the first step it is 0. Karamelo gives
+    the internal force here.
 
     See Also
     --------
@@ -270,7 +270,7 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
 
 def _total(hub: Hub, name: str, group: AnyGroup, direction: str) -> Expression:
-    """The value of the fix that measures it, which is made when first asked for."""
+    """The value of the fix that measures it, which is made on first use."""
     ID = f"{name}({group.id})"
     if ID not in hub.fixes:
         others = dict(hub.fixes)
@@ -288,6 +288,6 @@ def _file(hub: Hub, catalogue: Any, ID: str, item: Any, style: str) -> None:
 
 
 def _component(hub: Hub, formula: Expression, direction: str) -> Expression:
-    """`formula`, or 0 in a direction that the domain does not have."""
+    """`formula`, or 0 in a direction that the domain lacks."""
     d = require_domain(hub).dimension
     return Expression(formula if "xyz".index(direction) < d else 0.0)

@@ -9,7 +9,7 @@ from karamelo_py.script.expressions import POINT_SEEDS, SEEDS, Expression, shown
 
 
 def print_(hub: Hub, first: Argument, *more: Argument) -> None:
-    """Print what variables and expressions stand for.
+    """Print the values of variables and expressions.
 
     Parameters
     ----------
@@ -48,9 +48,9 @@ print_.may_differ = True
 
 
 def value(hub: Hub, expression: Expression) -> float:
-    """Give the present value of a formula, as a number that no longer changes.
+    """Give the present value of a formula, as a constant number.
 
-    ``value`` and ``evaluate`` are two names of it.
+    ``evaluate`` is another name for it.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def value(hub: Hub, expression: Expression) -> float:
         return expression.constant
     if not expression.names.intersection(POINT_SEEDS):
         if hub.rehearsing:
-            return math.nan  # Known only once the runs before it are made.
+            return math.nan  # known only after the runs before it
         if hub.interpreter.replay is not None:
             found = hub.interpreter.replay.value()
         else:
@@ -81,7 +81,7 @@ def value(hub: Hub, expression: Expression) -> float:
 
 
 def include(hub: Hub, file: str) -> None:
-    """Go through another script at this place; what it sets stays set.
+    """Execute another script here; its variables and definitions remain.
 
     Parameters
     ----------
@@ -106,6 +106,6 @@ def quit_(hub: Hub) -> None:
 
 
 def _refresh(hub: Hub, formula: Expression) -> None:
-    """Let fixes and computes measure anew if the formula reads what they publish."""
+    """Update fixes and computes whose published values the formula reads."""
     if formula.names - SEEDS and not hub.rehearsing:
         hub.refresh_values()

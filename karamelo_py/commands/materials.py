@@ -1,4 +1,4 @@
-"""Commands about materials, their parts, and what shows them: element."""
+"""Commands for materials and their parts, and for testing a law: element."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
     style
         The law.
     arguments
-        What the style asks for; see its page.
+        Arguments of the style; see its page.
 
     Example
     -------
@@ -49,7 +49,7 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
 
 
 def judge(hub: Hub, made: Material) -> None:
-    """Try the law of a plug-in, and warn of numbers that hardly any body has."""
+    """Test the law of a plug-in, and warn of values that hardly any material has."""
     try_law(hub, made)
     with attributed(hub):
         for what, hint in doubts(made.law):
@@ -78,7 +78,7 @@ def _part(kind: str, summary: str, example: str, others: str) -> Callable:
     style
         The law.
     arguments
-        What the style asks for; see its page.
+        Arguments of the style; see its page.
 
     Example
     -------
@@ -118,7 +118,7 @@ temperature = _part(
 
 
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
-    """File under `ID` what the style makes of the arguments; an ID in use is an error first."""
+    """Store under `ID` the object that the style makes; refuse an ID in use first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
     given: dict = {}
@@ -141,34 +141,34 @@ def load_path(
     volumetric: float | None = None, turn: float = 0.0,
     duration: Annotated[float, Positive] | None = None,
 ) -> None:  # fmt: skip
-    """Describe a piece of a load path: what an element is brought to, from wherever it is.
+    """Define one segment of a load path, by its final strains or stresses.
 
-    Strains and stresses are those at the end of the piece; they are reached in equal increments.
-    A strain whose component is not named at all stays as it is.
+    The segment starts from the current state and reaches its final values in equal increments. A
+    strain component that is not named stays constant.
 
     Parameters
     ----------
     ID
         Name of the load path.
     increments
-        How many increments.
+        Number of increments.
     exx, eyy, ezz, exy, exz, eyz
-        Strain: the sum of the increments, so ln(length over first length) with many of them. Shear
-        strain is that of the tensor, half the angle.
+        Strain: the sum of the increments, so ln(length/initial length) for many increments. Shear
+        strains are tensor components, half the angle.
     gxy, gxz, gyz
-        Angle of simple shear, twice the strain of the tensor. gxy moves x along y and turns the
-        point by half of it. exy does not turn the point.
+        Angle of simple shear, twice the tensor strain. gxy moves x along y and rotates the point by
+        gxy/2. exy does not rotate the point.
     sxx, syy, szz, sxy, sxz, syz
         Cauchy stress, tension positive. The program finds the strain of this component.
     volumetric
-        exx + eyy + ezz: the normal strains that are not named share what it takes.
+        exx + eyy + ezz: the remaining volumetric strain is split among the unspecified normal
+        strains.
     turn
-        Angle about z by which the point turns meanwhile, in radians. Strains and stresses are
-        about axes that do not turn.
+        Angle in radians by which the point rotates about z during the segment. Strains and stresses
+        refer to fixed axes.
     duration
-        Duration, by default 1, for laws that depend on the rate of strain. Alone it holds the
+        Duration, by default 1, for rate-dependent laws. A segment with only a duration holds the
         point.
-
     Example
     -------
     load_path(pull, 100, exx=0.01, syy=0, szz=0)
@@ -227,26 +227,26 @@ def element(
     kinematics: Literal["3D", "plane-strain", "axisymmetric", "1D"] = "3D",
     tangent: bool = False,
 ) -> None:
-    """Take one point of a material along a load path, to see its law before using it.
+    """Take one point of a material along a load path, to check its law before a run.
 
-    Writes what the point answers to the table element_ID.txt and draws it to element_ID.png. Needs
-    no domain and compiles nothing. The point begins at rest, without stress;
-    of material cam-clay at its pressure p0.
+    Writes the response to the table element_ID.txt and plots it to element_ID.png. Needs no domain
+    and compiles nothing. The point begins at rest and stress-free; cam-clay begins at its pressure
+    p0.
 
     Parameters
     ----------
     ID
-        Name of the element, which names its files.
+        Name of the element, used in its file names.
     material
         ID of a material.
     first, more
-        IDs of load paths, one after another; a path may come again.
+        IDs of load paths, in order. A path may be repeated.
     kinematics
-        Which strains there can be: ``3D``; ``plane-strain`` (none out of the plane xy);
+        Which strains are possible: ``3D``; ``plane-strain`` (none out of the plane xy);
         ``axisymmetric`` (x the radius, y the axis, z around it); ``1D`` (exx only).
     tangent
-        Whether to print the tangent of the last increment: derivatives of the Cauchy stress by
-        strains and angles of shear. These angles are twice the strain of the tensor.
+        Whether to print the tangent of the last increment: derivatives of the Cauchy stress with
+        respect to strains and angles of shear. The angles are twice the tensor strains.
 
     Example
     -------
@@ -258,16 +258,16 @@ def element(
 
     Notes
     -----
-    The table has the form of the log, and a row for each increment: time; strain exx ...; Cauchy
-    stress sxx ...; pressure p and von Mises stress q; J = det F; stored energy and work of the
-    stress per reference volume; columns of the law, such as the equivalent plastic strain ep. The
-    last row is published as ID_exx, ID_sxx and so on.
+    The table has the format of the log, with a row per increment: time; strain exx ...; Cauchy
+    stress sxx ...; pressure p and von Mises stress q; J = det F; stored energy and stress work per
+    reference volume; columns of the law, such as the equivalent plastic strain ep. The last row is
+    published as ID_exx, ID_sxx and so on.
 
-    The law gets dt grad v as in a run, so that det F of n increments e is (1 + e)^n. An increment
-    of a turn is skew to first order. Its second order stores the least energy, because laws in rate
-    form and laws in F differ on what is rigid. Newton's method with the exact tangent finds the
-    strains of prescribed stresses. It halves an increment that does not converge, up to eight
-    times. If that fails, the files show the increments so far.
+    The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. The increment of
+    a rotation is skew to first order. Its second-order part is chosen for the least stored energy,
+    because laws in rate form and laws in F differ on what is rigid. Prescribed stresses are solved
+    for with Newton's method and the exact tangent. An increment that does not converge is halved,
+    up to eight times. If that fails, the files show the increments so far.
 
     See Also
     --------
@@ -300,7 +300,7 @@ def element(
     finally:
         for name, value in response.last().items():
             hub.values.set(f"{ID}_{name}", value)
-        # What was reached before an error shows where the law gives way.
+        # The increments before an error show where the law fails.
         if not hub.checking:
             response.write(hub.folder / table)
             response.draw(hub.folder / picture, what)
@@ -331,7 +331,7 @@ def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> No
 
 
 def _check_components(path: LoadPath, point: Point, kinematics: str, number: int) -> None:
-    """Refuse strains that the kinematics does not have, and stresses that need them."""
+    """Refuse strains that the kinematics lacks, and stresses that need them."""
     for kind, names in (("e", path.strain), ("s", path.stress)):
         for name in names:
             if name not in point.free:

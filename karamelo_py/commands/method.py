@@ -1,4 +1,4 @@
-"""Commands about the method: method, scheme, precision, anti_volumetric_locking."""
+"""Commands for the method: method, scheme, precision, anti_volumetric_locking."""
 
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
@@ -21,22 +21,22 @@ def method(
     basis: StyleOf("basis"),
     *options: Argument,
 ) -> None:
-    """Choose the method, the transfer of velocity, and the basis functions.
+    """Choose the method, the velocity transfer and the basis functions.
 
     Parameters
     ----------
     kind
-        Which grids there are, and whether points move through them.
+        Which grids are used, and whether points move through them.
     transfer
-        How velocity goes from the nodes to the points.
+        How velocity is mapped from nodes to points.
     basis
-        The functions of the nodes; with the cpdi methods ``linear``.
+        The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
-        First the numbers of the transfer (the share of FLIP, the order of XPIC), then those of the
-        basis and of the method. Words stand in any order. ``thermo-mechanical``: heat flows between
-        points (``mechanical``, the default: it does not). ``gradient-enhanced``: FLIP maps the
-        gradient of velocity too. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of
-        cpgimp. ``R4``, ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
+        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), then those for
+        the basis and the method. Words in any order. ``thermo-mechanical``: heat flows between
+        points (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the
+        velocity gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp.
+        ``R4``, ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
 
     Example
     -------
@@ -50,14 +50,14 @@ def method(
     -----
     Comes before the first solid.
 
-    ``thermo-mechanical``: before each update of momentum, heat flows between the points of
-    materials with a temperature. These are ``linear``, ``neo-hookean`` and ``hencky`` with cp and
-    kappa, and ``eos-strength`` with a temperature. Points take the changes of the nodes'
-    temperature (FLIP, for any transfer of velocity), so that only conduction smears temperatures.
-    Conduction has a stable step of its own, h^2/(4 d) rho cp/kappa in d dimensions, which `dt`
-    keeps too. Heat flows between bodies that share nodes. Otherwise it leaves a body only by a fix.
+    ``thermo-mechanical``: before each momentum update, heat flows between points of materials with
+    a temperature. These are ``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, and
+    ``eos-strength`` with a temperature. Points take the temperature increments of the nodes (FLIP,
+    for any velocity transfer), so only conduction smears temperatures. `dt` also respects the
+    stable step of conduction, h^2/(4 d) rho cp/kappa in d dimensions. Heat flows between bodies
+    with common nodes. Otherwise it leaves a body only by a fix.
 
-    Without that word, points only heat by their own work.
+    Without that word, points are heated only by their own work.
 
     See Also
     --------
@@ -93,17 +93,17 @@ def scheme(
     *arguments: Argument,
     start: Literal["full", "half"] = "full",
 ) -> None:
-    """Choose when in a step the stress is updated, or implicit steps.
+    """Choose when the stress is updated in a step, or an implicit scheme.
 
     Parameters
     ----------
     style
-        ``musl`` when there is no such command.
+        Default ``musl``.
     arguments
-        What the style asks for; explicit schemes ask for nothing.
+        Arguments of the style; explicit schemes have none.
     start
-        For how much of the first explicit step forces act: all of it (``full``), or ``half``.
-        ``half`` shows velocities and kinetic energies of the time of the log.
+        Fraction of the first explicit step in which forces act: all of it (``full``), or ``half``.
+        With ``half``, velocities and kinetic energies belong to the logged time.
 
     Example
     -------
@@ -112,12 +112,12 @@ def scheme(
 
     Notes
     -----
-    Positions belong to the ends of explicit steps, and velocities to their middles. With ``full``
-    the initial velocity belongs to half a step before the start. The log shows velocities half a
-    step early. A thrown body is then g dt t/2 further than it should be, and kinetic energies lag
-    by half a step. With ``half`` both are right to second order in the step. Points then store
-    their last velocity, too. Velocities that are set after the first step, such as
-    ``sim.points["vx"] = values``, are those of half a step before.
+    In explicit steps, positions belong to the end of a step and velocities to its middle. With
+    ``full`` the initial velocity belongs to half a step before the start, and the log shows
+    velocities half a step early. A projectile is then g dt t/2 too far, and kinetic energies lag by
+    half a step. With ``half`` both are second-order accurate in the step. Points then also store
+    their previous velocity. Velocities set after the first step, such as
+    ``sim.points["vx"] = values``, belong to half a step earlier.
 
     See Also
     --------
@@ -131,7 +131,7 @@ def scheme(
         if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
             error.hint = meant(pair[0], ["start"])
             error.expected = "start=full or start=half" if error.hint else error.expected
-        for name in PUBLISHED:  # who asks for these is not at fault
+        for name in PUBLISHED:  # a script that reads these is not at fault
             hub.values.publish(name)
         raise
     if start == "half" and chosen.traits.implicit:
@@ -150,17 +150,17 @@ def scheme(
         )
     update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
     for name in PUBLISHED:
-        # Those of steps before say nothing of an explicit scheme.
+        # Values of earlier steps do not apply to an explicit scheme.
         if name in hub.values or name in getattr(chosen, "published", ()):
             hub.values.publish(name)
 
 
-# A run may go on with another solver.
+# A resumed run may use another solver.
 scheme.may_vary = "tolerance", "iterations", "solver", "limit"  # type: ignore[attr-defined]
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
-    """Choose the precision of the numbers that points and nodes carry.
+    """Choose the floating-point precision of points and nodes.
 
     Parameters
     ----------
@@ -184,12 +184,12 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
 
 
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
-    """Average changes of volume over the surroundings of a point (F-bar).
+    """Average volume changes over neighbouring points (F-bar).
 
-    Nearly incompressible and plastic bodies are too stiff where each point keeps its own volume:
-    low-order functions cannot follow. Averaging the increment of volume with the weights of the
-    basis takes the excess of constraints away (Coombs et al. 2018). The mean stress is averaged
-    alike: the forces do the work of the averaged strain.
+    Nearly incompressible and plastic bodies are too stiff if the volume of each point is
+    constrained: low-order basis functions cannot deform accordingly. Averaging the volume increment
+    with the basis weights removes the excess constraints (Coombs et al. 2018). The mean stress is
+    averaged in the same way, so the forces do the work of the averaged strain.
 
     Parameters
     ----------
@@ -202,12 +202,13 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    One more visit of the points for each update of the stress, and one for the forces.
+    Costs one extra pass over the points per stress update and one per force evaluation.
 
-    Yield surfaces of mohr-coulomb, drucker-prager and mu-i take a part of the averaged pressure:
-    (sin(phi) - sin(psi))/(sin(phi) (1 - sin(psi))) of the difference to that of the point. With the
-    pressure of the point alone, sand that does not dilate would lose half of its strength. Load
-    steps take that of the point: leave averages out there in such sand.
+    Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
+    fraction of the difference from the averaged pressure:
+    (sin(phi) - sin(psi))/(sin(phi) (1 - sin(psi))). With the pressure of the point alone,
+    non-dilatant sand would lose half of its strength. Load steps use the pressure of the point:
+    do not use averages there for such sand.
 
     See Also
     --------
@@ -220,7 +221,7 @@ FAMILIES = ("transfer", "basis", "method")
 
 
 class _Call:
-    """The three styles of a call, and which of their parameters each option is."""
+    """The three styles of a call, and the parameter of each option."""
 
     def __init__(self, hub: Hub, kind: str, transfer: str, basis: str, options: Sequence[Argument]):
         self.hub = hub
@@ -230,7 +231,7 @@ class _Call:
         domain = hub.domain
         self.dimension = domain.dimension if domain is not None else hub.announced_dimension
         self.styles = self._found()
-        # Domains have a shape, which chooses the class of the basis.
+        # The shape of domains chooses the class of the basis.
         self.shapes = _variants(self.styles["method"])
         self.variants = {"method": {}, "transfer": _variants(self.styles["transfer"])}
         self.fit = [n for n, s in self.shapes.items() if self.dimension in (None, s.dimension)]
@@ -246,12 +247,12 @@ class _Call:
         self.variants["basis"] = self.shapes or _variants(self.styles["basis"])
 
     def _found(self) -> dict[str, type]:
-        """Method and transfer; of all names that are not known, all are told."""
+        """Method and transfer. The error lists all unknown names."""
         styles: dict[str, type] = {}
         errors: list[ScriptError] = []
         for family, name in self.names.items():
             if family == "basis" and not errors:
-                break  # It may be the shape of domains.
+                break  # it may be the shape of domains
             try:
                 styles[family] = registry.find(family, name)
             except ScriptError as error:
@@ -263,7 +264,7 @@ class _Call:
         return styles
 
     def parts(self) -> dict[str, Any]:
-        """Transfer, basis and method, made with the options that are theirs."""
+        """Transfer, basis and method, each made with its options."""
         if self.shapes:
             self._check_shapes()
         rest = self._choose("basis", self._choose("transfer", self.options))
@@ -276,7 +277,7 @@ class _Call:
                 raise self._unknown(argument, slots)
             family, parameter = slot or numbers.pop(0)
             before, words = given.get((family, parameter.name)), parameter.kind.words
-            # Scripts with variables in the place of options may say the same word twice.
+            # Scripts with variables as options may repeat a word.
             if before and not (words and _word(before, words) == _word(argument, words)):
                 raise _chosen_twice(before, argument)
             given[family, parameter.name] = argument
@@ -300,7 +301,7 @@ class _Call:
         }
 
     def _check_shapes(self) -> None:
-        """Refuse functions that know no domains, and shapes for another dimension."""
+        """Refuse basis functions without domains, and shapes for another dimension."""
         kind, fit = self.names["method"], self.fit
         if self.names["basis"] != "linear":
             raise ScriptError(
@@ -332,7 +333,7 @@ class _Call:
             )
 
     def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
-        """Put the variant that a word asks for in the place of the style; the other options."""
+        """Replace the style by the variant that a word selects, and return the other options."""
         variants = self.variants[family]
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
@@ -352,7 +353,7 @@ class _Call:
         basis: str | None = None,
         by_name: bool = False,
     ) -> str:
-        """The same call with another kind or basis, what it lacks, and `option` at the end."""
+        """The same call with another kind or basis, completed, and with `option` at the end."""
         styles = [self.styles[family] for family in FAMILIES if family in self.styles]
         asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
@@ -370,7 +371,7 @@ class _Call:
         return word is None or isinstance(self.hub.interpreter.variables.get(word), float)
 
     def _words(self, *families: str) -> list[str]:
-        """Words that some of the styles know."""
+        """Words that some of the styles accept."""
         words = []
         for family in families:
             words += [w for p in signature.parameters(self.styles[family]) for w in p.kind.words]
@@ -378,7 +379,7 @@ class _Call:
         return words
 
     def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
-        """Return the error for an option that nothing takes."""
+        """Return the error for an option that no style takes."""
         word = argument.word()
         if self._is_number(argument):
             asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}
@@ -393,7 +394,7 @@ class _Call:
             )
         for family in FAMILIES:
             for name in registry.names(family):
-                with suppress(ScriptError):  # a broken plug-in is not what this is about
+                with suppress(ScriptError):  # not the place to report a broken plug-in
                     if word in _variants(registry.find(family, name)):
                         return ScriptError(
                             f"{word} goes with {name}, not with {self.names[family]}",
@@ -410,12 +411,12 @@ class _Call:
 
 
 def _variants(style: type) -> Mapping[str, Any]:
-    """Words that choose another class (or style, by its name) in the place of a style."""
+    """Words that choose another class (or style, by its name) instead of a style."""
     return getattr(style, "variants", {})
 
 
 def _word(argument: Argument, known: Container[str]) -> str | None:
-    """The one of the `known` words that an argument is; a variable of that name is passed over."""
+    """The word of `known` that an argument names; a variable of that name is ignored."""
     word = argument.text if argument.text in known else argument.word()
     return word if word in known else None
 

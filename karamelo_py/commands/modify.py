@@ -1,4 +1,4 @@
-"""Command modify: numbers of materials that change between runs."""
+"""Command modify: change material constants between runs."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from karamelo_py.script.errors import ScriptError, unknown
 
 
 def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
-    """Change numbers of a material between runs; its points keep their state.
+    """Change constants of a material between runs; its points retain their state.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     ID
         Name of the material or of the part.
     numbers
-        ``name=value`` for each number that changes, by the names on the page of the style. They are
+        ``name=value`` for each changed constant, with the names on the page of the style. They are
         checked together, as in the first definition.
 
     Example
@@ -34,13 +34,13 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
     Notes
     -----
-    The next run computes with the new numbers, in the same compiled loops. Stresses stay as they
-    are; those beyond a new yield surface return to it in the first step. If an elastic modulus
-    changes, the stress of a law that adds up increments stays, and that of a law of the whole
-    deformation follows at once. The density cannot change, since points have their masses, nor can
-    a number from which the state of points began, such as pc of cam-clay.
+    The next run uses the new constants in the same compiled loops. Stresses are retained; a stress
+    outside the new yield surface returns to it in the first step. If an elastic modulus changes,
+    the stress of an incremental law is retained, and the stress of a law of the total deformation
+    changes at once. Not changeable: the density, because points have their masses, and a constant
+    that sets the initial state of points, such as pc of cam-clay.
 
-    ``kind`` material also finds numbers of the parts of eos-strength, where one part alone has the
+    ``kind`` material also finds constants of the parts of eos-strength if only one part has the
     name.
 
     See Also
@@ -76,7 +76,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
 
 def _parts(material: Material) -> list[MaterialPart]:
-    """List the parts that a material was made of."""
+    """List the parts of a material."""
     found: list[Any] = []
     for value in material.given.values():
         found += value if isinstance(value, tuple) else [value]
@@ -84,7 +84,7 @@ def _parts(material: Material) -> list[MaterialPart]:
 
 
 def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
-    """Find the material, or the one part of it, that has all numbers."""
+    """Find the material, or its only part, that has all the constants."""
     names = {(argument.keyword() or ("",))[0] for argument in numbers}
     if names <= set(material.given):
         return material
@@ -112,14 +112,14 @@ def _changed(hub: Hub, entry: MaterialPart, given: dict, numbers: tuple) -> Mate
 
 
 def _now(value: Any, changed: dict) -> Any:
-    """Return what a value, perhaps a part or several, has become."""
+    """Return the new value of a value, perhaps a part or several."""
     if isinstance(value, tuple):
         return tuple(_now(one, changed) for one in value)
     return changed.get(value, value) if isinstance(value, MaterialPart) else value
 
 
 def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument, ...]) -> None:
-    """Refuse what points that exist cannot follow."""
+    """Refuse changes that existing points cannot follow."""
     if any(solid.material is before for solid in hub.solids.values()):
         names = ", ".join((argument.keyword() or ("",))[0] for argument in numbers)
         if specific_volume(after.law) != specific_volume(before.law):

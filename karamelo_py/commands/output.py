@@ -1,4 +1,4 @@
-"""Commands about output: dump, log, plot and what belongs to them."""
+"""Commands for output: dump, log, plot and their options."""
 
 import re
 from typing import Literal
@@ -19,7 +19,7 @@ from karamelo_py.script.errors import ScriptError
 def dump(
     hub: Hub, ID: str, group: Literal["all"], style: StyleOf("dump"), *arguments: Argument
 ) -> None:
-    """Write snapshots of the points or the nodes to files, again and again while the scene runs.
+    """Write snapshots of points or nodes to files at intervals.
 
     Parameters
     ----------
@@ -28,18 +28,18 @@ def dump(
     group
         Always the word ``all``.
     style
-        What is written, and in which form.
+        The content and format of the files.
     arguments
-        What the style asks for, beginning with the rhythm and the file name; see the page of the
-        style. The rhythm is a number of steps, or ``time(T)``: the first step at or after each
-        multiple of the time T.
+        Arguments of the style, beginning with the interval and the file name; see its page. The
+        interval is a number of steps, or ``time(T)``: the first step at or after each multiple of
+        the time T.
 
     Notes
     -----
-    A file name is relative to the folder where the program was started; ``~`` is the home folder,
-    and a folder in the name must exist. Files of that name are overwritten.
-    Snapshots of an earlier, longer run whose steps this run does not reach stay: a viewer would
-    show them after its own.
+    A file name is relative to the folder where the program was started; ``~`` is the home folder. A
+    folder in the name must exist. Files of that name are overwritten. Snapshots of a longer,
+    earlier run remain if this run does not reach their steps: a viewer shows them after the new
+    ones.
 
     Example
     -------
@@ -63,7 +63,7 @@ def dump(
 
 
 def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
-    """Tell of a file name in front of the number of steps."""
+    """Explain that the number of steps comes before the file name."""
     if len(arguments) < 2:
         return
     first, second = arguments[:2]
@@ -78,11 +78,11 @@ def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
         )
 
 
-dump.syntax = "ID, all, style, every, file[, ...]"  # the rest is the style's own
+dump.syntax = "ID, all, style, every, file[, ...]"  # the style defines the rest
 
 
 def delete_dump(hub: Hub, ID: str) -> None:
-    """Stop a dump. What it has written stays.
+    """Stop a dump. Its files remain.
 
     Parameters
     ----------
@@ -100,15 +100,15 @@ def delete_dump(hub: Hub, ID: str) -> None:
     old = hub.dumps[ID]
     hub.dumps.remove(ID)
     if old.one_file_per_step:
-        # A file of many snapshots stays taken: another dump would begin it anew.
+        # A file with several snapshots stays reserved: another dump would overwrite it.
         hub.output.files.pop(old.file, None)
 
 
 def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> None:
-    """Set how often a line is logged, and in which form.
+    """Set how often a line is logged, and in which format.
 
-    The log goes to the terminal and to log.mpm in the current folder, every line at once. The
-    first and the last state of each run are always logged. Without this command every step is.
+    Each line goes at once to the terminal and to log.mpm in the current folder. The first and last
+    state of each run are always logged. Without this command, every step is logged.
 
     Parameters
     ----------
@@ -139,9 +139,9 @@ def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> N
 
 
 def log(hub: Hub, every: Every) -> None:
-    """Set how often a line is logged: the older form of set_output.
+    """Set how often a line is logged (older form; see set_output).
 
-    Only where it stands alone on a line; inside an expression log(x) is the natural logarithm.
+    Only as a statement; in an expression log(x) is the natural logarithm.
 
     Parameters
     ----------
@@ -171,8 +171,8 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
 
     Notes
     -----
-    Between two runs it changes the columns of the following rows. A line in log.mpm that begins
-    with ``#`` has their names.
+    Between two runs it changes the columns of the following rows. Their names are in a line of
+    log.mpm that begins with ``#``.
 
     Example
     -------
@@ -207,9 +207,9 @@ def plot(
     scale: Literal["linear", "log"] = "linear",
     label: str | None = None,
 ) -> None:
-    """Plot one quantity against another, in the picture that save_plot names.
+    """Plot one quantity against another, in the picture of save_plot.
 
-    Curves over the same x share one diagram, with a legend of their IDs.
+    Curves with the same x are drawn in one diagram, with a legend of their IDs.
 
     Parameters
     ----------
@@ -220,11 +220,11 @@ def plot(
     x, y
         ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
     axis
-        The side of the axis of y: ``right`` for a second one, with limits of its own.
+        Side of the y axis: ``right`` for a second axis with separate limits.
     scale
-        ``log`` for a logarithmic axis of y. It omits numbers that are not positive.
+        ``log`` for a logarithmic y axis, which omits numbers that are not positive.
     label
-        Label of the axis of y, such as "energy (J)". The default is the name of y with its unit.
+        Label of the y axis, such as "energy (J)". The default is the name of y with its unit.
 
     Example
     -------
@@ -246,7 +246,7 @@ def plot(
 def save_plot(hub: Hub, file: OutputFile) -> None:
     """Draw the curves of all plot commands to a file at the end of each run.
 
-    A run that breaks off draws them, too. Given after a run, it draws at once what was collected.
+    Interrupted and failed runs draw them too. After a run, the command draws the curves at once.
 
     Parameters
     ----------
@@ -280,15 +280,15 @@ def units(
 ) -> None:
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
 
-    No number changes. A scene in mm, g, ms has forces in N, stresses in MPa and energies in mJ. The
-    program warns before the first step of densities and wave speeds that no real material has.
-    These are densities outside 10 to 100000 kg/m^3 (gases: below 0.001), and speeds outside 1 m/s
-    to 50 km/s.
+    No number is converted. A scene in mm, g, ms has forces in N, stresses in MPa and energies in
+    mJ. Before the first step, the program warns of densities and wave speeds that no real material
+    has: densities outside 10 to 100000 kg/m^3 (gases: below 0.001), and speeds outside 1 m/s to
+    50 km/s.
 
     Parameters
     ----------
     length, mass, time, temperature
-        The units that the numbers of the script are in.
+        Units of the numbers in the script.
 
     Example
     -------
@@ -302,5 +302,5 @@ def units(
 
 
 for _command in (dump, delete_dump, set_output, log, log_modify, plot, save_plot, units):
-    # Another one does no harm where a run goes on from a file.
+    # A change is harmless when a run resumes from a file.
     _command.may_differ = True

@@ -21,13 +21,13 @@ from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 
 class Solids(tuple):
-    """For signatures: a solid, or all of them."""
+    """For signatures: one solid or all of them."""
 
     script_kind = "the ID of a solid, or all"
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> "Solids":
-        """The solids that `argument` names."""
+        """Return the solids that `argument` names."""
         if ALL in (argument.text, argument.word()):
             return cls(hub.solids.values())
         return cls((Solid.from_script(hub, argument),))
@@ -36,7 +36,7 @@ class Solids(tuple):
 def delete_particles(
     hub: Hub, solids: Solids, by: Literal["region", "where"], chosen: Argument
 ) -> None:
-    """Take points of a solid away: holes, notches, what a run has shown to be needless.
+    """Delete points of a solid, for holes and notches or between runs.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def delete_particles(
         The word ``region`` or ``where``.
     chosen
         ID of a region, whose points are deleted by their reference positions. After ``where``: a
-        formula of columns of dump particle. Points are deleted where it is not 0.
+        formula of columns of dump particle. Points for which it is not 0 are deleted.
 
     Example
     -------
@@ -55,10 +55,10 @@ def delete_particles(
 
     Notes
     -----
-    With ``where`` it stands between runs. The program prints the mass and energy of the deleted
-    points. Before the first run it numbers the other points anew. Then the command comes before the
-    groups of particles and contact fixes of these solids. Between runs numbers stay. All points of
-    a solid cannot be deleted before the first run.
+    With ``where`` the command comes between runs. The mass and energy of the deleted points are
+    printed. Before the first run, the remaining points are renumbered, so the command must come
+    before the groups of particles and contact fixes of these solids. Between runs the numbers do
+    not change. A solid cannot lose all of its points before the first run.
 
     See Also
     --------
@@ -102,7 +102,7 @@ def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
     if hub.rehearsing or hub.interpreter.replay is not None:
         return
     own, fields = {solid.index for solid in solids}, hub.fields
-    # Zero where points have gone: these are not asked.
+    # Zero for deleted points: the condition does not apply to them.
     meet = np.zeros(fields.count, np.bool_)
     meet[fields.present] = condition.holds(fields)
     _take_away(hub, np.flatnonzero(meet & np.isin(fields.solid, list(own))))
@@ -131,10 +131,10 @@ def translate_particles(
     by
         The word ``region``.
     region
-        ID of the region: its points move.
+        ID of the region whose points move.
     shift
-        dx, dy, dz, as many as the domain has dimensions: numbers or formulas of x, y and z. NULL
-        leaves a component alone.
+        dx, dy, dz, one per dimension of the domain: numbers or formulas of x, y and z. NULL leaves
+        a component unchanged.
 
     Example
     -------
@@ -142,9 +142,9 @@ def translate_particles(
 
     Notes
     -----
-    The points are there from the start: their reference positions move, and volumes stay (around
-    an axis they follow the radius). A grid of the solid's own covers the new places. The points
-    stay in the groups that they belong to.
+    The reference positions move, so the points start there. Volumes do not change, except in
+    axisymmetry, where they follow the radius. A separate grid of a solid covers the new positions.
+    The points stay in their groups.
 
     See Also
     --------
@@ -167,7 +167,7 @@ def translate_particles(
 
 
 def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
-    """Put the points of `solid` elsewhere, `step` (n, d) from where they are."""
+    """Move the points of `solid` by `step` (n, d)."""
     moved = _chosen(solid, np.ones(solid.count, np.bool_))
     x0 = moved.x0 + step
     if not hub.domain.contains(x0).all():
@@ -186,7 +186,7 @@ def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
 
 
 def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
-    """The points of a solid that are `kept`, as they were placed."""
+    """The initial state of the points of a solid that are `kept`."""
     volume = solid.volume0 / solid.x0[:, 0] if solid.domain.axisymmetric else solid.volume0
     return Placement(
         x0=solid.x0[kept],
@@ -200,7 +200,7 @@ def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
 
 
 def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
-    """Groups of points and contact know points by number, and the numbers from here on change."""
+    """Refuse if groups of points or contacts store the numbers that would change."""
     later = [one for one in hub.solids.values() if one.index >= solid.index]
     affected = [("fix", "made for", fix) for fix in hub.fixes.values() if fix.point_fields]
     for group in hub.groups.values():
@@ -218,7 +218,7 @@ def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
 def replace_points(
     hub: Hub, solid: Solid, placement: Placement, *, may_be_empty: bool = False
 ) -> None:
-    """Give a solid other points, and the solids behind it their new numbers."""
+    """Give a solid new points, and renumber the solids after it."""
     before = solid.count
     solid.put(hub, placement, may_be_empty=may_be_empty)
     for other in hub.solids.values():
@@ -246,15 +246,14 @@ def populate_cylindrical_coordinates(
     Parameters
     ----------
     solid
-        ID of the solid. It keeps its material and its cell size.
+        ID of the solid. Its material and cell size do not change.
     region
         ID of the region. Points outside it are dropped.
     lattice
         In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: the centre, the outer radius, the number of rings,
-        the number of points in each ring, and the initial temperature. In 3D
         ``axis, c1, c2, R, lo, hi, Ndx, Ndr, Ndtheta, T0``: the word x, y or z, the centre in the
         other two directions (in the order x, y, z), the outer radius, the ends along the axis, the
-        number of slices along it, and the rest as in 2D.
+        number of slices along it, and then as in 2D.
 
     Example
     -------
@@ -268,8 +267,8 @@ def populate_cylindrical_coordinates(
     The sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo puts rings at ``j dr`` with a point
     in the centre, and slices at ``lo + i dx``. Their volumes do not give this sum.
 
-    Comes before the first run, and before the groups that choose from these points. T0 replaces
-    the temperature of the solid.
+    Comes before the first run, and before groups that select from these points. T0 replaces the
+    temperature of the solid.
 
     See Also
     --------
@@ -301,7 +300,7 @@ populate_cylindrical_coordinates.syntax = (
 
 
 def _polar(values: dict, places: dict) -> Placement:
-    """The points of all polar cells, slices outermost, then rings, then angles."""
+    """The points of all polar cells: slices outermost, then rings, then angles."""
     check_radius(values["R"], place=places["R"])
     counts = [
         _count(values[name], name, places[name]) if name in values else 1
@@ -316,7 +315,7 @@ def _polar(values: dict, places: dict) -> Placement:
     dr, dtheta = values["R"] / counts[1], 2 * math.pi / counts[2]
     r, theta = (rings + 0.5) * dr, angles * dtheta
     cosine, sine = np.cos(theta), np.sin(theta)
-    # The box around a cell taken as a rectangle of r dtheta by dr.
+    # Bounding box of the cell, approximated by a rectangle of r dtheta by dr.
     along_r, along_theta = dr / 2, r * dtheta / 2
     columns = [values["c1"] + r * cosine, values["c2"] + r * sine]
     halves = [
@@ -342,7 +341,7 @@ def _polar(values: dict, places: dict) -> Placement:
 
 def _count(value: float, name: str, place) -> int:
     if math.isnan(value):
-        return 1  # A result that a rehearsal does not have.
+        return 1  # a result that a rehearsal does not have
     if value < 1 or value != math.floor(value):
         raise ScriptError(
             f"{name} must be a whole number of at least 1, not {value:g}", place=place
@@ -351,7 +350,7 @@ def _count(value: float, name: str, place) -> int:
 
 
 def _kept(hub: Hub, region: Region, placed: Placement) -> Placement:
-    """The points that lie in the region and in the domain, and how many lie outside of it."""
+    """The points inside the region and the domain, and the number outside the domain."""
     domain = require_domain(hub)
     wanted = region.inside(placed.x0)
     in_domain = domain.contains(placed.x0)

@@ -1,4 +1,4 @@
-"""Commands that let time go on, and that write and read files to go on from."""
+"""Commands that run the simulation, and that write and read files to resume from."""
 
 from math import isnan
 from pathlib import Path
@@ -25,7 +25,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     ----------
     dt
         Time step. A run warns above the stable limit: cell size over wave speed plus velocity, less
-        with scheme usl. Above four times the limit of conduction it does not begin.
+        with scheme usl. It refuses to start above four times the limit of conduction.
 
     Example
     -------
@@ -42,16 +42,16 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
 
 
 def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
-    """Set which share of the stable time step is taken.
+    """Set the time step as a fraction of the stable step.
 
     Parameters
     ----------
     factor
         Above 0. A run warns of unstable factors. The default is 0.9. It is 0.4 (0.2 with one point
-        per cell) where a drifting body would gain energy: linear functions in the updated frame,
-        FLIP above 0.99, and musl or usf. Until a point has moved a quarter of a cell, the default
-        is 0.9, and more with splines. A factor of your own always refers to the stable step of
-        moving bodies.
+        per cell) where a drifting body would gain energy: linear basis in ulmpm, FLIP coefficient
+        above 0.99, and musl or usf. Until a point has moved a quarter of a cell, the default is
+        0.9, and more with splines. A given factor always refers to the stable step of moving
+        bodies.
 
     Example
     -------
@@ -73,18 +73,18 @@ def _warn_of_factor(hub: Hub) -> None:
 
 
 def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble = "stop") -> None:
-    """Take a number of steps.
+    """Run a number of steps.
 
     Parameters
     ----------
     steps
-        How many; exactly so many are taken.
+        Exact number of steps.
     on_trouble
-        ``stop``, or ``halve``. With ``halve`` the run goes back to its last good state and halves
-        the step, at most five times, and says so. It does so where a point goes wrong, where
-        energy comes from nowhere (a warning without ``halve``), and where the step gets unstable.
-        Log, dumps, curves and computes go back too, and are written again. Points that leave the
-        domain without a gain of energy stop the run (see `boundary`).
+        ``stop``, or ``halve``. With ``halve`` the run returns to its last good state and halves the
+        step, at most five times, with a message. This happens when a point fails, when energy
+        appears that no load supplied (a warning without ``halve``), and when the step becomes
+        unstable. Log, dumps, curves and computes are rewound too. Points that leave the domain
+        without an energy gain stop the run (see `boundary`).
 
     Example
     -------
@@ -93,9 +93,9 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
 
     Notes
     -----
-    The log shows positions and stresses of the end of a step, and velocities of half a step before.
-    After n steps of a free fall, the kinetic energy is low by the share 1/(n + 1). Velocities and
-    kinetic energies of the time shown: ``scheme(musl, start=half)``.
+    The log shows positions and stresses at the end of a step, and velocities half a step earlier.
+    After n steps of free fall, the kinetic energy is too low by the fraction 1/(n + 1). For
+    velocities and kinetic energies at the logged time: ``scheme(musl, start=half)``.
 
     See Also
     --------
@@ -107,12 +107,12 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
 def run_time(
     hub: Hub, time: Annotated[float, NonNegative], *, on_trouble: OnTrouble = "stop"
 ) -> None:
-    """Run for a span of time; the last two steps are shortened to end there exactly.
+    """Run for a given time; the last two steps are shortened to end there exactly.
 
     Parameters
     ----------
     time
-        How long, from now.
+        Duration, from now.
     on_trouble
         As in run.
 
@@ -122,7 +122,7 @@ def run_time(
 
     Notes
     -----
-    Kinetic energies of the log are those of half a step before: see `run`.
+    Kinetic energies in the log belong to half a step earlier: see `run`.
 
     See Also
     --------
@@ -132,12 +132,12 @@ def run_time(
 
 
 def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop") -> None:
-    """Run until a condition holds; it is looked at before every step.
+    """Run until a condition holds; it is checked before every step.
 
     Parameters
     ----------
     condition
-        Formula of time, timestep, dt and published values; anything but 0 ends the run. NaN
+        Formula of time, timestep, dt and published values; a value other than 0 ends the run. NaN
         is an error.
     on_trouble
         As in run.
@@ -155,7 +155,7 @@ def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
 
 
 def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop") -> None:
-    """Run as long as a condition holds; it is looked at before every step.
+    """Run as long as a condition holds; it is checked before every step.
 
     Parameters
     ----------
@@ -208,38 +208,39 @@ class EveryOrNever(Every):
 
 
 def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> None:
-    """Write files from which the run can go on, again and again while the scene runs.
+    """Write restart files at intervals, from which the run can be resumed.
 
     Parameters
     ----------
     every
-        Steps between two files, or ``time(T)``; 0 writes no more.
+        Steps between two files, or ``time(T)``; 0 stops writing.
     file
-        File name. The first ``*`` becomes the step number; without ``*`` each file takes the place
-        of the one before.
+        File name. The first ``*`` becomes the step number; without ``*`` each file replaces the
+        previous one.
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` goes on after the step of the file. The results have the
-    bits of a run that was never interrupted, with any number of threads. The log and the dumps go
-    on in their files. The program cuts off lines that were written after the step.
+    ``karamelo-py SCRIPT -restart FILE`` resumes after the step of the file. The results are
+    bit-identical to an uninterrupted run, with any number of threads. The log and the dumps are
+    continued; lines written after that step are cut off.
 
-    The script must stay the same up to this run, with three exceptions. Commands that only say how
-    a run goes on or what it writes may change (set_dt, dt_factor, set_output, dump, plot). The
-    length of the last run may change, as a number in its own line. Variables that ``-var`` had set
-    come from the file. A longer ``run(n)`` has the bits of a run that was as long from the
-    beginning. A longer ``run_time(T)`` has them if the file was written before the last two steps
-    of the shorter run, which are shortened.
+    The script must be unchanged up to this run, with three exceptions. Commands that only control
+    how a run proceeds or its output may change (set_dt, dt_factor, set_output, dump, plot). The
+    length of the last run may change, as a number in its own line. Variables that were set with
+    ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run that had this length
+    from the start. A longer ``run_time(T)`` is too, if the file was written before the last two
+    steps of the shorter run, which are shortened.
 
-    A file holds all fields of points and nodes, all that fixes, computes, dumps and plots remember,
-    and the values that the script has read. It is in HDF5. A killed run leaves the file before it.
-    The last state of each run is written too. A run that goes wrong writes last_good.<step>.h5
-    instead. If its energy has grown, this is the last state before the growth, to ten steps. If its
-    step was above the stable limit from the start, it is the state before the first step. There is
-    none with boundary(delete), or if the run went on from a file with that step.
+    A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
+    plots, and the values that the script has read. A run that is killed while writing leaves the
+    previous file intact. The last state of each run is written too. A run that fails writes
+    last_good.<step>.h5 instead. If its energy has grown, this is the last state before the growth,
+    to within ten steps. If its step was above the stable limit from the start, it is the state
+    before the first step. No such file is written with boundary(delete), or if the run was resumed
+    from a file at that step.
 
-    Dumps show the state in which a run was interrupted or went wrong. A run that goes on removes
-    this state from files with several snapshots. It leaves snapshots in files of their own.
+    Dumps include the state in which a run was interrupted or failed. A resumed run removes this
+    state from files with several snapshots. Snapshots in separate files remain.
 
     Example
     -------
@@ -263,7 +264,7 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
 
 
 def write_restart(hub: Hub, file: OutputFile) -> None:
-    """Write a file from which the script, or another one, can go on.
+    """Write a file from which this or another script can be resumed.
 
     Parameters
     ----------
@@ -272,8 +273,8 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` goes on after this line. A further run may stand there. The
-    length of the runs before it must not change.
+    ``karamelo-py SCRIPT -restart FILE`` resumes after this line. A further run may be added there.
+    The length of the runs before it must not change.
 
     Example
     -------
@@ -299,23 +300,23 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
 
 
 def read_restart(hub: Hub, file: str) -> None:
-    """Put the scene into the state that a file holds.
+    """Set the scene to the state in a restart file.
 
     Parameters
     ----------
     file
-        Name of a file that restart or write_restart has written, in the current folder or beside
-        the script. With a ``*`` it is the one with the largest number in its place.
+        Name of a file written by restart or write_restart, in the current folder or next to the
+        script. A ``*`` selects the file with the largest number.
 
     Notes
     -----
-    Before this command, write the domain, method and solids of the script of the file, and the
-    fixes and computes to continue. Those with the same ID and style keep their values. Initial
-    velocities do not act again. Everything else may differ: constants of materials, fixes, the time
-    step, outputs. Time and step go on from those of the file.
+    Before this command, repeat the domain, method and solids of the script that wrote the file, and
+    the fixes and computes to continue. Those with the same ID and style retain their values.
+    Initial velocities are not applied again. Anything else may differ: constants of materials,
+    fixes, the time step, outputs. Time and step continue from the file.
 
-    The run begins new files. A picture or movie with the same ID, style and field keeps the colours
-    of the pictures before.
+    The run starts new output files. A picture or movie with the same ID, style and field retains
+    the earlier colour scale.
 
     Example
     -------
@@ -338,5 +339,5 @@ def read_restart(hub: Hub, file: str) -> None:
 
 
 for _command in (set_dt, dt_factor, restart):
-    # Another one does no harm where a run goes on from a file.
+    # A change is harmless when a run resumes from a file.
     _command.may_differ = True

@@ -8,10 +8,10 @@ from karamelo_py.schemes.traits import SchemeTraits
 
 
 class MUSL(NamedTuple):
-    """The stress follows from the velocity of the moved points, mapped to the nodes once more.
+    """Update the stress after the forces, with the new velocity mapped to the nodes again.
 
-    The second mapping makes the gradient of a node with next to no mass harmless, and energy is
-    kept well. The default.
+    After the second mapping, the velocity gradient at nodes with very little mass is harmless.
+    Energy is conserved well. The default.
 
     Example
     -------

@@ -1,4 +1,4 @@
-"""Newmark: implicit steps in time; or the backward rule of Euler."""
+"""Newmark: implicit time steps with inertia, and the backward Euler rule."""
 
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -10,13 +10,13 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Surplus(Field):
-    """Acceleration of generalized-alpha over that of the forces, at the end of a step."""
+    """Generalized-alpha acceleration minus force/mass, at the end of a step."""
 
     shape = vector
 
 
 def _damping(scheme: "Newmark") -> str:
-    """Name what takes energy from vibrations; empty where nothing does."""
+    """Name what damps vibrations; empty if nothing does."""
     if scheme.rule == "euler":
         return "rule=euler"
     if scheme.rho < 1:
@@ -25,26 +25,27 @@ def _damping(scheme: "Newmark") -> str:
 
 
 class Newmark(NamedTuple):
-    """Steps in time that no wave limits: each ends in balance with inertia (Newmark 1959).
+    """Implicit time steps with inertia, not limited by waves (Newmark 1959).
 
-    The step is that of `set_dt`. Vibrations that it does not resolve stay undamped, unless `gamma`
-    is above 1/2, `rho` is below 1, or the rule is that of Euler. Accelerations at the beginning of
-    a step are those of the forces there; with `rho` those of the rule.
+    The step is set by `set_dt`. Vibrations that it does not resolve are undamped, unless `gamma` is
+    above 1/2, `rho` is below 1, or the rule is euler. The acceleration at the beginning of a step
+    comes from the forces there; with `rho` from the rule.
 
     Parameters
     ----------
     beta, gamma
-        Of displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'), v' = v + dt ((1 -
-        gamma) a + gamma a'). The defaults, 1/4 and 1/2, are the trapezoidal rule. It keeps the
-        energy of linear bodies. Gamma above 1/2 damps, high frequencies most.
+        Coefficients for displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'), v' =
+        v + dt ((1 - gamma) a + gamma a'). The defaults, 1/4 and 1/2, are the trapezoidal rule,
+        which conserves the energy of linear bodies. Gamma above 1/2 damps, high frequencies most.
     rule
-        ``newmark``, or ``euler``: the backward rule of Euler, which damps all vibrations.
+        ``newmark``, or ``euler``: the backward Euler rule, which damps all vibrations.
     rho
-        Share that a step leaves of what is much faster than the step: generalized-alpha (Chung &
-        Hulbert 1993). Forces and accelerations are then in balance between the beginning and the
-        end of a step. Slow vibrations are hardly damped. 1: as without; 0: all goes in a step.
+        Spectral radius at high frequency, i.e. the fraction of vibrations much faster than the step
+        that remains after a step: generalized-alpha (Chung & Hulbert 1993). Forces and
+        accelerations are then in balance between the beginning and the end of a step. Slow
+        vibrations are hardly damped. 1: no damping; 0: they vanish in one step.
     tolerance, iterations, solver, stabilisation
-        As of quasi-static.
+        As in quasi-static.
 
     Example
     -------
@@ -77,13 +78,13 @@ class Newmark(NamedTuple):
 
     @property
     def alphas(self) -> tuple[float, float]:
-        """Shares of the beginning of a step in its accelerations and its forces."""
-        # With a radius of 1 both are halves, which is balance at the end after balance before.
+        """Fractions of the beginning of a step in its accelerations and its forces."""
+        # With a radius of 1 both are 1/2: balance at the end follows from balance at the start.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        """Name the fields that points carry from one step to the next."""
+        """Return the fields that points carry from one step to the next."""
         return (Surplus,) if self.rho < 1 else ()
 
     @classmethod
@@ -99,7 +100,7 @@ class Newmark(NamedTuple):
         solver: Literal["auto", "direct", "amg"] = "auto",
         stabilisation: Annotated[float, NonNegative] = 0.0,
     ) -> Any:
-        """The scheme from the words of a script."""
+        """Make the scheme from the words of a script."""
         if rho is not None:
             if beta is not None or gamma is not None or rule != "newmark":
                 raise ScriptError(

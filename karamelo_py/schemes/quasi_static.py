@@ -33,28 +33,29 @@ Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.0
 class QuasiStatic(NamedTuple):
     """Load steps without inertia: each ends in equilibrium, found by Newton's method.
 
-    A step of the run is a load step. Loads are formulas of `time`, which is only a parameter of the
-    load. The tangent is exact for every law and basis, so that Newton's method converges
-    quadratically. The program divides a step that does not converge.
+    Each step of the run is a load step. Loads are formulas of `time`, which is only a load
+    parameter. The tangent is exact for every law and basis, so Newton's method converges
+    quadratically. A step that does not converge is subdivided.
 
     Parameters
     ----------
     tolerance
-        What is left of the nodal forces when a step ends, as a share of them: from 1e-14 to 0.01.
+        Residual nodal forces at the end of a step, as a fraction of the nodal forces: from 1e-14 to
+        0.01.
     iterations
-        How often a step is corrected before it is done in halves.
+        Number of corrections before a step is halved.
     solver
-        Of the linear equations: ``direct``, ``amg`` (conjugate gradients with algebraic multigrid),
-        or ``auto``. auto takes amg from 5000 unknowns on in the plane if the matrix is symmetric,
-        and from 2000 on in space.
+        Linear solver: ``direct``, ``amg`` (conjugate gradients with algebraic multigrid), or
+        ``auto``. auto takes amg from 5000 unknowns in 2D if the matrix is symmetric, and from 2000
+        in 3D.
     stabilisation
-        Share of Young's modulus by which jumps of the gradient at the border of a body are
-        penalised (ghost stabilisation; Coombs 2023). It bears nodes that see next to nothing of
-        the body. 0: none.
+        Ghost stabilisation (Coombs 2023): penalises gradient jumps at the border of a body, with
+        this fraction of Young's modulus. It stabilises nodes that overlap only a sliver of the
+        body. 0: none.
     limit
-        What a load is that has no equilibrium, even in 1/1024 of a step: an ``error``, or the end
-        of the run (``stop``). The script goes on then, and `time` is that of the last equilibrium:
-        loads as formulas of it are the limit load.
+        What to do if no equilibrium is found even with 1/1024 of a step: raise an ``error``, or end
+        the run (``stop``). With ``stop`` the script continues, and `time` belongs to the last
+        equilibrium: loads as formulas of it are the limit load.
 
     Example
     -------
@@ -64,12 +65,12 @@ class QuasiStatic(NamedTuple):
 
     Notes
     -----
-    Velocities are zero after a step, and so are kinetic energies. A script can show `iterations`,
-    `residual` and `parts` of the last step: corrections, remaining share of the forces, and number
-    of parts.
+    Velocities and kinetic energies are zero after a step. A script can show `iterations`,
+    `residual` and `parts` of the last step: corrections, remaining fraction of the forces, and
+    number of substeps.
 
-    The program also divides a step in which points would move more than half a cell towards nodes
-    that move otherwise, or held nodes without points.
+    A step is also subdivided if points would move more than half a cell towards nodes that move
+    differently, or towards held nodes without points.
     """
 
     traits = SchemeTraits(implicit=True, inertia=False)
@@ -95,5 +96,5 @@ class QuasiStatic(NamedTuple):
         stabilisation: Annotated[float, NonNegative] = 1 / 30,
         limit: Literal["error", "stop"] = "error",
     ):
-        """The scheme from the words of a script."""
+        """Make the scheme from the words of a script."""
         return cls(tolerance, iterations, solver, stabilisation, limit)

@@ -1,4 +1,4 @@
-"""Traits of a scheme: each has one `traits`, and nothing else is asked for."""
+"""Traits of a scheme: all that the rest of the program reads from it."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ def _none(scheme: Any) -> str:
 
 
 class SchemeTraits(NamedTuple):
-    """Traits of a scheme; a plug-in gives those in which it differs from these defaults."""
+    """Traits of a scheme; a plug-in gives those that differ from these defaults."""
 
     # Steps are equilibria or balances that Newton's method finds, with or without inertia.
     implicit: bool = False
@@ -19,9 +19,8 @@ class SchemeTraits(NamedTuple):
     # Stable step in h/c with two points per cell and direction, and with one.
     courant: tuple[float, float] = (1.0, 1.0)
     # Fractions of the stable step with which a drifting body conserves its energy, with 2 and 1
-    # points per cell: smooth gradients, gradients that jump, nodes within the cells. None: a drift
-    # feeds nothing.
-    keeping: tuple[tuple[float, float], ...] | None = None
+    # points per cell: smooth gradients, gradients that jump, nodes within the cells.
+    keeping: tuple[tuple[float, float], ...] = ((USUAL, USUAL),) * 3
     # Fraction of a step's strain that comes before the forces.
     strained_before: float = 0.0
     # The velocity of the moved points is mapped to the nodes once more.
@@ -30,5 +29,5 @@ class SchemeTraits(NamedTuple):
     bears_drift: bool = False
     # Vibrations are damped, with two points per cell and direction.
     damps: bool = False
-    # What takes energy from vibrations by the scheme's own numbers; empty where nothing does.
+    # What damps vibrations through the parameters of the scheme; empty if nothing does.
     damping: Callable[[Any], str] = _none

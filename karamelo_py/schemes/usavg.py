@@ -8,10 +8,10 @@ from karamelo_py.schemes.traits import SchemeTraits
 
 
 class USAVG(NamedTuple):
-    """Half of the strain from the nodal velocity before the forces, half from the one of musl.
+    """Half of the stress update before the forces, and half after them as in musl.
 
-    Energy is kept best, for two updates of the stress per step (Nairn 2003, "Material point method
-    calculations with explicit cracks"). The two halves make the whole increment of F.
+    Best energy conservation, for two stress updates per step (Nairn 2003, "Material point method
+    calculations with explicit cracks"). The two halves make up the whole increment of F.
 
     Example
     -------

@@ -14,17 +14,17 @@ from karamelo_py.schemes.traits import SchemeTraits
 
 
 class USL(NamedTuple):
-    """The stress follows from the gradient of the updated nodal velocity.
+    """Update the stress after the forces, with the gradient of the updated nodal velocity.
 
-    The fastest scheme, because a step visits the points once. It dissipates a little.
+    The fastest scheme, with one pass over the points per step. It dissipates a little.
 
-    The stable step is 0.65 h/c, and 0.4 h/c with one point per cell. Bernstein-quadratic takes 0.7
-    of that. Points average some modes of the nodes away. Only the strain of such a mode answers to
-    forces: e <- (1 - (w dt)^2) e. This is stable for w dt < sqrt(2) instead of 2.
+    The stable step is 0.65 h/c, and 0.4 h/c with one point per cell. With bernstein-quadratic it is
+    0.7 times as large. The points average some nodal modes away. Only the strain of such a mode
+    responds to forces: e <- (1 - (w dt)^2) e. This is stable for w dt < sqrt(2) instead of 2.
 
-    A node with almost no mass gets a large velocity. The limit is the mean mass of the points that
-    it sees times d (c dt / h)^2, at most 1. Below it, the gradient takes the change of velocity by
-    the ratio of both masses. Momentum is kept.
+    A node with almost no mass gets a large velocity. The mass limit is the mean mass of the points
+    around the node times d (c dt / h)^2, at most 1. Below it, the velocity change that enters the
+    gradient is scaled by nodal mass / limit. Momentum is conserved.
 
     Example
     -------
@@ -46,7 +46,7 @@ class USL(NamedTuple):
 
 
 def _thin_edges(scheme, scene):
-    """Return True if boxes have edges that moments push."""
+    """Return True if boxes have edges on which moments act."""
     boxes = scene.basis.steep_edge and scene.basis.cells > 1
     return scene.moments and boxes and not gradient_weight.defined(type(scene.transfer))
 
@@ -63,7 +63,7 @@ known_failure(
 
 
 def any_node(s):
-    """The nodal mass below which this form limits the gradient: none."""
+    """Nodal mass below which the gradient is limited: none."""
     return UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
 
 
@@ -71,10 +71,10 @@ any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defin
 
 
 class USLUnlimited(NamedTuple):
-    """As usl, without the limit at nodes with next to no mass: as first published.
+    """usl as first published, without the limit at nodes with very little mass.
 
-    A point that has just entered a cell gives the node ahead little mass and much force. It gets
-    the strain of f dt / m from there. This shows the use of the limit.
+    A point that has just entered a cell gives the node ahead little mass and much force, and gets
+    the strain f dt / m from there. This scheme shows the effect of the limit.
 
     Example
     -------

@@ -1,4 +1,4 @@
-"""Region styles mesh and stl, solid style mesh: what Gmsh and others make."""
+"""Region styles mesh and stl, solid style mesh: shapes from mesh files."""
 
 from typing import Annotated, Literal
 
@@ -18,7 +18,7 @@ from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
-# A shape of fewer cells, or so many times longer than the domain, may be in other units.
+# A shape with fewer cells, or this many times longer than the domain, may be in other units.
 CELLS, OUT = 3, 20
 UNITS = {
     1e-3: "a file in millimetres, a script in metres",
@@ -41,7 +41,7 @@ def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
 
 
 def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> None:
-    """Warn of a shape that is much larger or smaller than the domain, as in other units."""
+    """Warn of a shape much larger or smaller than the domain, probably in other units."""
     domain, used = require_domain(hub), slice(len(lo))
     size, room = float((hi - lo).max()), float((domain.hi - domain.lo)[used].max())
     if CELLS * (domain.h or 0.0) < size < OUT * room:
@@ -58,7 +58,7 @@ def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> 
 
 
 class Enclosed(Region):
-    """Base of regions within a `skin`."""
+    """Base of regions inside a `skin`."""
 
     skin: Skin
     from_file = True
@@ -84,20 +84,19 @@ class Enclosed(Region):
 
 
 class MeshRegion(Enclosed):
-    """All that lies in an element of a mesh, or of one of its physical groups.
+    """All positions in the elements of a mesh, or of one of its physical groups.
 
     Parameters
     ----------
     file
-        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and whatever
-        meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes.
+        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and any other
+        format that meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes.
     group
         Name or number of a physical group (a set of elements, an instance or a surface in other
-        formats). Left out: the
-        whole mesh. A group of lower dimension, such as a boundary, holds the positions that lie
-        on it, which is useful for groups of nodes.
+        formats). Default: the whole mesh. A group of lower dimension, such as a boundary, contains
+        the positions on it, for groups of nodes.
     exterior
-        The word ``exterior`` makes the region all that is outside.
+        The word ``exterior`` selects everything outside.
 
     Example
     -------
@@ -107,8 +106,8 @@ class MeshRegion(Enclosed):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D. Elements of higher order count by their corners. Faces belong to elements. Faces
-    with four corners that are not plane count as two triangles. In 2D the mesh lies in the plane
+    pyramids in 3D. Of elements of higher order, only the corners are used. Faces belong to
+    elements. Non-planar faces with four corners are two triangles. In 2D the mesh lies in the plane
     z = 0.
 
     See Also
@@ -135,7 +134,7 @@ class MeshRegion(Enclosed):
         lo, hi = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
         _tell_of_units(hub, file, lo, hi)
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
-        # Meshes are written with fewer digits than numbers have.
+        # Mesh files have fewer digits than double precision.
         tolerance = max(self.tolerance, RELATIVE_TOLERANCE * float((hi - lo).max()))
         self.skin = Skin([faces], tolerance, odd=dimension == 1, open=flat)
 
@@ -148,20 +147,20 @@ class MeshRegion(Enclosed):
         return self.skin.open
 
 
-# Binary STL files, and most programs that write the others, have single precision.
+# Binary STL files, and most programs that write the other formats, have single precision.
 _SINGLE = float(np.finfo(np.float32).eps)
 
 
 class STL(Enclosed):
-    """All that a closed surface of triangles encloses, the surface included; in 3D.
+    """All positions inside a closed triangulated surface, surface included; in 3D.
 
     Parameters
     ----------
     file
         Name of a file with triangles or quadrilaterals: STL (text or binary), OBJ, or any format
-        that region mesh reads. In the lengths of the script: the file is not scaled.
+        that region mesh reads. In the length unit of the script: the file is not scaled.
     exterior
-        The word ``exterior`` makes the region all that is outside of the surface.
+        The word ``exterior`` selects everything outside the surface.
 
     Example
     -------
@@ -169,8 +168,8 @@ class STL(Enclosed):
 
     Notes
     -----
-    The surface must be closed: every edge belongs to two triangles. A shell that lies in another
-    one is a cavity, whichever side its triangles show. Shells that overlap are one body.
+    The surface must be closed: every edge belongs to two triangles. A shell inside another one is a
+    cavity, whatever the orientation of its triangles. Shells that overlap are one body.
 
     See Also
     --------
@@ -208,12 +207,12 @@ class MeshSolid(Solid):
     Parameters
     ----------
     file
-        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and whatever
-        meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes. It is looked
-        for in the current folder, then next to the script.
+        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and any other
+        format that meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes. It is
+        searched for in the current folder, then next to the script.
     group
         Name or number of a physical group (a set of elements, a part or an instance in other
-        formats), whose elements are taken. Left out: the whole mesh.
+        formats). Default: the whole mesh.
 
     Example
     -------
@@ -222,10 +221,10 @@ class MeshSolid(Solid):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; those of lower dimension are left out. Elements of higher order have the volume
-    within their curved edges. The cpdi methods take elements of one shape, by their corners. In 2D
-    the mesh lies in the plane z = 0. Elements whose centroid lies outside the domain are left out,
-    with a warning.
+    pyramids in 3D; elements of lower dimension are ignored. Elements of higher order have the
+    volume within their curved edges. The cpdi methods take elements of one shape, by their corners.
+    In 2D the mesh lies in the plane z = 0. Elements whose centroid lies outside the domain are
+    ignored, with a warning.
 
     See Also
     --------

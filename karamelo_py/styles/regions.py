@@ -17,7 +17,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Base of shapes with an exact depth: between planes across some axes, round along others."""
+    """Base of shapes with an exact depth: slabs across some axes, round across others."""
 
     slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
     across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
@@ -57,16 +57,15 @@ def _between(d: int, axis: int, lo: float, hi: float) -> list[np.ndarray]:
 
 
 class BlockRegion(Primitive):
-    """A box with faces along the axes; its faces belong to it.
+    """A box with faces along the axes, faces included.
 
     Parameters
     ----------
     bounds
         In 1D ``xlo, xhi``; in 2D ``xlo, xhi, ylo, yhi``; in 3D
-        ``xlo, xhi, ylo, yhi, zlo, zhi``. Each is a number, or ``INF`` (or ``EDGE``) where the
-        block reaches as far as the domain does. Equal numbers make a plane, a line or a point,
-        which is useful for groups of nodes. A last word ``exterior`` makes the region all that
-        is outside the block.
+        ``xlo, xhi, ylo, yhi, zlo, zhi``. Each is a number, or ``INF`` (or ``EDGE``) for the
+        edge of the domain. Equal numbers make a plane, a line or a point, for groups of nodes. A
+        last word ``exterior`` selects everything outside the block.
 
     Example
     -------
@@ -96,15 +95,15 @@ class BlockRegion(Primitive):
 
 
 class Cylinder(Primitive):
-    """A disk in 2D, a cylinder along one of the axes in 3D; its surface belongs to it.
+    """A disk in 2D, a cylinder along one of the axes in 3D, surface included.
 
     Parameters
     ----------
     shape
         In 2D ``xc, yc, R``: centre and radius. In 3D ``axis, c1, c2, R, lo, hi``: the word x, y
         or z, the centre in the other two directions (in the order x, y, z), the radius, and the
-        ends along the axis, which may be ``INF`` (or ``EDGE``). A last word ``exterior`` makes
-        the region all that is outside.
+        ends along the axis, which may be ``INF`` (or ``EDGE``). A last word ``exterior`` selects
+        everything outside.
 
     Example
     -------
@@ -149,13 +148,13 @@ class Cylinder(Primitive):
 
 
 class Sphere(Primitive):
-    """A sphere in 3D, a disk in 2D, an interval in 1D; its surface belongs to it.
+    """A sphere in 3D, a disk in 2D, an interval in 1D, surface included.
 
     Parameters
     ----------
     shape
         Centre and radius: in 1D ``x, R``; in 2D ``x, y, R``; in 3D ``x, y, z, R``. A last word
-        ``exterior`` makes the region all that is outside.
+        ``exterior`` selects everything outside.
 
     Example
     -------
@@ -182,14 +181,14 @@ class Sphere(Primitive):
 
 
 class Plane(Primitive):
-    """All on one side of a plane, in 2D of a line; the plane belongs to it.
+    """All positions on one side of a plane, in 2D of a line, surface included.
 
     Parameters
     ----------
     plane
         A position on the plane and a normal of any length, which points into the region: in 2D
-        ``x, y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior`` makes the region
-        the other side.
+        ``x, y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior`` selects the other
+        side.
 
     Example
     -------
@@ -197,8 +196,7 @@ class Plane(Primitive):
 
     Notes
     -----
-    It reaches as far as the domain does. Bodies with leaning faces are intersections of such
-    regions.
+    It extends to the edges of the domain. For bodies with inclined faces, intersect such regions.
 
     See Also
     --------
@@ -242,12 +240,12 @@ class Plane(Primitive):
 
 
 class Union(region.Region):
-    """All that lies in at least one of two or more regions.
+    """All positions in at least one of two or more regions.
 
     Parameters
     ----------
     first, second, more
-        IDs of regions. Those made with ``exterior`` count as what is outside their shape.
+        IDs of regions. A region made with ``exterior`` is everything outside its shape.
 
     Example
     -------
@@ -260,7 +258,7 @@ class Union(region.Region):
     intersection, difference
     """
 
-    # How the insides and the corners of the boxes of the parts are put together.
+    # How to combine the inside tests and the box corners of the parts.
     joined, low, high = np.logical_or, np.minimum, np.maximum
     kind: type = Joined
 
@@ -286,7 +284,7 @@ class Union(region.Region):
 
 
 class Intersection(Union):
-    """All that lies in each of two or more regions.
+    """All positions in each of two or more regions.
 
     Example
     -------
@@ -304,14 +302,14 @@ class Intersection(Union):
 
 
 class Difference(region.Region):
-    """All that lies in the first region and in none of the others.
+    """All positions in the first region and in none of the others.
 
     Parameters
     ----------
     first
         ID of the region to cut from.
     second, more
-        IDs of the regions that are cut off, their surfaces included.
+        IDs of the regions to remove, surfaces included.
 
     Example
     -------
@@ -342,6 +340,6 @@ class Difference(region.Region):
 
 
 def outlines(parts: Sequence[region.Region]) -> tuple | None:
-    """Return what kernels know some regions by; None where there is one that they do not know."""
+    """Return the descriptions of regions for kernels; None if a region has none."""
     found = [part.outline() for part in parts]
     return None if any(one is None for one in found) else tuple(found)

@@ -22,15 +22,15 @@ from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
 MISSED = 0.01  # of the volume of a shape in a file
-MANY = 10  # points per cell and direction that nobody needs
+MANY = 10  # more points per cell and direction than useful
 
 
 class RegionSolid(Solid):
     """A body that fills a region, with `ppc` points per cell and direction.
 
-    Points are put into the cells of the grid and kept where they lie in the region and in the
-    domain. Each carries the volume ``(h / ppc)^dimension`` (times x where the domain is
-    axisymmetric) and the mass that its material has in it.
+    Points are placed in the cells of the grid, if they lie in the region and in the domain. Each
+    has the volume ``(h / ppc)^dimension`` (times x in axisymmetric domains) and the corresponding
+    mass of its material.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ class RegionSolid(Solid):
     ppc
         Points per cell in each direction: 2 gives 4 points per cell in 2D, 8 in 3D.
     points
-        ``regular``: at equal distances. ``gauss``: at the Gauss points of the cell, with their
-        weights as volumes. ``cut``: at equal distances, with boxes that the edge of the region
-        cuts. Left out: at equal distances, with three exceptions. With ``ppc`` 3 points stand at
-        the Gauss points with equal volumes, as in Karamelo, unless the basis has domains (ugimp,
-        cpgimp, cpdi). Regions of files (mesh, stl) are cut, unless the basis has domains. In
-        ulmpm/contacts, regions with curved or leaning faces are cut.
+        ``regular``: equally spaced. ``gauss``: at the Gauss points of the cell, with their weights
+        as volumes. ``cut``: equally spaced, with boxes cut by the edge of the region. Default:
+        equally spaced, with three exceptions. With ``ppc`` 3, points are at the Gauss points with
+        equal volumes, as in Karamelo, unless the basis has domains (ugimp, cpgimp, cpdi). Regions
+        from files (mesh, stl) are cut, unless the basis has domains. In ulmpm/contacts, regions
+        with curved or inclined faces are cut.
 
     Example
     -------
@@ -54,14 +54,14 @@ class RegionSolid(Solid):
 
     Notes
     -----
-    Cells are counted from the lower corner of the domain. Methods with a grid for each solid count
-    from the lower corner of the box around the region, whose open sides end at the domain.
+    Cells start at the lower corner of the domain. Methods with a grid for each solid start at the
+    lower corner of the box around the region, whose open sides end at the domain.
 
-    A cut point has the volume of the rest of its box and stands in its middle. A rest of less than
-    a tenth goes to the nearest point. Round bodies then have their volume to 0.01 %, and no steps
-    at the rim, at which bodies in contact hook each other. Fins and slots as thin as a tenth of
-    h/ppc have their mass to 3 %. A message tells where thinner parts may be missing. For a region
-    of a plug-in without `distance` the program looks along the axes, and may miss thin parts. With
+    A cut point lies at the centroid of the rest of its box and has the volume of this rest. A rest
+    of less than a tenth is merged with the nearest point. Round bodies then have their volume to
+    0.01 %, and no stair-stepped surface for contacting bodies to lock on. Fins and slots as thin as
+    a tenth of h/ppc have their mass to 3 %. A message warns if thinner parts may be missing. The
+    region of a plug-in without `distance` is sampled along the axes and may miss thin parts. With
     ugimp and cpgimp, cut points have square domains, which do not tile the body at its edge. cpdi
     refuses them.
 
@@ -90,7 +90,7 @@ class RegionSolid(Solid):
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
         method = hub.update.method
-        # Contact feels the steps of whole boxes; shapes from files have a mass that is known.
+        # Whole boxes make steps that affect contact; shapes from files have a known mass.
         stepped = method.fields_per_solid and not region.aligned
         drawn = region.from_file and not method.regular_points
         if points is None and (stepped or drawn) and not (corners or region.unknown):
@@ -126,7 +126,7 @@ class RegionSolid(Solid):
             self._warn_of_volume(hub, *self.volumes)
 
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
-        """Return the volume of the points, and of the shape in a file that they fill."""
+        """Return the volume of the points, and of the shape in a file, if there is one."""
         whole = self.region.volume
         own = float(np.sum(np.broadcast_to(placement.volume, self.count)))
         return None if whole is None else (own, whole)
@@ -154,15 +154,15 @@ class RegionSolid(Solid):
 
 
 class PointsSolid(Solid):
-    """A body of points that a file or a program in Python gives, with what they begin with.
+    """A body of points from a file or from Python, with their initial state.
 
     Parameters
     ----------
     table
-        Name of a file of columns of numbers with a row of names. Required: ``x``, ``y``, ``z`` (one
-        per dimension), and ``volume`` (in the plane for a thickness of 1, in axisymmetric domains
-        the area in the plane). Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
-        stresses (``s11`` ..., of materials in rate form). In Python a dictionary of arrays, or a
+        Name of a file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z``
+        (one per dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains
+        the area in the plane xy). Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
+        stresses (``s11`` ..., of materials in rate form). In Python, a dictionary of arrays or a
         DataFrame.
     GlueToSolid
         As in solid region.
@@ -173,8 +173,8 @@ class PointsSolid(Solid):
 
     Notes
     -----
-    Each point stands for a square or cube of its volume, where the basis has domains around points.
-    The cpdi methods take none: their domains tile a body.
+    With a basis that has domains around points, each domain is a square or cube of the volume of
+    its point. The cpdi methods refuse this style: their domains tile a body.
 
     See Also
     --------
@@ -217,7 +217,7 @@ class PointsSolid(Solid):
             )
         half = volume[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
-        # A stress is that at the temperature of the point.
+        # Stress is given at the temperature of the point.
         order = sorted(columns, key=lambda name: name != "T")
         self.initial = {name: columns[name][kept] for name in order}
         near, size = (x[kept], half[kept]) if kept.any() else (x, half)

@@ -1,4 +1,4 @@
-"""Computes of what is conserved: energies, momenta, and their drift."""
+"""Computes of conserved quantities: energies, momenta, and their drift."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from karamelo_py.script.expressions import Expression
 
 
 class Energy(Compute):
-    """Base of computes of an energy: the one that is `measured`."""
+    """Base of computes of an energy, given by `measured`."""
 
     published: tuple[str, ...] = ("", "s")
     measured = ""
@@ -30,7 +30,7 @@ class KineticEnergy(Energy):
 
     Notes
     -----
-    It is that of half a step before the time of the log, as velocities are (see `scheme`).
+    In the log it belongs to half a step earlier, like velocities (see `scheme`).
 
     See Also
     --------
@@ -87,8 +87,8 @@ class FixStrainEnergy(StrainEnergy, Fix):
 class DissipatedEnergy(Energy):
     """Measure the energy that a group of points has dissipated; published as ID.
 
-    Plastic and viscous work, and what damage sets free. It is 0 of materials that dissipate
-    nothing.
+    Plastic and viscous work, and energy released by damage. It is 0 for materials without
+    dissipation.
 
     Example
     -------
@@ -105,7 +105,7 @@ class DissipatedEnergy(Energy):
 
 
 class Drift:
-    """|value - first value|, relative to the largest scale there has been so far."""
+    """|value - first value|, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 
@@ -114,7 +114,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """The drift now; `scale` is a size that the value could have, above 0."""
+        """Return the present drift; `scale` is a possible magnitude of the value, above 0."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value
@@ -124,13 +124,13 @@ class Drift:
 
 
 class EnergyBalance(Compute):
-    """Measure kinetic + stored + dissipated energy less the work done, which should stay the same.
+    """Measure kinetic + stored + dissipated energy minus the work done, which should be constant.
 
     Parameters
     ----------
     work
-        Known work of loads on the group since the start: a formula of time and published values.
-        The default is 0.
+        Work of known loads on the group since the start: a formula of time and published values.
+        Default 0.
 
     Example
     -------
@@ -141,10 +141,10 @@ class EnergyBalance(Compute):
     Notes
     -----
     Publishes ID, the sum, and ID_total, the energies without the work. ID_drift is the change of ID
-    since the first output over the largest kinetic, stored or dissipated energy or work so far.
-    Velocities lie half a step beside positions, which gives a drift of the order of dt (a third in
-    a body of a few cells). The end of a run prints the change between energies of equal times. The
-    energy that affine transfers keep within points is not included.
+    since the first output, divided by the largest kinetic, stored or dissipated energy or work so
+    far. Velocities lag positions by half a step, which gives a drift of the order of dt (33 % in a
+    body of a few cells). The end of a run prints the change between energies at equal times. The
+    energy that affine transfers store within points is not included.
 
     See Also
     --------
@@ -169,7 +169,7 @@ class EnergyBalance(Compute):
 
 
 class Momentum(Compute):
-    """Base of computes of a momentum: the `terms` of points are its components, and their size."""
+    """Base of computes of a momentum: the `terms` of points are its components and magnitude."""
 
     published = ("x", "y", "z", "drift")
     remembers = ("_drift",)
@@ -203,7 +203,7 @@ class LinearMomentum(Momentum):
     """
 
     def terms(self, points: PointTable) -> np.ndarray:
-        """Momenta of points, and what they are without their direction."""
+        """Momenta of points, and their magnitudes."""
         mass, v = points.mass.astype(float), points.velocity.astype(float)
         return mass * np.vstack([v.T, np.linalg.norm(v, axis=1)])
 
@@ -226,7 +226,7 @@ class AngularMomentum(Momentum):
     Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
     the largest sum m |x - c| |v| so far.
 
-    Affine transfers (APIC) also keep angular momentum in the moment of velocity of points. The sum
+    Affine transfers (APIC) also store angular momentum in the affine velocity of points. The sum
     contains it, and the transfer conserves this sum.
 
     See Also
@@ -241,7 +241,7 @@ class AngularMomentum(Momentum):
         self.centre = np.array([cx, cy, cz])
 
     def terms(self, points: PointTable) -> np.ndarray:
-        """Angular momenta of points, and what they are without their direction."""
+        """Angular momenta of points, and their magnitudes."""
         d = self.hub.domain.dimension
         arm, v = np.zeros((2, points.count, 3))
         arm[:, :d], v[:, :d] = points.position, points.velocity
@@ -249,7 +249,7 @@ class AngularMomentum(Momentum):
         angular = np.cross(arm, v)
         moment = points.velocity_moment
         if moment is not None and d > 1:
-            # B_ij = sum N v_i (X - x)_j: the part of v x arm within a point's surroundings.
+            # B_ij = sum N v_i (X - x)_j: angular momentum within a point's surroundings.
             b = np.zeros((points.count, 3, 3))
             b[:, :d, :d] = moment.reshape(-1, d, d)
             angular += np.stack(

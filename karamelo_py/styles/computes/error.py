@@ -1,4 +1,4 @@
-"""Computes error and reference: how far values or fields are from formulas or curves."""
+"""Computes error and reference: compare values or fields with formulas or curves."""
 
 from math import inf
 from typing import Any, Literal
@@ -20,11 +20,11 @@ from karamelo_py.script.expressions import Expression
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
-VANISHED = 1e-9  # of the largest norm of the exact values so far: the present one is round-off
+VANISHED = 1e-9  # of the largest norm of the exact values so far: less is round-off
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
-    """A column of points, (n,), displacements too."""
+    """A column of points, (n,), displacements included."""
     if name in DISPLACEMENTS:
         return points.particle(name[1]) - points.particle(name[1] + "0")
     return points.particle(name)
@@ -33,7 +33,7 @@ def column(points: PointTable, name: str) -> np.ndarray:
 class PointField:
     """A field of points: its name in the script, and its columns, one for a scalar.
 
-    `weights` say how often a component counts in the square of the size: shear components twice.
+    `weights` count the components in the square of the magnitude: shear components twice.
     """
 
     script_kind = "a column of points, or displacement, velocity, stress or strain"
@@ -55,10 +55,10 @@ class PointField:
 
 
 class Norm:
-    """The size of a difference: L1, L2 or max, as it is or relative to the same norm of the exact.
+    """Norm of a difference: L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    In a history the time since the last output weighs each difference. The result then does not
-    depend on the number of outputs.
+    In a history, each difference is weighted by the time since the last output, so the result does
+    not depend on the number of outputs.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -83,18 +83,18 @@ class Norm:
         self._exact = 0.0  # the largest norm of the exact values
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Return the terms of a norm from the sizes (2, n) of differences and exact values."""
+        """Return the terms of a norm from the magnitudes (2, n) of differences and exact values."""
         return np.vstack([weight * sizes**self.power, weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
-        """The norms (2,) of differences and exact values from sums, and the largest of some."""
+        """Return the norms (2,) of differences and exact values, from sums and some maxima."""
         if self.kind == "max":
             return np.max([np.zeros(2), *largest], axis=0)
         mean = sums[:2] / sums[2] if sums[2] else np.zeros(2)
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """As `scaled`; `history` and `largest` take the moment in, once."""
+        """As `scaled`, and add the moment to `history` and `largest`, once."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -103,7 +103,7 @@ class Norm:
         if self.kind == "max":
             self._sums = mean = np.maximum(self._sums, moment)
         else:
-            # The first state stands for itself until there is a second one.
+            # The first state counts alone until there is a second one.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
             self._sums += span * moment**self.power
@@ -114,14 +114,14 @@ class Norm:
         return now
 
     def scaled(self, difference: float, exact: float) -> float:
-        """The norm as it is asked for, from that of differences and that of exact values."""
+        """Return the absolute or relative norm, from the norms of differences and exact values."""
         if not self.relative or difference == 0:
             return float(difference)
         return float(difference / exact) if exact else inf
 
 
 class Compared:
-    """Mixed into computes that compare points: says `sizes(points)`, and has a `norm`."""
+    """Mix-in for computes that compare points: has `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
         """Norms (2,) of differences and exact values now, and other sums."""
@@ -139,7 +139,7 @@ class Compared:
 
 
 def refuse_absent(hub: Any, columns: tuple[str, ...]) -> None:
-    """A column that no material has cannot be wrong: comparing it is a mistake."""
+    """Refuse a column that no material has: comparing it is a mistake."""
     absent = [name for name in columns if name in hub.fields.absent_at_points()]
     if absent and hub.materials:
         raise ScriptError(
@@ -158,11 +158,10 @@ class Error(Compared, Compute):
         A column of a dump (x, vy, s11, T, ...), ux, uy, uz (displacement by component), or a whole
         field: ``displacement``, ``velocity``, ``stress``, ``strain``.
     expression
-        The exact value: a formula of x, y, z (present position), x0, y0, z0 (first position), time,
-        and published values. For a whole field: one formula per known component, in the order x, y,
-        z or 11, 22, 33, 12, 13, 23. NULL leaves a component out. Then, in any order, the norm,
-        ``L1``, ``L2`` (without a word) or ``max``, and ``absolute`` (without a word) or
-        ``relative``.
+        The exact value: a formula of x, y, z (present position), x0, y0, z0 (initial position),
+        time, and published values. For a whole field: one formula per known component, in the order
+        x, y, z or 11, 22, 33, 12, 13, 23. NULL omits a component. Then, in any order, the norm,
+        ``L1``, ``L2`` (default) or ``max``, and ``absolute`` (default) or ``relative``.
 
     Example
     -------
@@ -172,14 +171,14 @@ class Error(Compared, Compute):
 
     Notes
     -----
-    With e the length of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and V0 the volume
-    of the point at first: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e.
-    ``relative`` divides by the same norm of the exact values. While they vanish it divides by the
-    largest so far. Before the first it gives inf.
+    With e the magnitude of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and V0 the
+    initial volume of the point: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max
+    e. ``relative`` divides by the same norm of the exact values. While they vanish it divides by
+    the largest norm so far; before the first it gives inf.
 
-    Publishes ID, the error now; ID_max, the largest of the outputs so far; and ID_history, the norm
+    Publishes ID, the present error; ID_max, the largest output so far; and ID_history, the norm
     over points and all time so far. With ``relative`` both norms cover the whole history, so exact
-    values may vanish at times. An output counts with the time since the one before.
+    values may vanish at times. Each output is weighted by the time since the previous one.
 
     See Also
     --------
@@ -216,7 +215,7 @@ class Error(Compared, Compute):
         self.publish_all(now, self.norm.largest, self.norm.history)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Sizes (2, n) of the differences and of the exact values at points, and their weights."""
+        """Magnitudes (2, n) of the differences and exact values at points, and their weights."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))
         for name, weight, formula in self.parts:
@@ -226,7 +225,7 @@ class Error(Compared, Compute):
 
 
 class GroupOrValue:
-    """For signatures: a group of points, or a number that changes in time."""
+    """For signatures: a group of points, or a number that changes over time."""
 
     script_kind = "a group of points, or a value"
 
@@ -247,7 +246,7 @@ class Reference(Compared, Compute):
         A value (``v_x``, a variable, a formula of values), compared over time. Or a group of points
         or ``all``, compared over a coordinate.
     file
-        Columns of numbers, with commas, semicolons or blanks between them. The first row has their
+        Columns of numbers, separated by commas, semicolons or blanks. The first row has their
         names; without it they are named 1, 2, ... Lines that begin with # are comments. The first
         column is the time. For points it is the coordinate of that name: x, y, z, x0, y0, z0 or any
         other column of points.
@@ -255,8 +254,8 @@ class Reference(Compared, Compute):
         The column of the file to compare with; for points also the column of the points, such as
         s11 or vx.
     norm
-        ``L1``, ``L2`` (without a word) or ``max``, and ``absolute`` (without a word) or
-        ``relative``, in any order.
+        ``L1``, ``L2`` (default) or ``max``, and ``absolute`` (default) or ``relative``, in any
+        order.
 
     Example
     -------
@@ -267,12 +266,12 @@ class Reference(Compared, Compute):
 
     Notes
     -----
-    The curve is linear between its rows. What lies beyond its ends is not compared.
+    The curve is linear between its rows. Values beyond its ends are not compared.
 
-    Of a value, ID is the norm of its difference over the time so far. Each output counts with the
-    time since the one before. ID_now is the difference now, ID_curve the curve now. Of points, ID
-    and ID_now are the norm over the points now, weighted by initial volumes. ID_curve is the mean
-    of the curve at the points.
+    For a value, ID is the norm of its difference over the time so far. Each output is weighted by
+    the time since the previous one. ID_now is the present difference, ID_curve the present value of
+    the curve. For points, ID and ID_now are the present norm over the points, weighted by initial
+    volumes. ID_curve is the mean of the curve at the points.
 
     See Also
     --------
@@ -332,13 +331,13 @@ class Reference(Compared, Compute):
         self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
-        """Sizes (2, n) of differences and of the curve at points, weights; the curve, and one."""
+        """Magnitudes (2, n) of differences and of the curve, weights; the curve, and one."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact
         sizes = np.abs([difference, exact])
         return sizes, points.reference_volume[within], exact, np.ones(len(exact))
 
     def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return which places (n,) the curve covers, and its values there."""
+        """Return which positions (n,) the curve covers, and its values there."""
         within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
         return within, np.interp(at[within], *self.curve)

@@ -1,4 +1,4 @@
-"""Computes of means, extremes and quantiles over points, and of a column at a place."""
+"""Computes of means, extremes and quantiles over points, and of a column at a position."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -15,9 +15,9 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Mean(Compute):
-    """Base of computes of means: the `terms` of points are weights, and these times quantities.
+    """Base of computes of means: the `terms` of points are weights, and weights times quantities.
 
-    Without weight the mean is 0, as the sums of other computes.
+    With zero total weight the mean is 0, like the sums of other computes.
     """
 
     empty = 0.0
@@ -31,7 +31,7 @@ class Mean(Compute):
 
 
 class AverageVelocity(Mean):
-    """Measure the plain mean of the velocities of points; published as ID_x, ID_y, ID_z.
+    """Measure the unweighted mean velocity of points; published as ID_x, ID_y, ID_z.
 
     Example
     -------
@@ -55,8 +55,8 @@ class AverageStress(Mean):
 
     Notes
     -----
-    The mean is over the present volume: sum V sigma / sum V. For a body at rest it follows from the
-    forces on its surface alone. A group without points gives 0.
+    The mean is over the present volume: sum V sigma / sum V. For a body at rest it depends only on
+    the forces on its surface. A group without points gives 0.
 
     See Also
     --------
@@ -73,8 +73,8 @@ class AverageStress(Mean):
 class AverageTemperature(Mean):
     """Measure the mean temperature of a group of points; published as ID.
 
-    Points count by their mass, and those of materials without a temperature as 0. A scene in which
-    no material has one is refused.
+    Weighted by mass. Points of materials without a temperature count as 0. A scene without any
+    such material is refused.
 
     Example
     -------
@@ -105,7 +105,7 @@ class AverageTemperature(Mean):
 class MaxPlasticStrain(Compute):
     """Measure the largest equivalent plastic strain and temperature of a group of points.
 
-    Published as ID_Epmax and ID_Tmax; 0 where nothing can yield, or has a temperature.
+    Published as ID_Epmax and ID_Tmax; 0 if nothing can yield, or nothing has a temperature.
 
     Example
     -------
@@ -132,7 +132,7 @@ class CenterOfMass(Mean):
     Parameters
     ----------
     group
-        Group of points or of nodes, or ``all`` points. Nodes have the mass that the points bring.
+        Group of points or of nodes, or ``all`` points. Nodes have the mass mapped from the points.
 
     Example
     -------
@@ -163,7 +163,7 @@ class CenterOfMass(Mean):
 
 
 class MaxPosition(Compute):
-    """Measure the largest coordinates among points, each on its own; published as ID_x, ID_y, ID_z.
+    """Measure the largest coordinate in each direction; published as ID_x, ID_y, ID_z.
 
     Example
     -------
@@ -180,7 +180,7 @@ class MaxPosition(Compute):
 
     def refresh(self) -> None:
         found = self.hub.fields.each(self, "furthest")
-        # Without points, 0, as the sums of other computes.
+        # 0 without points, like the sums of other computes.
         self.publish_components(self.extreme(found, axis=0) if found else np.zeros(3))
 
     def furthest(self, points: PointTable) -> np.ndarray | None:
@@ -188,7 +188,7 @@ class MaxPosition(Compute):
 
 
 class MinPosition(MaxPosition):
-    """Measure the least coordinates among points, each on its own; published as ID_x, ID_y, ID_z.
+    """Measure the smallest coordinate in each direction; published as ID_x, ID_y, ID_z.
 
     Example
     -------
@@ -203,20 +203,20 @@ class MinPosition(MaxPosition):
     extreme = staticmethod(np.min)
 
 
-BITS = 8  # of a coordinate that are looked at together
+BITS = 8  # of a coordinate, examined at a time
 SIGN = np.uint64(1 << 63)
 
 
 class PositionQuantile(Compute):
-    """Measure the coordinates below which a share of the mass lies, each on its own.
+    """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z. A front measured so does not jump after a few points that fly
-    ahead, as the largest position does.
+    Published as ID_x, ID_y, ID_z. Unlike the largest position, a front measured like this does not
+    jump when a few points fly ahead.
 
     Parameters
     ----------
     share
-        Share of the mass, from 0 (the lowest point) to 1 (the highest).
+        Fraction of the mass, from 0 (the lowest point) to 1 (the highest).
 
     Example
     -------
@@ -225,7 +225,7 @@ class PositionQuantile(Compute):
 
     Notes
     -----
-    The first coordinate at which the mass of the points up to there reaches the share.
+    The first coordinate at which the mass of the points up to there reaches the fraction.
 
     See Also
     --------
@@ -240,7 +240,7 @@ class PositionQuantile(Compute):
 
     def refresh(self) -> None:
         d = self.hub.domain.dimension
-        # Of the bits of the coordinates, eight at a time: which come first is known so far.
+        # Radix selection: the bits of the coordinates, eight at a time, from the highest.
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
@@ -248,7 +248,7 @@ class PositionQuantile(Compute):
                 self.publish_components(np.zeros(d))
                 return
             if shift == 64 - BITS:
-                # Shares such as 0.1 of ten equal points must not fail by rounding.
+                # Fractions such as 0.1 of ten equal points must not fail by rounding.
                 wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 there = np.flatnonzero(of_bits)
@@ -259,7 +259,7 @@ class PositionQuantile(Compute):
         self.publish_components(_numbers(np.array(first, np.uint64)))
 
     def masses(self, points: PointTable, shift: int, first: list[int]) -> tuple:
-        """Masses of points whose coordinates begin with these bits, by the next ones."""
+        """Masses of points whose coordinates begin with these bits, by the next bits."""
         found = []
         for axis, begin in enumerate(first):
             bits = _bits(points.position[:, axis].astype(float)) >> np.uint64(shift)
@@ -271,30 +271,30 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Whole numbers in the order of floating-point ones."""
-    bits = (numbers + 0.0).view(np.uint64)  # no zero with a sign
+    """Integers in the same order as the floating-point numbers."""
+    bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
 
 def _numbers(bits: np.ndarray) -> np.ndarray:
-    """The numbers that have these bits."""
+    """Floating-point numbers with these bits."""
     return np.where(bits >> np.uint64(63) > 0, bits ^ SIGN, ~bits).view(float)
 
 
 class Probe(Mean):
-    """Measure a column of the points: its mean, or its value at a point or a place.
+    """Measure a column of the points: its mean, or its value at a point or a position.
 
-    Published as the plain ID, or with several columns as ID_column each. Without points in the
-    group, and of a point that is not there any more, NaN.
+    Published as ID, or for several columns as ID_column. NaN for an empty group, and for a point
+    that no longer exists.
 
     Parameters
     ----------
     column, columns
-        Columns of dump particle. Their mean over the group counts points by their volume.
+        Columns of dump particle. Their mean over the group is weighted by volume.
     point
-        The id of a point, as dumps show it: its own values instead of the mean.
+        The id of a point, as in dumps: its values instead of the mean.
     x, y, z
-        A place: the values of the point of the group that is now nearest to it.
+        A position: the values of the point of the group that is nearest to it now.
 
     Example
     -------
@@ -345,7 +345,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Distance, id and columns of the point that is asked for, or of the nearest of these."""
+        """Distance, id and columns of the given point, or of the nearest of these."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

@@ -1,4 +1,4 @@
-"""Base of dumps: a rhythm, a file name, checked columns; tables of points and of nodes."""
+"""Base of dumps: interval, file name, checked columns; tables of points and of nodes."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -24,10 +24,10 @@ class Dump(Rhythmic):
         Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
         always written.
     file
-        File name. The first ``*`` becomes the step number; without ``*`` all snapshots follow each
-        other in one file.
+        File name. The first ``*`` becomes the step number; without ``*`` all snapshots are written
+        to one file, one after another.
     columns
-        What to write, as the style understands it.
+        Content of the dump, interpreted by the style.
     """
 
     style = ""
@@ -43,11 +43,11 @@ class Dump(Rhythmic):
 
     @property
     def one_file_per_step(self) -> bool:
-        """Tell if the name has a ``*``."""
+        """Return True if the name has a ``*``."""
         return "*" in str(self.file)
 
     def path(self) -> Path:
-        """Name the file of the present state."""
+        """Return the file of the present state."""
         folder, file = folder_of_discarded(), self.file
         folder, file = (self.hub.folder, file) if folder is None else (folder, file.name)
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
@@ -57,32 +57,32 @@ class Dump(Rhythmic):
         raise NotImplementedError
 
     def take_part(self) -> None:
-        """Do the same as the first of several processes, which alone keeps what is written."""
+        """Do what the first of several processes does, which alone writes."""
         with discarded():
             self.write()
 
     def finish(self) -> None:
-        """Complete what is written; called at the end of each run, also of one that breaks off."""
+        """Complete the files; called at the end of each run, also of a failed one."""
 
     def warn_of_absence(self) -> None:
-        """Tell that a file to go on in is not as the run left it that is gone on from."""
+        """Warn if the file to continue is not as the resumed run left it."""
         self.hub.warn(begins_anew(self.path()), place=self.place)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
-        """Warn of columns that are 0 because no point or node (`what`) keeps them."""
+        """Warn of columns that are 0 because no point or node (`what`) stores them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
 
 
 POSITIONS = ("x", "y", "z")
-# Written with every row, so asking for them again adds nothing. `tag` is Karamelo's second name of
+# Written with every row anyway, so requests for them are ignored. `tag` is Karamelo's other name of
 # the id.
 LEADING = ("id", "type", "tag")
 
 
 class TableRows(NamedTuple):
-    """Some rows, in the order of their ids: identities and types, (n,) whole numbers; columns."""
+    """Rows in the order of their ids: identities and types, (n,) integers; columns."""
 
     ids: np.ndarray
     types: np.ndarray
@@ -90,19 +90,18 @@ class TableRows(NamedTuple):
 
 
 class TableDump(Dump):
-    """A dump of ``id type x y z`` and the columns asked for, in the form that `write` gives it.
+    """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
 
-    `OfPoints` or `OfNodes`, which stands in front of this class among the bases of a style, says
-    what the rows are: `names` of columns that can be written, those that are `absent` (always 0),
-    the `extent` (number of rows, largest id), and all rows in the order of their ids, in `tables`
-    that fit into memory.
+    `OfPoints` or `OfNodes`, which comes before this class among the bases of a style, defines the
+    rows: `names` of columns that can be written, `absent` ones (always 0), the `extent` (number of
+    rows, largest id), and all rows in the order of their ids, in `tables` that fit into memory.
 
     Attributes
     ----------
     to_first
-        Whether the first of several processes alone gets the tables, which all go through once.
+        Whether only the first of several processes gets the tables, which all iterate over once.
     counts_rows
-        Whether it asks for the extent before.
+        Whether it reads the extent before.
     """
 
     to_first = False
@@ -119,14 +118,14 @@ class TableDump(Dump):
             )
         check_columns(columns, known, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
-        # A viewer needs all three positions; where some are not asked for they come first.
+        # A viewer needs all three positions; those not requested come first.
         if not set(POSITIONS) <= set(wanted):
             wanted = [*POSITIONS, *(name for name in wanted if name not in POSITIONS)]
         super().__init__(hub, every, file, *wanted)
         self.warn_of_absent(columns, self.absent, self.rows_are)
 
     def take_part(self) -> None:
-        """Give the first of several processes the own rows, or do what it does."""
+        """Send the rows of this process to the first process, or do the same as the first."""
         if not self.to_first:
             super().take_part()
             return
@@ -147,9 +146,9 @@ class OfPoints:
     Parameters
     ----------
     columns
-        What to write of each point: x y z (position), x0 y0 z0 (first position), vx vy vz
-        (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
-        stress), p (pressure), rho (density), volume, mass and so on. ``x, y, z`` by default.
+        Columns for each point: x y z (position), x0 y0 z0 (initial position), vx vy vz (velocity),
+        s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises stress), p
+        (pressure), rho (density), volume, mass and so on. ``x, y, z`` by default.
     """
 
     rows_are = "points"
@@ -174,17 +173,16 @@ class OfPoints:
 
 
 class OfNodes:
-    """Rows are the nodes of the background grids, or with `occupied` those that have mass.
+    """Rows are the nodes of the background grids; with `occupied`, only nodes with mass.
 
     Parameters
     ----------
     columns
-        What to write of each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity
-        after the momentum update), fx fy fz (total force), mass, T where heat flows. ``x, y, z`` by
+        Columns for each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity after
+        the momentum update), fx fy fz (total force), mass, T if heat flows. ``x, y, z`` by
         default.
     occupied
-        true: leave out nodes without mass, which makes the files of a large and sparsely filled
-        domain small.
+        true: omit nodes without mass, for small files from a large and sparsely filled domain.
     """
 
     rows_are = "nodes"

@@ -14,15 +14,14 @@ from karamelo_py.output.hdf5_file import reading
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
-# The least compression: with the bytes of like order together, more takes twice the time for a few
-# per cent.
+# The lowest compression: with shuffled bytes, higher levels take twice the time for a few per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
 
 
 class SnapshotRows(NamedTuple):
-    """The rows of one moment, in pieces; `last` is the largest id."""
+    """The rows of one snapshot, in pieces; `last` is the largest id."""
 
     time: float
     step: int
@@ -36,7 +35,7 @@ class Hdf5Dump(TableDump):
     Parameters
     ----------
     file
-        File name. With a ``*``, which becomes the step number, each snapshot has a file of its own.
+        File name. With a ``*``, which becomes the step number, each snapshot is a separate file.
     """
 
     remembers = ("_snapshots",)
@@ -50,11 +49,11 @@ class Hdf5Dump(TableDump):
         self._snapshots += 1
 
     def _add(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
-        """Write snapshot `k`: to a file of its own, or after those before it."""
+        """Write snapshot `k`: to a separate file, or after the previous ones."""
         import h5py
 
         if k == 0 or self.one_file_per_step:
-            # In memory at first: HDF5 cannot close a file for which there is no room.
+            # In memory at first: HDF5 cannot close a file that has no room on the disk.
             with h5py.File("new", "w", driver="core", backing_store=False, libver="latest") as root:
                 self._prepare(root, snapshot.last)
                 root.flush()
@@ -67,7 +66,7 @@ class Hdf5Dump(TableDump):
         self._go_on(path, k, snapshot)
 
     def _go_on(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
-        """Write snapshot `k` into a file, after those before it."""
+        """Append snapshot `k` to a file."""
         self._reserve(path, snapshot.last)
         try:
             with _opened_to_append(path) as root:
@@ -77,15 +76,15 @@ class Hdf5Dump(TableDump):
                     for name in ("time", "step", *self.columns):
                         root[name].resize(k, axis=0)
                     raise
-        except (OSError, RuntimeError) as error:  # of HDF5: told in the words of the system
+        except (OSError, RuntimeError) as error:  # from HDF5; the message is the system's
             reason = re.search("error message = '([^']*)'", str(error))
             what = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {what}") from error
 
     def _reserve(self, path: Path, last: int) -> None:
-        """See that the disk has room for a snapshot of any content.
+        """Check that the disk has room for a snapshot of any content.
 
-        HDF5 writes when it thinks fit, and may neither report nor survive that it cannot.
+        HDF5 writes at any time, and may neither report nor survive a failure.
         """
         if not hasattr(os, "posix_fallocate"):
             return
@@ -101,10 +100,10 @@ class Hdf5Dump(TableDump):
                 file.truncate(size)
 
     def resumed(self) -> None:
-        """Go on in the file of an earlier run, with the snapshots that it had then.
+        """Continue the file of an earlier run, with the snapshots that it had then.
 
-        They are written once more, as they were the first time, so that the bytes are the same. A
-        file that a killed program was writing can be read, not written to.
+        They are rewritten, as at first, so that the bytes are the same. A file that a killed
+        program was writing can be read but not written.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -123,7 +122,7 @@ class Hdf5Dump(TableDump):
             self._snapshots = 0
 
     def _past(self, old: Any, k: int) -> SnapshotRows:
-        """Read snapshot `k` of a file; rows that hold NaN alone were not there."""
+        """Read snapshot `k` of a file; rows with only NaN did not exist."""
 
         def tables(begins: Iterable[int]) -> Iterator[TableRows]:
             for begin in begins:
@@ -140,11 +139,11 @@ class Hdf5Dump(TableDump):
 
     @property
     def _first(self) -> int:
-        """The least id: points are numbered from 1 and nodes from 0."""
+        """The smallest id: points are numbered from 1 and nodes from 0."""
         return int(self.rows_are == "points")
 
     def _prepare(self, root: Any, last: int) -> None:
-        """Make the empty arrays, with names of their axes, as xarray reads them."""
+        """Create the empty arrays, with axis names for xarray."""
         root.attrs["title"] = f"{self.rows_are} of a scene of karamelo-py"
         root.attrs["domain"] = np.array([self.hub.domain.lo, self.hub.domain.hi])
         rows = max(last, 1)
@@ -172,7 +171,7 @@ class Hdf5Dump(TableDump):
                 root[name].dims[axis].attach_scale(root[scale])
 
     def _append(self, root: Any, k: int, snapshot: SnapshotRows) -> None:
-        """Write snapshot `k`. Rows go by their id."""
+        """Write snapshot `k`. Rows are placed by id."""
         first = self._first
         count = max(snapshot.last + 1 - first, len(root["id"]))
         if count > len(root["id"]):
@@ -184,13 +183,13 @@ class Hdf5Dump(TableDump):
         for name, number in (("time", snapshot.time), ("step", snapshot.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
-        # An array that is not held writes its chunks when it is forgotten, and no error is seen.
+        # An array without a reference flushes its chunks when it is deleted, and hides errors.
         arrays = {name: root[name] for name in ("id", "type", *self.columns)}
         for name in self.columns:
             arrays[name].resize((k + 1, count))
         for table in snapshot.tables:
             at = table.ids - first
-            # Always the same pieces, so that a file has the same bytes however its rows come.
+            # Pieces of a fixed size: a file has the same bytes however its rows arrive.
             for begin in range(0, count, PIECE):
                 own, here = (
                     slice(begin, min(begin + PIECE, count)),
@@ -213,10 +212,10 @@ class Hdf5Dump(TableDump):
 
 
 def _opened_to_append(path: Path) -> Any:
-    """Open the file such that what was written stays readable, whatever happens to the program.
+    """Open the file such that its content stays readable if the program dies.
 
-    h5py's swmr=True also opens a file that a killed program has left, if it was opened for that at
-    once (`h5py.File.swmr_mode` does it a moment later).
+    h5py's swmr=True also opens a file that a killed program has left, if it was opened that way
+    from the start (`h5py.File.swmr_mode` does it a moment later).
     """
     import h5py
 
@@ -232,8 +231,8 @@ def _opened_to_append(path: Path) -> Any:
 class Hdf5(OfPoints, Hdf5Dump):
     """Write the material points to one compressed binary file, which h5py and xarray read.
 
-    Each column is an array over time and id. Of a point that is not there any more the numbers are
-    NaN. The file is complete after every snapshot.
+    Each column is an array over time and id. Deleted points are NaN. The file is complete after
+    every snapshot.
 
     Notes
     -----
@@ -243,8 +242,8 @@ class Hdf5(OfPoints, Hdf5Dump):
         points.seq.sel(time=0.5, method="nearest").max()
         h5py.File("points.h5")["seq"][-1]
 
-    A file that a program was writing when it was killed is opened with
-    ``h5py.File(name, swmr=True)``. On a full disk the file has the snapshots that were complete.
+    Open a file whose program was killed while writing with ``h5py.File(name, swmr=True)``. After a
+    full disk, the file has the snapshots that were complete.
 
     Example
     -------
@@ -259,7 +258,7 @@ class Hdf5(OfPoints, Hdf5Dump):
 class GridHdf5(OfNodes, Hdf5Dump):
     """Write the nodes of the background grids to one compressed binary file.
 
-    Everything else is as in dump hdf5.
+    Otherwise like dump hdf5.
 
     Parameters
     ----------

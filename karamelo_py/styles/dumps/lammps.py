@@ -1,4 +1,4 @@
-"""dump particle, dump grid and their kin: the formats of LAMMPS, which OVITO opens."""
+"""dump particle, dump grid and variants: the formats of LAMMPS, which OVITO opens."""
 
 import gzip
 import struct
@@ -14,18 +14,18 @@ from karamelo_py.output.files import continued, whole
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
 
-# A third of the time of level 6 for 4 % more bytes.
+# 33 % of the time of level 6, for 4 % more bytes.
 COMPRESSION = 4
 PIECE = 1 << 20  # bytes
-# Of the binary format (LAMMPS manual, dump, second revision).
+# For the binary format (LAMMPS manual, dump, second revision).
 MAGIC = b"DUMPCUSTOM"
 ENDIAN, REVISION = 1, 2
-# How the sides of the box are: shrink-wrapped, with a least extent.
+# Style of the box sides: shrink-wrapped, with a minimum extent.
 SHRUNK, AT_LEAST = 2, 3
 
 
 class Plain:
-    """Leaves text as it is, with the interface of ``zlib.compressobj``."""
+    """Writes text unchanged, with the interface of ``zlib.compressobj``."""
 
     def compress(self, data: bytes) -> bytes:
         return data
@@ -40,19 +40,19 @@ class Plain:
 class LammpsDump(TableDump):
     """A dump in LAMMPS text format."""
 
-    # Of a file with all snapshots: where the next one goes, how much text there is up to there, and
+    # For a file with all snapshots: position of the next one, length of the text up to there, and
     # the encoder's state.
     remembers = ("_end", "_length")
     to_first = True
     _end = 0
     _length = 0
     _encoder: Any = None
-    # Makes the encoder of a new file, and opens the text of one.
+    # Makes the encoder of a new file, and opens the text of a file.
     encoder: Any = Plain
     opened: Any = staticmethod(partial(open, mode="rb"))
 
     def write(self) -> None:
-        """Write one snapshot: to a file of its own, or after those before it."""
+        """Write one snapshot: to a separate file, or after the previous ones."""
         if self.one_file_per_step:
             encoder = self.encoder()
             with whole(self.path()) as file:
@@ -60,9 +60,9 @@ class LammpsDump(TableDump):
                     file.write(encoder.compress(text))
                 file.write(encoder.flush())
             return
-        # The file is whole after every snapshot: its last bytes are written each time and
-        # overwritten by the next snapshot. (Compressed snapshots of their own one after another
-        # would do for gunzip, but OVITO reads the first only.)
+        # The file is complete after every snapshot: its last bytes are written each time and
+        # overwritten by the next snapshot. (Separately compressed snapshots would do for gunzip,
+        # but OVITO reads only the first.)
         start, before = self._end, self._encoder or self.encoder()
         encoder = before.copy()
         tail = before.copy().flush() if start else b""
@@ -76,7 +76,7 @@ class LammpsDump(TableDump):
         self._end, self._length, self._encoder = end, length, encoder
 
     def resumed(self) -> None:
-        """Go on in the file of an earlier run, behind what was its last snapshot then."""
+        """Continue the file of an earlier run after its last snapshot then."""
         if self._end == 0:
             return
         path = self.path()
@@ -84,7 +84,7 @@ class LammpsDump(TableDump):
             self.warn_of_absence()
             self._end = self._length = 0
             return
-        # What an encoder has kept for the bytes to come is not in the file, but follows from it.
+        # The pending bytes of an encoder are not in the file, but follow from it.
         self._encoder = self.encoder()
         with self.opened(path) as file:
             for begin in range(0, self._length, PIECE):
@@ -95,7 +95,7 @@ class LammpsDump(TableDump):
         update, units = self.hub.update, self.hub.output.units
         lines = [
             *(["ITEM: UNITS", str(units)] if units else []),
-            "ITEM: TIME",  # read_dump of LAMMPS wants it first
+            "ITEM: TIME",  # read_dump of LAMMPS expects it first
             f"{update.time:.16g}",
             "ITEM: TIMESTEP",
             str(update.step),
@@ -111,9 +111,9 @@ class LammpsDump(TableDump):
 
 
 def box(hub: Hub) -> list[tuple[float, float]]:
-    """Find the ends of the domain along the three axes.
+    """Return the ends of the domain along the three axes.
 
-    OVITO takes a box of no thickness for degenerate; one cell about zero is right for a slice of
+    OVITO takes a box of zero thickness for degenerate; one cell about zero is right for a slice of
     unit width.
     """
     domain = hub.domain
@@ -123,30 +123,30 @@ def box(hub: Hub) -> list[tuple[float, float]]:
 
 
 class Gzipped:
-    """Mixed into a text dump: the same text, gzipped.
+    """Mix-in for a text dump: the same text, gzipped.
 
     Parameters
     ----------
     file
         File name, best with the ending ``.gz``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots follow each other in one file.
+        ``*`` all snapshots are written to one file, one after another.
     """
 
     def encoder(self) -> Any:
-        """Make a gzip stream without name and date, so that the same run gives the same bytes."""
+        """Make a gzip stream without name and date, for reproducible bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
     opened = staticmethod(gzip.open)
 
 
 class BinaryRows:
-    """Mixed into a text dump: the same rows as numbers in double precision, little-endian.
+    """Mix-in for a text dump: the same rows as little-endian double-precision numbers.
 
     Parameters
     ----------
     file
         File name, best with the ending ``.bin``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots follow each other in one file.
+        ``*`` all snapshots are written to one file, one after another.
     """
 
     def _snapshot(self) -> Iterator[bytes]:
@@ -158,7 +158,7 @@ class BinaryRows:
         yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *np.ravel(box(self.hub)))
         yield struct.pack("<iibd", len(names), 0, 1, update.time)  # no units, but a time
         yield struct.pack("<i", len(line)) + line
-        yield struct.pack("<ii", 1, count * len(names))  # all in one piece
+        yield struct.pack("<ii", 1, count * len(names))  # in one piece
         for ids, types, columns in self.tables():
             yield np.column_stack([ids, types, *columns]).astype("<f8", copy=False).tobytes()
 
@@ -166,9 +166,9 @@ class BinaryRows:
 class Particle(OfPoints, LammpsDump):
     """Write the material points in LAMMPS text format, which OVITO opens.
 
-    Each row begins with the point's number (``id``, the same through the whole run) and the number
-    of its solid (``type``, from 1). Positions are always written. The header carries the true step
-    and, as ``ITEM: TIME``, the time.
+    Each row begins with the point's number (``id``, constant during the run) and the number of its
+    solid (``type``, from 1). Positions are always written. The header contains the step and, as
+    ``ITEM: TIME``, the time.
 
     Example
     -------
@@ -182,7 +182,7 @@ class GridDump(OfNodes, LammpsDump):
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
     number of its grid (``type``, from 1). Positions are always written.
 
-    The dump writes the nodes of all grids, one after another, with continuous ids. ulmpm and ulcpdi
+    The nodes of all grids are written one after another, with consecutive ids. ulmpm and ulcpdi
     have one grid. tlmpm and tlcpdi have one for each solid, over its reference shape.
     ulmpm/contacts has the grid of the domain once for each velocity field, so several rows have the
     same position.
@@ -196,10 +196,7 @@ class GridDump(OfNodes, LammpsDump):
 class ParticleGz(Gzipped, Particle):
     """Write the material points in LAMMPS text format, gzipped.
 
-    A file has less than half the size, and OVITO
-    opens it as it is.
-
-    Everything else is as in dump particle.
+    A file has less than half the size, and OVITO opens it directly. Otherwise like dump particle.
 
     Example
     -------
@@ -214,7 +211,7 @@ class ParticleGz(Gzipped, Particle):
 class GridGz(Gzipped, GridDump):
     """Write the nodes of the background grids in LAMMPS text format, gzipped.
 
-    Everything else is as in dump grid.
+    Otherwise like dump grid.
 
     Example
     -------
@@ -229,8 +226,7 @@ class GridGz(Gzipped, GridDump):
 class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers keep all their digits, and files are written faster than text. Everything else is as in
-    dump particle.
+    Numbers retain all digits, and files are written faster than text. Otherwise like dump particle.
 
     Example
     -------
@@ -245,8 +241,7 @@ class ParticleBin(BinaryRows, Particle):
 class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers keep all their digits, and files are written faster than text. Everything else is as in
-    dump grid.
+    Numbers retain all digits, and files are written faster than text. Otherwise like dump grid.
 
     Example
     -------

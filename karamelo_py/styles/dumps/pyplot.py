@@ -23,24 +23,23 @@ from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
-# Above this, a width or height is meant in pixels.
+# A width or height above this is in pixels.
 MOST_INCHES = 50
 LEAST_PIXELS, MOST_PIXELS = 20, 20000
-# Fast and nearly as small as the best for pictures of few colours.
+# Fast, and nearly as small as the best for pictures with few colours.
 PNG_COMPRESSION = 1
-# Components have either sign: their colours are of two kinds, with grey at 0.
+# Components have either sign: a diverging colour map, with grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # points, about, that say how large one is
+SAMPLE = 1 << 16  # points, about, from which the typical size is measured
 
 
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
-    In 2D and 3D the points are drawn where they are, in 1D the field is drawn over x. The limits
-    of the colours grow with what has been seen, so that the pictures of a run can be compared,
-    unless they are given. The figure is made once and only its points are drawn anew.
+    In 2D and 3D the points are drawn at their positions; in 1D the field is drawn over x. Unless
+    given, the colour limits grow with the values seen, so the pictures of a run can be compared.
 
     Parameters
     ----------
@@ -49,49 +48,48 @@ class PyPlot(Dump):
         always drawn.
     file
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
-        ``*`` each picture takes the place of the one before.
+        ``*`` each picture replaces the previous one.
     width, height
         Size of the picture: up to 50 in inches (of 100 pixels), above that in pixels; from 20 to
         20000 pixels.
     field
-        What colours the points: any column of dump particle, or a formula of columns, time and
-        published values. The name of a group or solid is a column, too: 1 for its points, 0 for
-        others. Without it the solid does (in 1D: vx is drawn).
+        Column of dump particle that sets the colour, or a formula of columns, time and published
+        values. The name of a group or solid is a column, too: 1 for its points, 0 elsewhere.
+        Default: the solid (in 1D: vx is drawn).
     vmin, vmax
-        Ends of the colours. Where a picture has values beyond, the bar beside it ends in an arrow.
+        Limits of the colours. If a picture has values beyond, the colour bar ends in an arrow.
     cmap
-        A colour map of Matplotlib; viridis, or coolwarm for components, which have either sign.
+        A Matplotlib colour map; default viridis, or coolwarm for components with either sign.
     azimuth, elevation
-        In 3D, from where it is seen, in degrees: around z from x on, and above the horizon.
+        Viewing direction in 3D, in degrees: around z from x, and above the horizon.
     axes
         false: without axes and numbers.
     title
-        What is written above, in front of step and time. A name or formula in braces becomes the
-        number it has then, as in "force {press_y} N". Two braces are one, and dollars enclose
-        mathematics, as in "$v_{max}$".
+        Text above, before step and time. A name or formula in braces becomes its present number,
+        as in "force {press_y} N". Two braces make one, and dollars enclose mathematics, as in
+        "$v_{max}$".
     label
-        What is written beside the colours, such as "stress (MPa)"; the column when left out.
+        Label of the colour bar, such as "stress (MPa)"; default: the column.
     only
-        A condition of columns as in `field`: other points are left out. It slices a body and leaves
-        groups and solids out, as in ``not tool && y > 0``.
+        A condition of columns as in `field`: other points are omitted. Use it to slice a body or
+        omit groups and solids, as in ``not tool && y > 0``.
     xmin, xmax, ymin, ymax, zmin, zmax
-        Ends of what is shown; those of the domain when left out.
+        Limits of the view; default: the domain.
     scale
-        log: colours go by the logarithm of the column.
+        log: colours follow the logarithm of the column.
     quantile
-        Share of the values that may lie beyond either end of the colours, such as 0.01. It keeps
-        single large values from taking all colours.
+        Fraction of the values that may lie beyond either colour limit, such as 0.01, so that a few
+        large values do not use up all colours.
     dpi
         Pixels per inch. A picture of 600 pixels is 6 inches wide, and has 1800 with 300.
     fontsize
-        Size of letters in points.
+        Font size in points.
     pointsize
-        Size of the points over that of the material they stand for; 1.4 fills all gaps.
+        Size of the drawn points, relative to the size of the material points; 1.4 fills all gaps.
     outlines
         true: a line around each solid, and around the regions, walls and rigid tools of fixes, such
-        as contact/surface. In 3D tools are drawn by their edges and sections; what lies behind
-        something is light.
-
+        as contact/surface. In 3D tools are drawn by their edges and sections; hidden lines are
+        light.
     Example
     -------
     dump(d3, all, pyplot, 100, picture.*.png, 500, 500, seq, vmin=0, vmax=2e5)
@@ -155,20 +153,20 @@ class PyPlot(Dump):
 
     @property
     def seen(self) -> tuple[Any, ...]:
-        """Limits of the field so far, and what they are those of."""
+        """Limits of the field so far, and the field they belong to."""
         limits = self._picture.limits if self._picture is not None else self._limits
         return limits, self._label(), *self._marks()
 
     @seen.setter
     def seen(self, seen: tuple[Any, ...] | None) -> None:
         limits, *of = seen or (None,)
-        if of == [self._label(), *self._marks()]:  # a script that goes on may show something else
+        if of == [self._label(), *self._marks()]:  # a resumed script may show another field
             self._limits = limits
             if self._picture is not None:
                 self._picture.begin_with(limits)
 
     def _marks(self) -> list[Any]:
-        """Name what the limits of the colours belong to."""
+        """Identify what the colour limits belong to."""
         more = [self.look[name] for name in ("log", "quantile") if self.look[name]]
         return [*self.limits, *more]
 
@@ -176,7 +174,7 @@ class PyPlot(Dump):
         self.save(self.path())
 
     def save(self, path: Path) -> None:
-        """Draw the present state to a file, in the format that its name asks for."""
+        """Draw the present state to a file, in the format of its name."""
         with unwarned():
             if picture_format(path) == "png":
                 with whole(path) as file:
@@ -205,7 +203,7 @@ class PyPlot(Dump):
         self._picture.show(snapshot, self.side(snapshot), title, tools_of(fixes))
 
     def _make(self) -> Any:
-        # Matplotlib takes a third of a second to import: only scenes with pictures pay it.
+        # Matplotlib takes 0.3 s to import: only scenes with pictures pay for it.
         from karamelo_py.output import pictures
 
         units = self.hub.output.units
@@ -222,7 +220,7 @@ class PyPlot(Dump):
         return made
 
     def snapshot(self) -> Snapshot:
-        """Take what a picture needs of all points, some of them after others."""
+        """Collect the data of a picture from all points, part by part."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "type", "x", "y", "z", "volume", label])
         pieces = [self._chosen(table, names) for table in self.hub.fields.pieces(to_first=True)]
@@ -230,7 +228,7 @@ class PyPlot(Dump):
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 
     def _chosen(self, table: PointTable, names: Iterable[str]) -> list[np.ndarray]:
-        """Take columns of the points of a table that are drawn."""
+        """Return columns of the points of a table that are drawn."""
         of = self.formula
         columns = [
             of.of(table) if of and name == of.text else table.particle(name) for name in names
@@ -242,7 +240,7 @@ class PyPlot(Dump):
             pass
 
     def side(self, snapshot: Snapshot) -> float:
-        """Measure the side length of a typical point."""
+        """Return the side length of a typical point."""
         columns, domain = snapshot.columns, self.hub.domain
         volume = columns["volume"]
         if domain.axisymmetric:
@@ -258,7 +256,7 @@ class PyPlot(Dump):
 
 
 def tools_of(fixes: Iterable[Any]) -> list[Any]:
-    """List what is outlined of walls and tools (`output.outlines.Tool`)."""
+    """List the walls and tools to outline (`output.outlines.Tool`)."""
     from karamelo_py.output.outlines import Tool
 
     return [
@@ -317,7 +315,7 @@ def look_of(
                 expected="viridis, coolwarm, magma, gray, jet ...",
                 hint=meant(cmap, colormaps),
             )
-    # Where the user says about what the colours lie, they do not lie about 0.
+    # If the user sets a colour limit, the colours are not centred about 0.
     symmetric = signed and (vmin, vmax) == (None, None)
     look |= {"limits": (vmin, vmax), "symmetric": symmetric, "log": log}
     look["outlines"] = outlines
@@ -342,9 +340,9 @@ FRAMES_PER_SECOND = 25
 
 
 class Movie(PyPlot):
-    """Draw a movie of the points, as dump pyplot draws pictures: 25 frames in a second.
+    """Draw a movie of the points, with pictures like dump pyplot: 25 frames per second.
 
-    The file is written at the end of each run, also of one that breaks off or is interrupted.
+    The file is written at the end of each run, also of a failed or interrupted one.
 
     Parameters
     ----------
@@ -352,9 +350,9 @@ class Movie(PyPlot):
         Steps between two frames, or ``time(T)``. The first and the last state of a run are
         always drawn.
     file
-        File name ending in .gif or, where the program ffmpeg is installed, .mp4.
+        File name ending in .gif or, if the program ffmpeg is installed, .mp4.
     vmin, vmax
-        Ends of the colours. Without them the colours change when numbers outgrow them.
+        Limits of the colours. Without them the colours change when values exceed them.
 
     Example
     -------

@@ -16,7 +16,7 @@ from karamelo_py.styles.dumps.base import POSITIONS, OfNodes, OfPoints, TableDum
 
 
 class VtkDump(TableDump):
-    """A series of VTU files, and a PVD file beside them that gives each its time.
+    """A series of VTU files, and a PVD file with the time of each.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ class VtkDump(TableDump):
 class Vtk(OfPoints, VtkDump):
     """Write the material points as a series of VTU files, which ParaView opens.
 
-    Beside them, a file of the same name with the ending ``.pvd`` lists all snapshots with their
-    times: open that one.
+    A file of the same name with the ending ``.pvd`` lists all snapshots with their times: open that
+    one.
 
     Example
     -------
@@ -103,15 +103,15 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 
 
 class GridVtk(OfNodes, VtkDump):
-    """Write the background grids, with numbers at their nodes, as a series of VTU files.
+    """Write the background grids, with values at their nodes, as a series of VTU files.
 
-    ParaView opens the file with the ending ``.pvd`` beside them, which lists all snapshots with
+    Open the file of the same name with the ending ``.pvd`` in ParaView. It lists all snapshots with
     their times.
 
     Parameters
     ----------
     occupied
-        true: leave out nodes without mass, and cells that have such a node.
+        true: omit nodes without mass, and cells with such a node.
 
     Example
     -------
@@ -123,7 +123,7 @@ class GridVtk(OfNodes, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Keep the numbers of nodes that are written, where others are not."""
+        """Keep the numbers of the written nodes, where some are omitted."""
         if self.occupied:
             kept.append(ids)
 

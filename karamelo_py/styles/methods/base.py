@@ -1,4 +1,4 @@
-"""Base of methods: grids, data of the points, parts of a step."""
+"""Base of methods: grids, point data, parts of a step."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -17,30 +17,30 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
 
-# Names under which the force on a solid and its torque are published.
+# Published names of the force and torque on a solid.
 LOADS = ("ContactForce", "ContactTorque")
 
 
 def publish_loads(hub: Hub, solid: Solid) -> None:
-    """Make room for the force on a solid, and its torque."""
+    """Reserve published values for the force and torque on a solid."""
     for load in LOADS:
         hub.values.publish_vector(f"{load}_{solid.id}", ("x", "y", "z"))
 
 
 def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
-    """Find where the force on a solid and its torque are published."""
+    """Return the published slots of the force and torque on a solid."""
     return [hub.values.slot(f"{load}_{solid.id}_x") for load in LOADS]
 
 
 def takes_average(law: Any) -> bool:
-    """Tell whether the yield surface of a law takes a part of the averaged pressure (F-bar)."""
+    """Return True if the yield surface of a law uses part of the averaged pressure (F-bar)."""
     if not can(law, share_beside):
         return False
     return bool(share_beside(law.strength, initial_memory(law.strength, 1.0)) > 0)
 
 
 class NoContact(NamedTuple):
-    """Solids act on each other by sharing nodes, or not at all."""
+    """Solids interact through common nodes, or not at all."""
 
     rows = rows_before = rows_after = ()
 
@@ -51,14 +51,14 @@ class Method:
     Parameters
     ----------
     heat
-        Whether heat flows between points, too.
+        Whether heat also flows between points.
 
     Attributes
     ----------
     basis
-        The basis' tag.
+        Tag of the basis.
     basis_name
-        The basis, with its variant, as the script calls it.
+        Name of the basis in scripts, with its variant.
     thermal
         Whether heat flows.
     place
@@ -66,9 +66,9 @@ class Method:
     frame
         Whether weights belong to present or reference positions.
     own_grids
-        Whether every solid has a grid of its own, laid over its own box with its own cell size.
+        Whether each solid has a separate grid over its bounding box, with its cell size.
     fields_per_solid
-        Whether every solid has a velocity field of its own on the grid of the domain.
+        Whether each solid has a separate velocity field on the grid of the domain.
     """
 
     basis: NamedTuple
@@ -84,37 +84,37 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """True if points of a cell stand at equal distances, so that their domains tile it."""
+        """True if the points of a cell are equally spaced, so that their domains tile it."""
         return bool(getattr(self.basis, "shape", ()))
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Return the tag of contact between solids with velocity fields of their own."""
+        """Return the tag of contact between solids with separate velocity fields."""
         return NoContact()
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Before every run: bring what `contact_between` made up to date with the fixes."""
+        """Update the result of `contact_between` from the fixes, before every run."""
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Views of what of `contact` the next step reads, in the ranges `spans` (k, 2) of nodes."""
+        """Views of the state of `contact` for the next step, in node ranges `spans` (k, 2)."""
         return []
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Take over what a step left in the contact `before` the scene was lowered anew."""
+        """Copy the state of the contact `before` the scene was lowered again."""
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """A solid has been defined."""
+        """Register a new solid."""
 
     def lattices(self, hub: Hub) -> list[Lattice]:
-        """The grids of the scene, in the order of their nodes."""
+        """Return the grids of the scene, in the order of their nodes."""
         domain = hub.domain
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        """Return (F,) bool, whether each velocity field is of a rigid solid; (0,): none is."""
+        """Return (F,) bool, whether each velocity field is of a rigid solid; (0,) if none is."""
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """Return the number of the grid that the points of a solid see."""
+        """Return the number of the grid of the points of a solid."""
         return 0
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
@@ -125,7 +125,7 @@ class Method:
         return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()
 
     def averaging(self, hub: Hub) -> NamedTuple:
-        """Return the tag of averaging: `FBar` where changes of volume are averaged."""
+        """Return the tag of averaging: `FBar` if volume changes are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
         laws = [solid.material.law for solid in hub.solids.values()]
@@ -133,11 +133,11 @@ class Method:
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
-        """Positions and shapes of the domains of a solid's points before the first step, (n, w)."""
+        """Positions and domain shapes of the points of a solid before the first step, (n, w)."""
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """Return the shapes of the domains of a solid's points, (n, s), as the basis keeps them."""
+        """Return the domain shapes of the points of a solid, (n, s), as the basis stores them."""
         basis, half = type(self.basis), solid.half_size
         n, d = half.shape
         unit = np.eye(d)
@@ -161,10 +161,10 @@ class Method:
         return Lattice(dimension, lo, hi, h, basis.nodes_per_cell, basis.least_nodes)
 
     def check(self, hub: Hub) -> None:
-        """Refuse what does not go together; called before every run."""
+        """Refuse incompatible options; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
         if scheme.traits.implicit:
-            return  # which has no part for these transfers
+            return  # no part for these transfers
         unsteady = transfer.inverts_spread and not basis.steady_moment and self.frame.moves
         if unsteady and not scheme.traits.maps_velocity_again:
             raise ScriptError(

@@ -17,7 +17,7 @@ VARIANTS = {"R4": R4, "Q4": Q4, "T3": T3, "R8": R8, "H8": H8, "Tet4": Tet4}
 
 
 class Convected(Method):
-    """A method whose points have domains that deform with them (CPDI).
+    """A method with point domains that deform with the points (CPDI).
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Convected(Method):
             )
 
     def _check_elements(self, d: int, *solids: Solid) -> None:
-        """Refuse elements of a mesh, or boxes around points, that the basis does not work on."""
+        """Refuse mesh elements, or boxes around points, that the basis does not support."""
         basis = type(self.basis)
         name, element = basis.__name__, basis.element
         if d != basis.dimension:
@@ -81,17 +81,17 @@ class Convected(Method):
 
 
 class ULCPDI(Convected, ULMPM):
-    """CPDI: every point has a domain that deforms with it, and sees the nodes around its corners.
+    """CPDI: each point has a deforming domain, and sees the nodes around its corners.
 
-    All solids share one grid. A body does not break between points, however far it stretches.
+    All solids share one grid. A body does not fracture numerically, however far it stretches.
     Forces do not jump when a point crosses a cell face (Sadeghirad et al. 2011, 2013).
 
     ``R4`` and ``R8``
         parallelograms and parallelepipeds that follow the deformation of their point: robust;
     ``Q4`` and ``H8``
-        quadrilaterals and hexahedra whose corners move with the grid: no gaps nor overlaps;
+        quadrilaterals and hexahedra whose corners move with the grid: no gaps or overlaps;
     ``T3`` and ``Tet4``
-        the triangles and tetrahedra of a mesh, whose corners move with the grid.
+        triangles and tetrahedra of a mesh, whose corners move with the grid.
 
     Example
     -------
@@ -101,10 +101,10 @@ class ULCPDI(Convected, ULMPM):
 
 
 class TLCPDI(Convected, TLMPM):
-    """Total Lagrangian CPDI: the initial domain of every point on a grid of its solid's own.
+    """Total Lagrangian CPDI: initial domains on a separate grid for each solid.
 
-    Domains keep their initial shape, so that none tangles; weights never change. Solids do not see
-    each other on the grid. The variants are those of ulcpdi.
+    Domains do not deform, so they cannot tangle, and weights never change. Solids do not interact
+    on the grid. The variants are listed under ulcpdi.
 
     Example
     -------

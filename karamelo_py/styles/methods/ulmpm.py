@@ -15,10 +15,10 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 class ULMPM(Method):
-    """Updated Lagrangian MPM: weights follow the present positions, all solids share one grid.
+    """Updated Lagrangian MPM: weights follow the present positions; all solids share one grid.
 
-    Solids that meet on the grid move together there: contact without slip and without further
-    definition. Nodes that see points of a rigid solid take its velocity.
+    Solids that meet on the grid move together there: contact without slip, with no further
+    definition. Nodes near points of a rigid solid take its velocity.
 
     Example
     -------
@@ -27,8 +27,8 @@ class ULMPM(Method):
     Notes
     -----
     Publishes the force on every rigid solid as ContactForce_ID_x, ContactForce_ID_y,
-    ContactForce_ID_z, with the solid's ID. Its torque about the origin is ContactTorque_ID_x and so
-    on. About a place c it is ContactTorque_ID - c x ContactForce_ID.
+    ContactForce_ID_z, with the solid's ID, and its torque about the origin as ContactTorque_ID_x
+    and so on. The torque about a position c is ContactTorque_ID - c x ContactForce_ID.
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
@@ -50,9 +50,9 @@ class ULMPM(Method):
 class TLMPM(Method):
     """Total Lagrangian MPM: weights belong to reference positions, each solid has its own grid.
 
-    Weights never change: no point crosses a cell face, and a body breaks only where its law says
-    so. Solids do not see each other on the grid: contact is a matter of fixes (contact/hertz,
-    contact/minimize_penetration). For bodies that keep their topology (de Vaucorbeil, Nguyen &
+    Weights never change: no point crosses a cell face, and a body breaks only if its law says so.
+    Solids do not interact on the grid: define contact with fixes (contact/hertz,
+    contact/minimize_penetration). For bodies that retain their topology (de Vaucorbeil, Nguyen &
     Hutchinson 2020, "A Total-Lagrangian material point method for solid mechanics problems
     involving large deformations").
 
@@ -67,7 +67,7 @@ class TLMPM(Method):
     warned = False
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Tell once of solids that pass through all others."""
+        """Warn once of solids without contact to others."""
         touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
         alone = [ID for ID in hub.solids if ID not in touching]
         if len(hub.solids) > 1 and alone and not self.warned:

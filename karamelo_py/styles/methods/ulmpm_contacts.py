@@ -24,7 +24,7 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 def fields(hub: Hub) -> list[int]:
-    """The velocity field of each solid; a solid that is glued to another has the same."""
+    """Return the velocity field of each solid; solids that are glued together have the same."""
     found: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
@@ -33,11 +33,11 @@ def fields(hub: Hub) -> list[int]:
 
 
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
-    """(F, F): the share of the heat of friction that the first of two solids takes.
+    """(F, F): the fraction of frictional heat that the first of two solids takes.
 
-    Where heat flows, by their effusivities sqrt(kappa rho cp), as between two half-spaces in
-    contact (Carslaw & Jaeger 1959, section 2.15); half each where none does. A solid without a
-    temperature takes none.
+    With conduction, by effusivity sqrt(kappa rho cp), as between two half-spaces in contact
+    (Carslaw & Jaeger 1959, section 2.15); otherwise half each. A solid without a temperature takes
+    none.
     """
     takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
     root = [conductivity(law, 1.0) * heat_capacity(law, 1.0) / specific_volume(law) for law in laws]
@@ -48,11 +48,12 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
 
 
 class ULMPMContacts(Method):
-    """Updated Lagrangian MPM with contact: each solid has a velocity field of its own on the grid.
+    """Updated Lagrangian MPM with contact: each solid has a separate velocity field on the grid.
 
     Solids move freely until they approach each other and the gap between them is closed. Then they
     push each other along their common normal. They separate freely. Contact is frictionless unless
-    fix contact/friction says otherwise for a pair of solids. Rigid solids do not give way.
+    fix contact/friction defines friction for a pair of solids. Rigid solids do not yield to
+    contact.
 
     Example
     -------
@@ -61,42 +62,42 @@ class ULMPMContacts(Method):
     Notes
     -----
     Publishes the contact force on every solid (the sum of m dv/dt over its nodes) as
-    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, with the solid's ID. Publishes its
-    torque about the origin as ContactTorque_ID_x and so on. Solids that are glued together share a
-    field and its force.
+    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, with the solid's ID, and its torque
+    about the origin as ContactTorque_ID_x and so on. Solids that are glued together have one field
+    and one force.
 
-    The gap follows from the mean position of the points that a node sees. The outermost layer of
+    The gap follows from the mean position of the points around a node. The outermost layer of
     points lies half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the
     material point method using multimaterial methods"). This is exact for plane surfaces along the
-    grid. Solids with curved or leaning faces have cut points there (points=cut), unless the line
-    ``solid`` says otherwise. Whole squares (points=regular) make steps in such a face: a block on a
-    slope of 20 degrees sticks. With Bernstein-quadratic functions the gap is unknown, and contact
-    begins as soon as two solids have mass at one node.
+    grid. Solids with curved or inclined faces use cut points there (points=cut), unless the command
+    ``solid`` says otherwise. Whole squares (points=regular) make such a face stair-stepped: a block
+    on a slope of 20 degrees sticks. With bernstein-quadratic the gap is unknown, and contact begins
+    as soon as two solids have mass at one node.
 
-    A node at a surface loses its velocity of approach. Bars of 4, 8 and 16 cells that collide lose
-    15, 11 and 4 % of the kinetic energy.
+    A node at a surface loses its velocity of approach. Colliding bars of 4, 8 and 16 cells lose 15,
+    11 and 4 % of the kinetic energy.
 
     For a fixed base, use a rigid solid or fix velocity_nodes. The fix must give all components, and
     its group must contain all corners of the cells of the base. With splines a base should be three
-    cells thick. The surface of a thinner one seems higher by up to a quarter of a cell.
+    cells thick: the surface of a thinner one appears higher by up to a quarter of a cell.
 
-    Walls of one cell hold liquids and grains, also in their corners. Water at rest in a rigid box
-    still sinks into its floor slowly: a third of a cell in 2 s (linear, FLIP 0.99).
+    Walls of one cell contain liquids and granular materials, also in corners. Water at rest in a
+    rigid box still sinks slowly into its floor: 33 % of a cell in 2 s (linear, FLIP 0.99).
 
-    Both solids at a node have one normal, so that their impulses are opposite and momentum is kept.
+    Both solids at a node have one normal, so their impulses are opposite and momentum is conserved.
     It comes from the sums of m grad N of both, averaged over the neighbouring nodes with the
-    weights 1/4, 1/2, 1/4 along each axis. The solid whose sums scatter less counts most: the face
-    where a corner lies on a face. A solid with a prescribed velocity counts alone, except at the
-    end of its face. Solids that are apart along an axis of the grid are not in contact.
+    weights 1/4, 1/2, 1/4 along each axis. The solid whose sums scatter less has more weight: the
+    face where a corner lies on a face. For a solid with a prescribed velocity, only its normal
+    counts, except at the end of its face. Solids that are apart along a grid axis are not in
+    contact.
 
-    At a node of more than two solids, every approaching pair takes its impulse from the same
+    At a node of more than two solids, every approaching pair computes its impulse from the same
     velocities. The impulse is smaller for solids in several pairs. The rest is removed in up to 16
-    passes. The order of the solids in the script has no effect. Contact does not move nodes that
-    fix velocity_nodes holds. Their impulse goes into the reaction of that fix.
+    passes. The order of the solids in the script has no effect. Contact does not move nodes held by
+    fix velocity_nodes. Their impulse is added to the reaction of that fix.
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
     for the material point method and application to stress propagation in granular material".
-
     See Also
     --------
     fix contact/friction, ulmpm
@@ -126,9 +127,9 @@ class ULMPMContacts(Method):
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """`nodes`, and what else the points of a body see whose cells have all corners among them.
+        """`nodes`, and all nodes around points of a body in cells with all corners in `nodes`.
 
-        Splines and domains see nodes beyond. If these gave way, the normal of contact would turn.
+        Splines and domains reach further nodes. If these moved, the contact normal would rotate.
         """
         if type(self.basis).cells == 1 and not getattr(self.basis, "shape", ()):
             return nodes
@@ -143,7 +144,7 @@ class ULMPMContacts(Method):
         return found
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Contact where the fields of two solids meet."""
+        """Return the tag of contact where the fields of two solids meet."""
         count, d = len(lattices), hub.domain.dimension
         shape = lattices[0].shape[:d]
         nodes = sum(lattice.node_count for lattice in lattices)
@@ -165,7 +166,7 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),
-            # Pages that nothing is written to cost no memory.
+            # Pages of memory cost nothing until they are written.
             touched=np.zeros((nodes, count), np.int32),
             prescribed=np.zeros((nodes, d), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
@@ -181,7 +182,7 @@ class ULMPMContacts(Method):
         )
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Friction and prescribed nodes as the fixes have them now."""
+        """Update friction and prescribed nodes from the fixes."""
         contact.friction[:] = 0
         contact.pair[:] = -1
         for (a, b), fix in self._rubbing(hub):
@@ -192,7 +193,7 @@ class ULMPMContacts(Method):
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
-        # Pages that nothing is written to cost no memory.
+        # Pages of memory cost nothing until they are written.
         prescribed: np.ndarray = contact.prescribed
         if self._prescribed is prescribed:
             prescribed[:] = 0
@@ -204,11 +205,11 @@ class ULMPMContacts(Method):
                     prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Return views of the record of last contact: usf and usavg need it when a step starts."""
+        """Views of the last contact, which usf and usavg read at the start of a step."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Go on from the contact before; fields that came since are behind those."""
+        """Continue from the contact `before`; new fields come after the old ones."""
         if contact.stride == before.stride:
             fields = before.touched.shape[1]
             touched = np.flatnonzero(before.touched.any(axis=1))
@@ -236,7 +237,7 @@ class ULMPMContacts(Method):
 
     @staticmethod
     def _rubbing(hub: Hub) -> Iterator[tuple[tuple[int, int], Fix]]:
-        """Fixes that say how two solids rub, each with the fields of the two."""
+        """Fixes for friction between two solids, each with the two fields."""
         of = fields(hub)
         for fix in hub.fixes.values():
             if fix.friction is not None:
