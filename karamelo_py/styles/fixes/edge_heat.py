@@ -1,4 +1,4 @@
-"""Fixes that let heat flow through the edge of a region: by the area of its surface."""
+"""Fixes for heat flow through the edge of a region, by the area of its surface."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from karamelo_py.styles.fixes.heat import HeatFix, check_coefficient
 
 
 class EdgeHeat(OnEdge, HeatFix):
-    """Base of fixes that let heat flow through the edge of a region."""
+    """Base of fixes for heat flow through the edge of a region."""
 
     published = ("s", "area")
 
@@ -25,12 +25,12 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Find the faces by the surface of the region; those of meshes by the boxes of points."""
+        """Find the faces from the surface of the region; for meshes from the boxes of points."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """The heat per time (n,) that points get by the values of formulas at the faces (m,)."""
+        """Heat per time (n,) into the points, from the values of formulas at the faces (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
@@ -44,18 +44,18 @@ class EdgeHeat(OnEdge, HeatFix):
 
 
 def on_points(points: PointsView, faces: Faces, of_faces: np.ndarray) -> np.ndarray:
-    """Sum numbers of faces (m,) at their points (n,)."""
+    """Sum face values (m,) over the faces of each point (n,)."""
     return np.bincount(faces.point, of_faces, len(points.ids))
 
 
 class EdgeHeatFlux(EdgeHeat):
-    """Let heat flow through the edge of a region: lasers, flames, sunshine.
+    """Apply a heat flux to the edge of a region: lasers, flames, sunshine.
 
     Parameters
     ----------
     q
-        Heat per area and time, negative where it leaves the body: a number or a formula of x, y, z
-        (the place of the edge before the first step), time and published values.
+        Heat per area and time, negative if it leaves the body: a number or a formula of x, y, z
+        (initial position of the edge), time and published values.
 
     Example
     -------
@@ -63,13 +63,13 @@ class EdgeHeatFlux(EdgeHeat):
 
     Notes
     -----
-    Each point gets the heat through the part of the region's surface next to it. The area is that
-    of the smooth surface before the first step (of a mesh, that of the faces of its points). For a
-    part of an edge end the group there, or let q be 0 elsewhere. Where the region ends at the edge
-    of the domain or along a plane of symmetry, let it reach beyond: that is no surface then.
+    Each point gets the heat through the part of the region's surface next to it. The area is the
+    initial area of the smooth surface (for a mesh, of the faces of its points). To load a part of
+    an edge, restrict the group, or set q to 0 elsewhere. If the region ends at the edge of the
+    domain or at a symmetry plane, extend it beyond: then it has no surface there.
 
-    Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, per radian
-    where axisymmetric).
+    Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in
+    axisymmetry per radian).
 
     See Also
     --------
@@ -84,15 +84,15 @@ class EdgeHeatFlux(EdgeHeat):
 
 
 class EdgeConvection(EdgeHeat):
-    """Cool or heat the edge of a region by a fluid around it: q = h (T_inf - T).
+    """Apply convection to the edge of a region: q = h (T_inf - T).
 
     Parameters
     ----------
     h
         Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z
-        (the place of the edge before the first step), time and published values.
+        (initial position of the edge), time and published values.
     T_inf
-        Temperature of the fluid; a number or a formula likewise.
+        Temperature of the surrounding fluid; a number or a formula likewise.
 
     Example
     -------
@@ -100,9 +100,9 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    The area is that of edge_heat_flux. T is the temperature of the points next to the surface after
-    the step, so that no coefficient cools them below the fluid. Publishes the heat per time that
-    all points get as ID_s, and the area as ID_area.
+    The area is defined as in edge_heat_flux. T is the temperature of the points next to the surface
+    after the step, so no coefficient cools them below the fluid. Publishes the heat per time into
+    all points as ID_s, and the area as ID_area.
 
     See Also
     --------
@@ -121,7 +121,7 @@ class EdgeConvection(EdgeHeat):
         rate = on_points(points, faces, faces.area * h)
         warms = on_points(points, faces, faces.area * h * T_inf)
         capacity = points.mass * from_solids(self.hub, points.ids - 1, _heat_capacities)
-        there = capacity > 0  # points of other materials have no temperature
+        there = capacity > 0  # points of other materials lack a temperature
         slower = 1 + rate * self.hub.values.get("dt") / np.where(there, capacity, 1.0)
         return np.where(there, (warms - rate * points.temperature) / slower, 0.0)
 

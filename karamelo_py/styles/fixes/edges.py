@@ -1,4 +1,4 @@
-"""Fixes that load the edge of a region: the faces that points show there."""
+"""Fixes that load the edge of a region, through the faces of points there."""
 
 import itertools
 from functools import cached_property
@@ -19,16 +19,16 @@ from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
-PARTS = 4  # of a box along each direction, in which the surface is measured
+PARTS = 4  # per direction of a box, for measuring the surface
 
 
 class Faces(NamedTuple):
-    """Faces of points that lie on the edge of a region, before the first step."""
+    """Faces of points on the edge of a region, before the first step."""
 
     point: np.ndarray  # (m,) numbers of the points, or their rows in a view
-    axis: np.ndarray  # (m,) that the face is across
-    sign: np.ndarray  # (m,) -1 or 1: the way out
-    area: np.ndarray  # (m,) per radian around an axis
+    axis: np.ndarray  # (m,) normal to the face
+    sign: np.ndarray  # (m,) -1 or 1: outward direction
+    area: np.ndarray  # (m,) per radian in axisymmetry
     middle: np.ndarray  # (m, d)
 
     def some(self, which: np.ndarray) -> "Faces":
@@ -36,10 +36,10 @@ class Faces(NamedTuple):
 
 
 def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
-    """The faces behind which a region ends, of the points `ids` inside it.
+    """Return the outer faces, at the edge of a region, of the points `ids` inside it.
 
-    Points are boxes; a face counts where a box of the same size beyond it would have its centre
-    outside. For boxes that a region has cut see `faces_cut`.
+    Points are boxes; a face counts if the centre of the adjacent box of the same size is outside.
+    For boxes that a region has cut see `faces_cut`.
     """
     d = hub.domain.dimension
     if not len(ids):
@@ -63,10 +63,10 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
 
 
 class EdgePieces(NamedTuple):
-    """Pieces of the surface of a region, and the points that they belong to."""
+    """Pieces of the surface of a region, and their points."""
 
     point: np.ndarray  # (m,) numbers of the points
-    area: np.ndarray  # (m, d) times the normal out of the region
+    area: np.ndarray  # (m, d) times the outward normal
     length: np.ndarray  # (m,) area of a piece, with both sides of an edge
     middle: np.ndarray  # (m, d)
 
@@ -74,8 +74,7 @@ class EdgePieces(NamedTuple):
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     """Measure the surface of a region at the points `ids` of a solid that fills it.
 
-    What of the surface is in a part of a box belongs to the nearest of the points inside that are
-    in this box or beside it.
+    The surface in a part of a box belongs to the nearest inside point in this box or next to it.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
@@ -85,7 +84,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     found = [EdgePieces(np.empty(0, np.int64), none, np.empty(0), none)]
     if not len(ids):
         return found[0]
-    corner = x0.min(axis=0) - 2.5 * size  # so that points of whole boxes are in the middle
+    corner = x0.min(axis=0) - 2.5 * size  # puts points of whole boxes at the box centres
     shape = tuple(((x0.max(axis=0) - corner) / size + 5).astype(np.int64))
     cells = np.ravel_multi_index(tuple(((x0 - corner) / size).astype(np.int64).T), shape)
     order = np.argsort(cells, kind="stable")
@@ -101,7 +100,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
         for step in itertools.product((-1, 0, 1), repeat=d):
             number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
-            for k in (0, 1):  # two points may be in a box: one took what was little beside it
+            for k in (0, 1):  # a box may have two points: one of them took in a small neighbour
                 row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
@@ -113,14 +112,14 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
-    """Return the middles (n PARTS^d, d) of the parts of boxes of edge length `size` around `x`."""
+    """Return the centres (n PARTS^d, d) of the parts of boxes of edge length `size` around `x`."""
     d = x.shape[1]
     places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
     return (x[:, None, :] + size * places).reshape(-1, d)
 
 
 def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
-    """Measure the area (n,) of the surface in boxes around `x`: by parts where it has an edge."""
+    """Measure the area (n,) of the surface in boxes around `x`: by parts at an edge."""
     found, d = np.linalg.norm(area, axis=1), x.shape[1]
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
     depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
@@ -138,8 +137,8 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     """Find the faces at the points `ids` of a solid whose boxes were cut: see `surface_at`.
 
-    They are the projections of the surface across the axes: of an edge within a part of a box,
-    where opposite ones meet, only their difference.
+    The faces are the projections of the surface across the axes. At an edge within a part of a box,
+    opposite projections cancel, and only the difference remains.
     """
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
     pieces = surface_at(solid, region, ids)
@@ -155,7 +154,7 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Find the surface of a region at the points `ids` of a solid, whatever way it looks."""
+    """Find the surface of a region at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     radius = pieces.middle[:, 0] if solid.domain.axisymmetric else 1.0
     none = np.zeros(len(pieces.point), np.int64)
@@ -163,22 +162,22 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 class OnEdge(Fix):
-    """Base of fixes that act on the edge of a region, by the faces that points show there.
+    """Base of fixes on the edge of a region, through the faces of points there.
 
     Parameters
     ----------
     region
-        ID of a region: that of a solid, or one that ends where the solid does.
+        ID of a region: the region of a solid, or one that ends where the solid ends.
     """
 
     group: ParticleGroup
     region: Region
-    side: int | None = None  # of `SIDES`, or all of them
-    # The points that were seen last, and their faces, by their rows there.
+    side: int | None = None  # of `SIDES`; None: all of them
+    # The last points, and their faces by row.
     _seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
-        """Warn where there is nothing to act on."""
+        """Warn if there is nothing to load."""
         if not self.hub.rehearsing and not self.region.unknown:
             pieces = self.group.pieces()
             if len(self.group) and not any(len(self._find(ids).point) for ids in pieces):
@@ -188,14 +187,14 @@ class OnEdge(Fix):
                 )
 
     def faces_of(self, ids: np.ndarray) -> Faces:
-        """The faces of the points in a view, by their rows there; what was found stays known."""
+        """Return the faces of the points in a view, by their rows there; results are cached."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
             known = faces._replace(point=before[faces.point])
             found = Faces(*map(np.concatenate, zip(new, known, strict=True)))
             found = found.some(np.isin(found.point, ids))
-            # The forces on a point are added up in this order, whenever its faces were found.
+            # Sum forces on a point in this order, whenever its faces were found.
             found = found.some(np.lexsort((found.sign, found.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, found.point, sorter=order)]
@@ -203,12 +202,12 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Find the faces of points of a solid by the surface of the region; None by their boxes."""
+        """Find faces from the surface of the region; None to find them from the boxes."""
         return faces_cut(solid, self.region, ids) if getattr(solid, "cut", False) else None
 
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
-        """The solids whose faces follow from the surface, with those of all their points."""
+        """Return solids whose faces come from the surface, with the faces of all their points."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
         found = {}
         for solid in self.hub.solids.values():
@@ -238,7 +237,7 @@ class EdgeFix(OnEdge, PointForces):
         self.region = region
 
     def loads(self, faces: Faces) -> np.ndarray:
-        """The force (m, d) on each face."""
+        """Return the force (m, d) on each face."""
         raise NotImplementedError
 
     def forces(self, points: PointsView) -> np.ndarray:
@@ -253,17 +252,17 @@ def _of(solid: Solid, ids: np.ndarray) -> np.ndarray:
 
 
 class EdgeTraction(EdgeFix):
-    """Load one side of a region with a force per area.
+    """Apply a traction (force per area) to one side of a region.
 
     Parameters
     ----------
     side
-        The side that is loaded, by the direction in which it looks: xlo and xhi for left and right,
-        ylo and yhi, zlo and zhi.
+        The loaded side, by its outward direction: xlo and xhi for left and right, ylo and yhi, zlo
+        and zhi.
     traction
-        tx, ty, tz, as many as the domain has dimensions: force per area. Numbers or formulas of x,
-        y, z (initial position of the edge), time and published values. NULL leaves a component
-        alone.
+        tx, ty, tz, one per dimension of the domain: force per area. Numbers or formulas of x, y, z
+        (initial position of the edge), time and published values. NULL leaves a component
+        unchanged.
 
     Example
     -------
@@ -273,10 +272,10 @@ class EdgeTraction(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
 
-    The points of the group are boxes that fill the region. Boxes with a face to the outside in the
-    direction of `side` bear the traction on the area of this face before the first step. The load
-    keeps its size and direction (a dead load) and acts half a box inside the edge. The sum over a
-    plane side is exactly traction times area. Around an axis, area and force belong to a radian.
+    The points of the group are boxes that fill the region. Boxes with an outer face in the
+    direction of `side` take the traction on the initial area of this face. The load has constant
+    magnitude and direction (a dead load) and acts half a box inside the edge. The sum over a plane
+    side is exactly traction times area. In axisymmetry, area and force are per radian.
 
     See Also
     --------
@@ -303,13 +302,13 @@ class EdgeTraction(EdgeFix):
 
 
 class EdgePressure(EdgeFix):
-    """Press on the whole edge of a region.
+    """Apply a pressure to the whole edge of a region.
 
     Parameters
     ----------
     p
-        Pressure: a number or a formula of x, y, z (the place of the edge before the first step),
-        time and published values.
+        Pressure: a number or a formula of x, y, z (initial position of the edge), time and
+        published values.
 
     Example
     -------
@@ -319,14 +318,13 @@ class EdgePressure(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
 
-    Points are boxes. Each of their faces to the outside of the region gets the pressure, inwards,
-    on its area before the first step. The forces keep their size and direction. A curved edge has
-    steps, but the forces along each axis are those of the projected area, as on the smooth edge.
-    With points=cut they are those of the smooth edge itself. Around an axis, forces belong to a
-    radian.
+    Points are boxes. The pressure acts inwards on each of their outer faces, on its initial area.
+    The forces have constant magnitude and direction. A curved edge is stair-stepped, but the force
+    along each axis is that on the projected area, as on the smooth edge. With points=cut the forces
+    are those on the smooth edge itself. In axisymmetry, forces are per radian.
 
-    For a part of an edge use a region of its own. A region such as
-    ``region(top, block, 0, 1, 0.9, 1)`` has other sides as well, where the group may have to end.
+    For a part of an edge, define a separate region. A region such as
+    ``region(top, block, 0, 1, 0.9, 1)`` also has other sides, which the group may have to exclude.
 
     See Also
     --------

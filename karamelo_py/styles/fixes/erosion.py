@@ -1,4 +1,4 @@
-"""Erosion: points that meet a condition are taken out of the run."""
+"""Erosion: points that meet a condition are deleted."""
 
 from typing import Annotated
 
@@ -14,15 +14,15 @@ from karamelo_py.scene.modify import Fix
 
 
 class Erosion(Fix):
-    """Take points out of the run that meet a condition: broken, swollen, or gone too far.
+    """Delete points that meet a condition: broken, swollen, or too far away.
 
     Parameters
     ----------
     condition
         A formula of columns of dump particle (damage, volume, x, ep, T, ...), names of groups and
-        solids, time and published values; points go where it is not 0.
+        solids, time and published values; points for which it is not 0 are deleted.
     every
-        Steps between two looks.
+        Steps between two checks.
 
     Example
     -------
@@ -32,7 +32,7 @@ class Erosion(Fix):
     Notes
     -----
     Publishes sums since the start: ID_points, ID_mass, and ID_energy, the kinetic, stored and
-    dissipated energy of the deleted points. The balance of energy counts this as work of the fix.
+    dissipated energy of the deleted points. The energy balance counts it as work of the fix.
 
     A column name means the column even if the script has a variable of that name. Points are
     deleted after each step whose number is a multiple of `every`. Log and dumps at this step omit
@@ -61,7 +61,7 @@ class Erosion(Fix):
             hub.warn(f"{', '.join(empty)} will be 0: points have no such field")
 
     def between_steps(self) -> bool:
-        """Take points away that meet the condition; whether there were any."""
+        """Delete the points that meet the condition; return whether there were any."""
         found = self.hub.fields.each(self, "meeting")
         ids = np.sort(np.concatenate([np.empty(0, np.int64), *found]))
         if not len(ids):
@@ -72,5 +72,5 @@ class Erosion(Fix):
         return True
 
     def meeting(self, points: PointTable) -> np.ndarray | None:
-        """Numbers of the points, of some, that meet the condition."""
+        """Return the numbers of the points in a table that meet the condition."""
         return points.numbers[self.condition.holds(points)] if points.count else None

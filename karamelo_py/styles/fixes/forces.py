@@ -1,4 +1,4 @@
-"""Fixes of forces on nodes and points, and of the stress of points at first."""
+"""Fixes for forces on nodes and points, and for the initial stress of points."""
 
 import re
 from typing import Annotated, Any
@@ -28,22 +28,22 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 ACCELERATION = Powers(1, 0, -2)
-TONNES = 1e-10, 1e-6  # densities in t/mm^3, from foam to beyond osmium: no others are so small
+TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium: unique to this unit system
 
 
 def accelerate(mass, v, v_star, force, value, before, dt, share):
-    """The force grows by mass times the value; so does the total."""
+    """Add mass times value to the force and to the total."""
     return v, v_star, force + mass * value, mass * value
 
 
 class BodyForce(Fix):
-    """Accelerate nodes: gravity, centrifugal force, a manufactured solution's source.
+    """Accelerate nodes: gravity, centrifugal force, manufactured sources.
 
     Parameters
     ----------
     acceleration
-        bx, by, bz, as many as the domain has dimensions: force per mass, numbers or formulas of
-        x0, y0, z0, time and published values. NULL leaves a component alone.
+        bx, by, bz, one per dimension of the domain: force per mass, numbers or formulas of x0, y0,
+        z0, time and published values. NULL leaves a component unchanged.
 
     Example
     -------
@@ -70,7 +70,7 @@ class BodyForce(Fix):
         self.formulas = per_direction(hub, "b", acceleration)
 
     def defined(self) -> None:
-        """Warn of a gravity in m/s^2 where the other numbers have other units."""
+        """Warn of a gravity in m/s^2 if other numbers use other units."""
         if not any(formula is not None and _is_gravity(formula) for formula in self.formulas):
             return
         hub = self.hub
@@ -90,25 +90,25 @@ class BodyForce(Fix):
 
 
 def _is_gravity(formula: Expression) -> bool:
-    """Tell if a formula is the acceleration of gravity in m/s^2, or has it as a number."""
+    """Return True if a formula is, or contains, the acceleration of gravity in m/s^2."""
     if formula.is_constant:
         return 9.7 < abs(formula.constant) < 9.9
     return re.search(r"(?<![\d.])9\.8\d*(?![\d.eE])", formula.text) is not None
 
 
 def share_out(mass, v, v_star, force, value, before, dt, share):
-    """Each member takes its share of the value."""
+    """Add the member's fraction of the value to its force."""
     return v, v_star, force + value * share, value * share
 
 
 class ForceNodes(Fix):
-    """Apply a total force, split equally among the nodes of the group that carry mass.
+    """Apply a total force, split equally among the nodes of the group with mass.
 
     Parameters
     ----------
     force
         fx, fy, fz: numbers or formulas of time and published values. NULL leaves a component
-        alone; in fewer dimensions the last ones may be left out, NULL or 0.
+        unchanged; in 1D and 2D, omit the last ones or set them to NULL or 0.
 
     Example
     -------
@@ -139,7 +139,7 @@ class PointForces(Fix):
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = True
-    conserves = True  # but for the work of the forces, which steps add up
+    conserves = True  # apart from the work of the forces, which is summed
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -155,11 +155,11 @@ class PointForces(Fix):
             )
 
     def forces(self, points: PointsView) -> np.ndarray:
-        """The forces (n, d) on the points."""
+        """Return the forces (n, d) on the points."""
         raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
-        """Give the points their forces, and publish the sum."""
+        """Apply the forces to the points, and publish the sum."""
         force = self.forces(points)
         points.force = points.force + force
         self.publish_components(points.total(force))
@@ -171,8 +171,8 @@ class ForceParticles(PointForces):
     Parameters
     ----------
     force
-        fx, fy, fz, as many as the domain has dimensions: numbers or formulas of x, y, z, x0, y0,
-        z0, time and published values. NULL leaves a component alone.
+        fx, fy, fz, one per dimension of the domain: numbers or formulas of x, y, z, x0, y0, z0,
+        time and published values. NULL leaves a component unchanged.
 
     Example
     -------
@@ -180,9 +180,9 @@ class ForceParticles(PointForces):
 
     Notes
     -----
-    A point of mass m gets m/M of the force at its position. M is the mass of the group. The load
-    goes with the points wherever they move, as that of fix force_nodes does not. In an axisymmetric
-    scene forces belong to a radian. Publishes the sum as ID_x, ID_y, ID_z.
+    A point of mass m gets m/M of the force at its position. M is the mass of the group. Unlike fix
+    force_nodes, the load moves with the points. In axisymmetry, forces are per radian. Publishes
+    the sum as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -207,9 +207,9 @@ class ForceParticles(PointForces):
 
 
 def brake(mass, v, v_star, force, value, before, dt, share):
-    """v* loses a share of what the force changed it by, against v; the total is the force of that.
+    """Remove a fraction of the change of v* by forces, against v; the total is the force of that.
 
-    Where the step turns the node around, or a wall has stopped it, there is nothing to brake.
+    No effect if the step reverses the node's motion, or a wall has stopped it.
     """
     against = 0.0
     if v * v_star > 0:
@@ -221,12 +221,12 @@ def brake(mass, v, v_star, force, value, before, dt, share):
 
 
 class LocalDamping(Fix):
-    """Bring a scene to rest: each node is braked by a share of the force that is out of balance.
+    """Damp each node by a fraction of its out-of-balance force, to bring a scene to rest.
 
     Parameters
     ----------
     alpha
-        The share, from 0 to 1; 0.8 is usual. A number or a formula of time: damping may end.
+        The fraction, from 0 to 1; 0.8 is usual. A number or a formula of time, so damping may end.
 
     Example
     -------
@@ -236,17 +236,17 @@ class LocalDamping(Fix):
     Notes
     -----
     The force f of a node becomes f - alpha |f| sign(v), component by component (Cundall 1987).
-    Where forces balance there is no damping. The state of rest is therefore that without damping,
-    for any stiffness, and steady motion is not braked. With 0.8 a scene comes to rest within some
+    Balanced forces cause no damping. The state of rest is therefore the same as without damping,
+    for any stiffness, and steady motion is not damped. With 0.8 a scene comes to rest within about
     ten periods of its slowest vibration.
 
-    It acts after all other fixes, wherever it stands in the script. Held nodes, and nodes with a
-    prescribed constant speed, are not braked, and their reactions are right. Publishes the sum of
-    the added forces as ID_x, ID_y, ID_z.
+    It acts after all other fixes, wherever it is in the script. Held nodes, and nodes with a
+    prescribed constant velocity, are not damped, and their reactions are correct. Publishes the sum
+    of the damping forces as ID_x, ID_y, ID_z.
 
     In method ulmpm/contacts it acts before solids push each other. Bodies in contact then stick as
-    with friction, between 1 - alpha and 1 + alpha of the load. Let alpha go to 0 there, as
-    0.8*max(1 - time/T, 0) does.
+    with friction, between 1 - alpha and 1 + alpha of the load. Reduce alpha to 0 there, as in
+    0.8*max(1 - time/T, 0).
 
     See Also
     --------
@@ -264,7 +264,7 @@ class LocalDamping(Fix):
         self.formulas = (Expression(alpha),) * hub.domain.dimension
 
     def defined(self) -> None:
-        """Warn where rest would not be that without damping."""
+        """Warn if the state of rest would differ from the one without damping."""
         alpha = self.formulas[0]
         if alpha.is_constant and alpha.constant > 0 and self.hub.update.method.fields_per_solid:
             self.hub.warn(
@@ -277,13 +277,13 @@ NAMES = ("11", "22", "33", "23", "13", "12")
 
 
 class InitialStress(Fix):
-    """Give points a Cauchy stress before the first step after this line, and never again.
+    """Set the Cauchy stress of points once, before the next step.
 
     Parameters
     ----------
     sxx, syy, szz, syz, sxz, sxy
         Components: numbers or formulas of x, y, z, x0, y0, z0; tension is positive. NULL leaves a
-        component alone. Shear components that the dimension does not have must be NULL or 0.
+        component unchanged. Shear components outside the dimension must be NULL or 0.
 
     Example
     -------
@@ -292,8 +292,8 @@ class InitialStress(Fix):
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
-    set. Compression is negative. A warning names tension that a material does not bear, such as
-    that of soil without cohesion.
+    set. Compression is negative. A warning is given for tension that a material cannot sustain,
+    such as in soil without cohesion.
     """
 
     published = ()
@@ -324,7 +324,7 @@ class InitialStress(Fix):
 
 
 def _is_borne(law: Any, mean: float) -> bool:
-    """Tell whether a law bears half of a mean stress in all directions."""
+    """Return True if a law sustains half of a mean stress in all directions."""
     kin = Space()
     stress = tuple(nothing(kin))
     state = with_stress(law, kin, initial_state(law, kin, 1.0), (*3 * (mean,), *stress[3:]))
@@ -333,7 +333,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
-    """Find the bodies that get a tension which they do not bear, in a tenth of their points."""
+    """Find the bodies with a tension that they cannot sustain, in 10 % of their points."""
     found = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():

@@ -1,4 +1,4 @@
-"""Formulas for each direction, and coefficients of friction, as fixes have them."""
+"""Formulas per direction, and coefficients of friction, for fixes."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -18,7 +18,7 @@ USUAL_FRICTION = 2.0
 def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = False) -> tuple:
     """Check that there is one formula (or NULL, unless `all_given`) per direction of the domain.
 
-    Further components are allowed when they are NULL or zero, as published inputs write them.
+    Further components may be NULL or zero, as in published inputs.
     """
     d = require_domain(hub).dimension
     wanted = ", ".join(name + axis for axis in AXES[:d])
@@ -46,9 +46,9 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
-    """Values (n, d) of a formula for each direction, 0 where there is none.
+    """Return the values (n, d) of a formula per direction, 0 if it is missing.
 
-    `first()` gives the reference positions, where a formula asks for these.
+    `first()` gives the reference positions for formulas that need them.
     """
     asked = any(formula is not None and formula.names & FIRST for formula in formulas)
     x0 = first() if asked else x
@@ -60,13 +60,13 @@ def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.n
 
 
 def unlike(one: Any, other: Any) -> list[int]:
-    """The directions in which two fixes have formulas that are not alike."""
+    """Return the directions in which two fixes have different formulas."""
     pairs = enumerate(zip(one.formulas, other.formulas, strict=False))
     return [k for k, (a, b) in pairs if None not in (a, b) and not a.is_like(b)]
 
 
 def judge_friction(hub: Hub, mu: float) -> None:
-    """Tell of a coefficient that no pair of materials has."""
+    """Warn of a coefficient that no pair of materials has."""
     if mu > USUAL_FRICTION:
         hub.warn(
             f"the coefficient of friction is {mu:g}: measured ones stay below 1.5",

@@ -1,4 +1,4 @@
-"""Fixes of heat."""
+"""Fixes for heat."""
 
 from math import inf
 from typing import Any
@@ -16,7 +16,7 @@ from karamelo_py.styles.fixes.velocity_nodes import prescribe_mapped
 
 
 class HeatFix(Fix):
-    """A fix with meaning only where heat flows."""
+    """A fix that requires heat flow."""
 
     published = ("s",)
 
@@ -29,7 +29,7 @@ class HeatFix(Fix):
         self.formulas = formulas
 
     def _compare(self, T: Expression) -> None:
-        """Tell of a temperature in degrees Celsius among others in kelvin."""
+        """Warn of a temperature in degrees Celsius among others in kelvin."""
         begins = (solid.T0 for solid in self.hub.solids.values() if solid.T0 is not None)
         warmest = max(begins, default=-inf)
         if T.is_constant and T.constant < COLD and warmest - T.constant > WARM:
@@ -39,7 +39,7 @@ class HeatFix(Fix):
             )
 
     def _look_inside(self) -> None:
-        """Tell of groups that are no layer along a surface: points inside have no face outside."""
+        """Warn of groups that are more than a surface layer: inner points have no outer face."""
         for solid in self.hub.solids.values():
             if not 0 < solid.count < MANY:
                 continue
@@ -62,11 +62,11 @@ def check_coefficient(h: Expression) -> None:
         )
 
 
-MANY = 1_000_000  # points of a solid, which are not looked at
+MANY = 1_000_000  # points of a solid, above which the check is skipped
 
 
 def hold_node(capacity, T, T_star, flow, value, before, dt, share):
-    """T* is the value; the total is the heat per time that takes."""
+    """Set T* to the value; the total is the heat per time needed."""
     return T, value, flow, capacity * (value - T_star) / dt
 
 
@@ -85,15 +85,15 @@ class TemperatureNodes(HeatFix):
 
     Notes
     -----
-    Publishes the heat per time that the nodes need for it as ID_s. Where several such fixes hold a
-    node, the last of them decides and has the heat of that node.
+    Publishes the heat per time that this needs as ID_s. If several such fixes hold a node, the last
+    of them decides and gets the heat of that node.
 
     See Also
     --------
     temperature_particles, heat_flux_particles, convection_particles, method
     """
 
-    # The temperature whose gradient makes heat flow is the value.
+    # The temperature gradient for the heat flow uses the value.
     post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
     post_update_grid_heat = node_hook(hold_node, holds=True)
 
@@ -102,18 +102,18 @@ class TemperatureNodes(HeatFix):
         self._compare(T)
 
     def defined(self) -> None:
-        """Warn of walls past the domain."""
+        """Warn of walls outside the domain."""
         if self.hub.domain.h is not None:
             self.group.warn_past_domain()
 
 
 def hold_point(capacity, T, face, supply, value, other, dt):
-    """The point has the value, whatever flows to it."""
+    """Set the temperature of the point to the value, whatever the heat flow."""
     return 0.0, supply, value
 
 
 class TemperatureParticles(HeatFix):
-    """Prescribe the temperature of points: they heat what is around them.
+    """Prescribe the temperature of points, which heat their surroundings.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class TemperatureParticles(HeatFix):
 
 
 def heat(capacity, T, face, supply, value, other, dt):
-    """The flux goes through one face of the point."""
+    """Apply the flux through one face of the point."""
     return 1.0, supply + face * value, T
 
 
@@ -150,7 +150,7 @@ class FacesOfPoints(HeatFix):
     """A fix that acts through one face of each point."""
 
     def defined(self) -> None:
-        """Tell the area that the group covers, which no region gives."""
+        """Print the area that the group covers."""
         hub, d = self.hub, self.hub.domain.dimension
         if hub.rehearsing or d == 1 or not len(self.group):
             return
@@ -170,14 +170,14 @@ class FacesOfPoints(HeatFix):
 
 
 class HeatFluxParticles(FacesOfPoints):
-    """Let heat flow into points at the surface of a body: lasers, flames, friction.
+    """Apply a heat flux to points at the surface of a body: lasers, flames, friction.
 
     Parameters
     ----------
     group
-        Group of points: one layer of them along the surface.
+        Group of points: a single layer along the surface.
     q
-        Heat per area and time, negative where it leaves the body. A number or a formula of x, y, z,
+        Heat per area and time, negative if it leaves the body. A number or a formula of x, y, z,
         x0, y0, z0, time and published values.
 
     Example
@@ -186,13 +186,12 @@ class HeatFluxParticles(FacesOfPoints):
 
     Notes
     -----
-    A point has one face to the outside, the side of a cube of its volume. In one dimension that is
-    the whole section. A point at an edge of the body has two faces outside and needs two fixes. In
-    axisymmetric scenes the face is at the radius of the point, somewhat inside the surface. The
-    program prints the area that the group covers: on curved surfaces it depends on the layer that
-    the group takes (0.66 to 1.44 of the surface). edge_heat_flux takes the area of the surface.
-    Publishes the heat per time (in two dimensions per thickness, per radian where axisymmetric) as
-    ID_s.
+    A point has one outer face, the side of a cube of its volume; in 1D, the whole section. A point
+    at an edge of the body has two outer faces and needs two fixes. In axisymmetry the face is at
+    the radius of the point, slightly inside the surface. The program prints the area that the group
+    covers: on curved surfaces it depends on the layer in the group (0.66 to 1.44 of the surface).
+    edge_heat_flux uses the area of the surface. Publishes the heat per time (in 2D per thickness,
+    in axisymmetry per radian) as ID_s.
 
     See Also
     --------
@@ -209,7 +208,7 @@ class HeatFluxParticles(FacesOfPoints):
 def exchange(capacity, T, face, supply, value, other, dt):
     """Newton's law of cooling through one face of the point, at its temperature after the step.
 
-    With the temperature before it, a large coefficient would cool the point below the fluid.
+    With the temperature before the step, a large coefficient would cool the point below the fluid.
     """
     if not capacity > 0:
         return 1.0, supply, T
@@ -218,17 +217,17 @@ def exchange(capacity, T, face, supply, value, other, dt):
 
 
 class ConvectionParticles(FacesOfPoints):
-    """Cool or heat points at the surface of a body by a fluid around it: q = h (T_inf - T).
+    """Apply convection to points at the surface of a body: q = h (T_inf - T).
 
     Parameters
     ----------
     group
-        Group of points: one layer of them along the surface.
+        Group of points: a single layer along the surface.
     h
         Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z,
         x0, y0, z0, time and published values.
     T_inf
-        Temperature of the fluid; a number or a formula likewise.
+        Temperature of the surrounding fluid; a number or a formula likewise.
 
     Example
     -------
@@ -236,8 +235,8 @@ class ConvectionParticles(FacesOfPoints):
 
     Notes
     -----
-    The faces of points are those of heat_flux_particles. Publishes the heat per time that all
-    points get as ID_s.
+    The faces of points are defined as in heat_flux_particles. Publishes the heat per time into all
+    points as ID_s.
 
     See Also
     --------
@@ -245,7 +244,7 @@ class ConvectionParticles(FacesOfPoints):
     """
 
     on_edge = "edge_convection"
-    acts_last = True  # what others supply bounds the temperatures that the watch allows
+    acts_last = True  # the supply of the other fixes bounds the temperatures for the watch
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):

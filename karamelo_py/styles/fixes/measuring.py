@@ -1,4 +1,4 @@
-"""Fixes that change nothing and measure."""
+"""Fixes that only measure."""
 
 import numpy as np
 
@@ -16,18 +16,18 @@ def force_of_nodes(mass, v, v_star, force, value, before, dt, share):
 
 
 def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
-    """The total is the momentum over the time that forces act for."""
+    """The total is the momentum divided by the time that forces act."""
     return v, x, mass * v / kick
 
 
-# What is measured of nodes or points, and when in a step.
+# Quantity that is measured at nodes or points, and when in a step.
 HOOKS = {
     "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
     "force": ("post_update_grid_state", node_hook(force_of_nodes)),
     "momentum_before": ("initial_integrate", point_hook(momentum_rate)),
     "momentum_after": ("final_integrate", point_hook(momentum_rate)),
 }
-# Before all other fixes, whenever they are defined.
+# Before all other fixes, whatever the order in the script.
 COME_FIRST = ("internal_force", "momentum_before")
 
 
@@ -57,7 +57,7 @@ class CheckSolution(Fix):
     Parameters
     ----------
     displacement
-        ux, uy, uz, as many as the domain has dimensions: formulas of x0, y0, z0 and time.
+        ux, uy, uz, one per dimension of the domain: formulas of x0, y0, z0 and time.
 
     Example
     -------
@@ -65,8 +65,8 @@ class CheckSolution(Fix):
 
     Notes
     -----
-    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the error now; ID_x = sum dt sum V0 |u -
-    u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so far; ID_z = sqrt(ID_x /
+    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the present error; ID_x = sum dt sum V0
+    |u - u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so far; ID_z = sqrt(ID_x /
     ID_y), the relative error of the history.
     """
 
@@ -92,7 +92,7 @@ class CheckSolution(Fix):
         self.publish_all(error, total, np.sqrt(error / total) if total > 0 else 0.0)
 
     def terms(self, points: PointTable) -> np.ndarray:
-        """Squares of the error and of the displacement at points times their volume, and this."""
+        """Squared error and displacement of points times their volume, and the volume."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))
         for k, formula in enumerate(self.formulas):

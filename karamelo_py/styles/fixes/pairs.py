@@ -1,4 +1,4 @@
-"""Fixes between two solids."""
+"""Fixes for contact between two solids."""
 
 from functools import partial
 from math import inf
@@ -23,11 +23,11 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.grip import Grip, grip_for
 
-SENT = 350  # bytes that the process that looks for pairs needs of each point
+SENT = 350  # bytes per point that are sent to the process that searches for pairs
 
 
 def check_pair(solid1: Solid, solid2: Solid) -> None:
-    """Refuse a pair that is one solid twice."""
+    """Refuse a pair of a solid with itself."""
     if solid1 is solid2:
         raise ScriptError(
             f"'{solid2.id}' is named twice",
@@ -37,19 +37,19 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 
 
 class PairContact(Fix):
-    """Base of the fixes by which the points of two solids push each other.
+    """Base of fixes for contact between the points of two solids.
 
-    Of many processes the first looks for pairs among the points of all that may touch. The `law` is
-    the tag of :mod:`karamelo_py.points.bodies` that gives the force between two points.
+    With several processes, the first one searches for pairs among all points that may touch. The
+    `law` is the tag of :mod:`karamelo_py.points.bodies` for the force between two points.
     """
 
     law: NamedTuple
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = True
-    conserves = True  # but for the work of the forces, which steps add up
+    conserves = True  # apart from the work of the forces, which is summed
     remembers = ("has_touched",)
-    has_touched = False  # else what grips hold is that of a fix before
+    has_touched = False  # until then, grips belong to an earlier fix
     grip: type[Grip] | None = None
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
@@ -73,7 +73,7 @@ class PairContact(Fix):
         self._reach = max(solid.h for solid in self.solids)
 
     def initial_integrate(self, points: PointsView) -> None:
-        """Find the pairs that touch and give the points their forces."""
+        """Find the touching pairs and apply their forces."""
         simulation, total = self.hub.simulation, np.zeros(3)
         kin, blocks = simulation.kin, simulation.setup.blocks
         rows = self._near(simulation)
@@ -99,13 +99,13 @@ class PairContact(Fix):
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
-        """Count the points that may touch others now: one process looks at all of them."""
+        """Count the points that may touch others now: one process searches all of them."""
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
-        """Rows of the points of each block that may touch others; None where no solids do.
+        """Rows of the points of each block that may touch others; None if no solids do.
 
-        Each solid is in a box, and reaches beyond it as far as two points touch.
+        Each solid is a box, extended by the contact distance of two points.
         """
         s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
@@ -162,14 +162,14 @@ gain(
 
 
 class ContactMinimizePenetration(PairContact):
-    """Let two solids touch point by point, as stiffly as the step allows, with friction.
+    """Point-to-point contact of two solids, as stiff as the step allows, with friction.
 
     Parameters
     ----------
     solid1, solid2
         IDs of the two solids.
     mu
-        Coefficient of friction (Coulomb); 0 when left out.
+        Coefficient of friction (Coulomb); default 0.
 
     Example
     -------
@@ -179,24 +179,24 @@ class ContactMinimizePenetration(PairContact):
     -----
     Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite.
 
-    Points are balls. Their radius R is half the side of a cube of their present volume (in the
-    plane a square). Their penetration is p = R1 + R2 - |x2 - x1|. Two points with p > 0 get the
-    force m1 m2 / (m1 + m2) p / dt^2. It separates two free points within one step. Friction is at
-    most mu times this force, against the slip (de Vaucorbeil & Nguyen 2021, "Modelling contacts
-    with a total Lagrangian material point method"). It stops and undoes the slip: what it can hold
-    rests, and gives way by mu p before it slides.
+    Points are spheres (in 2D disks). Their radius R is half the side of a cube (in 2D a square) of
+    their present volume. Their penetration is p = R1 + R2 - |x2 - x1|. Two points with p > 0 get
+    the force m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction
+    is at most mu times this force, against the slip (de Vaucorbeil & Nguyen 2021, "Modelling
+    contacts with a total Lagrangian material point method"). It stops and reverses the slip: a load
+    that friction can hold stays at rest, and yields by mu p before it slides.
 
-    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
-    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
+    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
 
-    A surface of balls is rough and brakes sliding. The force on a block (two points per cell and
-    direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces that
-    lean to the grid hook each other. On a slope of 20 degrees with mu = 0 a block sticks, and with
+    A surface of spheres is rough and resists sliding. The force on a block (two points per cell and
+    direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces
+    inclined to the grid lock. On a slope of 20 degrees with mu = 0 a block sticks, and with
     points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
-    Method ulmpm/contacts gives the right friction.
+    For correct friction use method ulmpm/contacts.
 
-    Pairs are found by cells, so the cost grows with the number of points. With many processes the
-    first one searches, among the points of all that may touch.
+    Pairs are found with cells, so the cost is proportional to the number of points. With several
+    processes, the first one searches among all points that may touch.
 
     See Also
     --------
@@ -243,7 +243,7 @@ def plane_modulus(solid: Solid, argument: str) -> float:
 
 
 class ContactHertz(PairContact):
-    """Let two solids touch point by point, with the force of Hertz, without friction.
+    """Point-to-point contact of two solids with Hertz forces, without friction.
 
     Parameters
     ----------
@@ -256,14 +256,14 @@ class ContactHertz(PairContact):
 
     Notes
     -----
-    Points are balls with the radius R of half the side of a cube of their present volume (in the
-    plane a square). Two points that overlap by p repel each other with 4/3 E* sqrt(R p^3) in space
-    and pi/4 E* sqrt(R p^3) otherwise. Here R = R1 R2 / (R1 + R2) and 1/E* = (1 - nu1^2)/E1 + (1 -
-    nu2^2)/E2. The force is that of single points. Bodies overlap before it is large, and a fast
-    body may pass through.
+    Points are spheres (in 2D disks) with a radius R of half the side of a cube (in 2D a square) of
+    their present volume. Two points that overlap by p repel each other with 4/3 E* sqrt(R p^3) in
+    3D and pi/4 E* sqrt(R p^3) otherwise. Here R = R1 R2 / (R1 + R2) and 1/E* = (1 - nu1^2)/E1 + (1
+    - nu2^2)/E2. The force is for single points, so bodies overlap noticeably before it is large,
+    and a fast body may pass through.
 
     Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite. With
-    many processes the first one searches the pairs of all points that may touch.
+    several processes, the first one searches among all points that may touch.
 
     See Also
     --------
@@ -282,15 +282,15 @@ class ContactHertz(PairContact):
 
 
 class ContactFriction(Fix):
-    """Let two solids rub where they touch on the grid (method ulmpm/contacts).
+    """Set the friction between two solids in contact on the grid (method ulmpm/contacts).
 
     Parameters
     ----------
     solid1, solid2
-        IDs of the two solids. Other pairs stay frictionless; a pair has one fix.
+        IDs of the two solids. Other pairs remain frictionless; one fix per pair.
     mu
-        Coefficient of friction (Coulomb): the force along the surface is at most mu times the
-        force across it. The words ``no-slip`` let the solids stick while they are pressed together.
+        Coefficient of friction (Coulomb): the tangential force is at most mu times the normal
+        force. The words ``no-slip`` make the solids stick while they are pressed together.
 
     Example
     -------
@@ -300,9 +300,9 @@ class ContactFriction(Fix):
     -----
     Publishes the contact force of solid2 on solid1 as ID_x, ID_y, ID_z.
 
-    The work of friction heats solids that have a temperature: half each, or all the one that has.
-    In methods with ``thermo-mechanical`` it is shared by the effusivities sqrt(kappa rho cp), as
-    between half-spaces.
+    Frictional work heats solids with a temperature: half each, or all of it if only one has a
+    temperature. In methods with ``thermo-mechanical`` it is divided by the effusivities
+    sqrt(kappa rho cp), as between half-spaces.
 
     See Also
     --------

@@ -1,4 +1,4 @@
-"""fix python: a function in Python acts on points or nodes."""
+"""fix python: call a Python function on points or nodes."""
 
 import inspect
 import pickle
@@ -21,7 +21,7 @@ from karamelo_py.scene.plugins import misfit
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
-# What a function may keep something in.
+# Types in which a function may store values.
 DATA = (
     *(int, float, complex, str, bytes, bytearray, list, dict, set, tuple),
     *(np.ndarray, np.generic, np.random.Generator, np.random.RandomState),
@@ -29,13 +29,13 @@ DATA = (
 
 
 class PythonFunction:
-    """For signatures: a function of a module, or one that a program has given the scene."""
+    """For signatures: a function of a module, or one passed to the scene from Python."""
 
     script_kind = "the name of a function: module.function"
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """Find the function that `argument` names; modules beside the script come first."""
+        """Find the function that `argument` names; modules next to the script come first."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
@@ -52,7 +52,7 @@ class PythonFunction:
         folder = hub.interpreter.folder.absolute()
         sys.path.insert(0, str(folder))
         try:
-            # Another script of this process may have had a module of this name beside it.
+            # Another script of this process may have had a different module of this name.
             beside = folder / f"{module}.py"
             known = getattr(sys.modules.get(module), "__file__", None)
             if beside.is_file() and known != str(beside):
@@ -79,38 +79,38 @@ class PythonFunction:
 
 
 class Python(Fix):
-    """Let a function in Python act on points or nodes in every step.
+    """Call a Python function on points or nodes in every step.
 
     Parameters
     ----------
     group
         Group of points or of nodes, or ``all``.
     function
-        ``module.function``; the module lies beside the script or is installed.
+        ``module.function``; the module is next to the script or installed.
     moment
-        When in a step it is called: without a word ``initial_integrate`` for points, where
-        ``points.force`` takes forces, and ``post_update_grid_state`` for nodes, where
-        ``nodes.velocity_update`` takes velocities.
+        When it is called in a step. The default is ``initial_integrate`` for points, where
+        ``points.force`` accepts forces, and ``post_update_grid_state`` for nodes, where
+        ``nodes.velocity_update`` accepts velocities.
 
     Notes
     -----
-    The function gets a view of the group: dt, time, and arrays with a row for each member. Points
-    have position, velocity, mass, force and more; nodes have position, velocity, velocity_update,
-    mass, force and more. The program takes over what the function changes in them. It publishes
-    what the function returns: a number as ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins
-    says more of these views. A step costs some ten microseconds more, and the time of the function.
+    The function gets a view of the group: dt, time, and arrays with a row per member. Points have
+    position, velocity, mass, force and more; nodes have position, velocity, velocity_update, mass,
+    force and more. Changes to these arrays take effect. The return value is published: a number as
+    ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins describes the views in full. A step
+    costs some ten microseconds more, plus the time of the function.
 
-    With many processes all points are gathered in each step. Write ``pull.point_by_point = True``
-    after a function that looks at each point or node on its own and moves no points. Each process
-    then calls it for its own points, in any order. ``points.total(terms)`` sums terms (n,) or
-    (n, k) over all.
+    With several processes all points are gathered in each step. Write ``pull.point_by_point =
+    True`` after a function that treats each point or node separately and moves no points. Each
+    process then calls it for its own points, in any order. ``points.total(terms)`` sums terms (n,)
+    or (n, k) over all points.
 
-    Restart files hold what the function keeps from step to step, where it is named.
-    ``remembers = ("taken", "left")`` names variables in the module, or attributes in the class of
-    an object that is called. These can be kept: numbers, texts, arrays, generators of NumPy, and
-    lists, tuples, sets and dictionaries of these. The first restart file warns of other such data
-    that has changed. The program does not see defaults of arguments, other objects, other modules,
-    and ``np.random`` itself.
+    Restart files hold values that the function stores between steps, if they are named.
+    ``remembers = ("taken", "left")`` names variables in the module, or attributes in the class of a
+    callable object. Possible values: numbers, texts, arrays, NumPy generators, and lists, tuples,
+    sets and dictionaries of these. The first restart file warns of other such data that has
+    changed. Defaults of arguments, other objects, other modules, and ``np.random`` itself are not
+    checked.
 
     Example
     -------
@@ -161,7 +161,7 @@ class Python(Fix):
 
     @property
     def state(self) -> dict[str, Any]:
-        """Values that the function keeps and names."""
+        """Values that the function stores and names."""
         return {name: getattr(self.keeper.owner, name) for name in self.keeper.names}
 
     @state.setter
@@ -170,7 +170,7 @@ class Python(Fix):
             setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
-        """Warn once of other values that the function has changed: files do not hold them."""
+        """Warn once of other values that the function has changed: files lack them."""
         keeper = self.keeper
         forgotten = [] if self.told else keeper.forgotten()
         if forgotten:
@@ -222,9 +222,9 @@ class Python(Fix):
 
 
 class Keeper:
-    """Owner of the values that a function needs from step to step: its object, or its module.
+    """Owner of the values that a function needs between steps: its object or its module.
 
-    `names` are those that ``remembers`` names there; `place` says where this word belongs.
+    `names` are the names in ``remembers``; `place` is where this word belongs.
     """
 
     def __init__(self, function: Callable):
@@ -247,16 +247,16 @@ class Keeper:
         self.seen = self._look()
 
     def forgotten(self) -> list[str]:
-        """Names of what has changed since the last look and is not remembered."""
+        """Return the names that have changed since the last call and are not remembered."""
         before, self.seen = self.seen, self._look()
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 
     def _look(self) -> dict[str, int]:
-        """A sum over the bits of all data that the function may change, by name."""
+        """Return a checksum of all data that the function may change, by name."""
         data = dict(self.data)
         if inspect.isfunction(self.function):
             seen = inspect.getclosurevars(self.function)
-            # A notebook has much else.
+            # A notebook has many other names.
             module = sys.modules.get(self.function.__module__)
             notebook = self.function.__module__ == "__main__" or module is None
             data = (dict(seen.globals) if notebook else data) | dict(seen.nonlocals)
@@ -270,7 +270,7 @@ class Keeper:
 def _sum_of(value: Any) -> int:
     try:
         return zlib.crc32(pickle.dumps(value))
-    except Exception:  # what stands in a list may refuse in any way
+    except Exception:  # list items may raise anything
         return 0
 
 

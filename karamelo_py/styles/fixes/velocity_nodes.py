@@ -1,4 +1,4 @@
-"""Fixes that give nodes velocities, and the force that holds them (compute reaction)."""
+"""Fixes that set node velocities, and compute reaction for the force that holds nodes."""
 
 import re
 from typing import Annotated, Any
@@ -15,7 +15,7 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_directio
 
 
 def prescribe(mass, v, v_star, force, value, before, dt, share):
-    """v* is the value now, v the value one step earlier, as at a plane of symmetry.
+    """Set v* to the present value, and v to the value one step earlier, as at a symmetry plane.
 
     The total is the reaction.
     """
@@ -23,7 +23,7 @@ def prescribe(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_motion(mass, v, v_star, force, value, before, dt, share):
-    """v* is the value now, and v what it was: points that keep their own velocity learn the value.
+    """Set v* to the present value, and leave v, so that FLIP points acquire the value.
 
     The total is the reaction.
     """
@@ -31,38 +31,38 @@ def prescribe_motion(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_mapped(mass, v, v_star, force, value, before, dt, share):
-    """The re-mapped velocity is the value now."""
+    """Set the re-mapped velocity to the present value."""
     return value, value, force, 0.0
 
 
 def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
-    """v* is not above the value; the total is the reaction, which pushes backwards."""
+    """Limit v* to at most the value; the total is the reaction, which pushes backwards."""
     allowed = min(v_star, value)
     return v, allowed, force, mass * (allowed - v_star) / dt
 
 
 def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
-    """Nor is the re-mapped velocity, which does not leave the bound where that has held v*.
+    """Limit the re-mapped velocity likewise, and keep it on the bound if v* was limited.
 
-    Else stress would do work on nothing: a rebound would gain half of the energy.
+    Otherwise stress would do spurious work: a rebound would gain half of the energy.
     """
     allowed = value if v_star == value else min(v, value)
     return allowed, allowed, force, 0.0
 
 
 def prescribe_at_least(mass, v, v_star, force, value, before, dt, share):
-    """v* is not below the value; the total is the reaction, which pushes forwards."""
+    """Limit v* to at least the value; the total is the reaction, which pushes forwards."""
     allowed = max(v_star, value)
     return v, allowed, force, mass * (allowed - v_star) / dt
 
 
 def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
-    """Nor is the re-mapped velocity (see `prescribe_mapped_at_most`)."""
+    """Limit the re-mapped velocity likewise (see `prescribe_mapped_at_most`)."""
     allowed = value if v_star == value else max(v, value)
     return allowed, allowed, force, 0.0
 
 
-# By the bound: what is done after the momentum update, and with velocities mapped again.
+# By bound: functions after the momentum update, and after velocities are mapped again.
 HOOKS = {
     bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
     for bound, update, mapped in (
@@ -75,7 +75,7 @@ HOOKS = {
 
 
 class Velocity(Expression):
-    """For signatures: a number or a formula, behind the word leq or geq where it is a `bound`."""
+    """For signatures: a number or a formula, after the word leq or geq if it is a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""
@@ -96,13 +96,14 @@ class VelocityNodes(Fix):
     Parameters
     ----------
     velocity
-        vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0, time
-        and published values. NULL leaves a component free. With ``leq`` or ``geq`` in front of it
-        the velocity is an upper or a lower bound: nodes that keep within it are free.
+        vx, vy, vz, one per dimension of the domain: numbers or formulas of x0, y0, z0, time and
+        published values. NULL leaves a component free. With ``leq`` or ``geq`` before it, the
+        velocity is an upper or lower bound: nodes within it are free.
     mu
         Coefficient of friction (Coulomb): a number or a formula. The wall is at rest in the
-        directions that are NULL. Nodes that it holds or bounds rub along it, with a force of at
-        most mu times the force across it. Nodes that are held, not bounded, rub under tension too.
+        directions that are NULL. On nodes that it holds or bounds, the tangential force is at most
+        mu times the normal force. With `velocity` (not ``geq`` or ``leq``), friction also acts
+        under tension.
 
     Example
     -------
@@ -114,15 +115,15 @@ class VelocityNodes(Fix):
 
     Notes
     -----
-    Publishes ID_x, ID_y, ID_z: the force that holds the nodes, with friction. The work of friction
-    heats points that have a temperature. The wall takes no heat.
+    Publishes ID_x, ID_y, ID_z: the force that holds the nodes, with friction. Frictional work heats
+    points with a temperature. The wall takes no heat.
 
     Several such fixes may hold a node in one direction. The last one decides: it has the whole
-    reaction of the node, and only it rubs. A bound that a node keeps within exerts no force.
+    reaction of the node, and only its friction acts. A bound that is not reached exerts no force.
 
-    A plane of such nodes inside the grid is a wall, as the ends of the grid are. Splines are
-    modified in cells beside faces whose nodes are all held or bounded. A group should reach as far
-    as the last cell in which a body has points.
+    A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
+    in cells next to faces whose nodes are all held or bounded. A group should extend to the last
+    cell in which a body has points.
 
     In ulmpm/contacts, if the fix gives all components and all corners of a solid's cells are in the
     group, all nodes of the solid are held.
@@ -155,14 +156,14 @@ class VelocityNodes(Fix):
                 expected="NULL for the directions along the wall, or no mu",
             )
         self.bound = self._one_bound()
-        # A wall that moves in all of its directions drags matter along; one at rest, or one that
+        # A wall that moves in all of its directions drags material along; one at rest, or one that
         # leaves a direction free, is a clamp, a roller or a plane of symmetry.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
         hooks = HOOKS["moves" if drags else self.bound]
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
-        # Contact may move nodes that are held only as far as they come.
+        # Contact may move held nodes only as far as they give way.
         self.prescribes_velocity = not self.bound
 
     @property
@@ -176,7 +177,7 @@ class VelocityNodes(Fix):
         return self.hub.update.method.held_with(self.hub, self.group.nodes)
 
     def _one_bound(self) -> str:
-        """The bound that all components have: a fix has one function for all of them."""
+        """Return the bound of all components: a fix has one function for all of them."""
         bounds = dict.fromkeys(v.bound for v in self.formulas if v is not None)
         if len(bounds) > 1:
             lines = []
@@ -191,7 +192,7 @@ class VelocityNodes(Fix):
         return next(iter(bounds), "")
 
     def defined(self) -> None:
-        """Warn of walls past the domain, and where another fix gives nodes another velocity."""
+        """Warn of walls outside the domain, and of nodes with two different velocities."""
         if self.hub.domain.h is None:
             return
         self.group.warn_past_domain()
@@ -213,13 +214,13 @@ class VelocityNodes(Fix):
 
 
 class InitialVelocityNodes(Fix):
-    """Give nodes a velocity in the first step after this line, and never again.
+    """Set the velocity of nodes once, in the next step.
 
     Parameters
     ----------
     velocity
-        vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x0, y0, z0.
-        NULL leaves a component alone.
+        vx, vy, vz, one per dimension of the domain: numbers or formulas of x0, y0, z0. NULL leaves
+        a component unchanged.
 
     Example
     -------
@@ -268,7 +269,7 @@ class Reaction(Compute):
 
     Notes
     -----
-    The sum of the reactions of the fixes velocity_nodes in the group. Where two fixes hold the same
+    The sum of the reactions of the fixes velocity_nodes in the group. If two fixes hold the same
     nodes, it is the force of both. Before the first step it is 0.
 
     See Also

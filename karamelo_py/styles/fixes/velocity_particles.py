@@ -1,4 +1,4 @@
-"""Fixes that give points velocities, and which of several decides: that is told beforehand."""
+"""Fixes that set point velocities, with a warning before the run if several conflict."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -16,22 +16,22 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
 
 SAMPLE = 1000  # points at which formulas are compared, about
-ALIKE = 1e-6  # of a velocity, or of the speed of waves: less is no other velocity
+ALIKE = 1e-6  # of a velocity, or of the wave speed: smaller differences are ignored
 HELD = " how they move, that one how they deform"
 
 
 def start(mass, v, x_old, x, value, before, dt, kick):
-    """The step starts from the value one step earlier."""
+    """Start the step from the value one step earlier."""
     return before, x, 0.0
 
 
 def carry(mass, v, x_old, x, value, before, dt, kick):
-    """The point moves with the value; the total is the force that makes it do so."""
+    """Move the point with the value; the total is the force needed."""
     return value, x_old + dt * value, mass * (value - v) / kick
 
 
 class VelocityOfPoints(Fix):
-    """Base of fixes that give points a velocity by a formula for each component."""
+    """Base of fixes that set a point velocity by a formula per component."""
 
     syntax = "group, vx[, vy[, vz]]"
 
@@ -41,13 +41,13 @@ class VelocityOfPoints(Fix):
 
 
 class VelocityParticles(VelocityOfPoints):
-    """Prescribe the velocity of points: they move as told, and push what they meet on the grid.
+    """Prescribe the velocity of points, which push other bodies on the grid.
 
     Parameters
     ----------
     velocity
-        vx, vy, vz, as many as the domain has dimensions: numbers or formulas of x, y, z, x0, y0,
-        z0, time and published values. NULL leaves a component free.
+        vx, vy, vz, one per dimension of the domain: numbers or formulas of x, y, z, x0, y0, z0,
+        time and published values. NULL leaves a component free.
 
     Example
     -------
@@ -59,8 +59,8 @@ class VelocityParticles(VelocityOfPoints):
     point in one direction, the last one decides. It also overrides initial velocities and held
     nodes. A run warns of this before its first step.
 
-    Take two cells of points or more: the rest of a solid can slip past a grip of one cell. So it
-    did in ulmpm where a slab was squeezed by a fifth (linear, quadratic-spline, cubic-spline).
+    Use two cells of points or more: the rest of a solid can slip past a grip of one cell. This
+    happened in ulmpm when a slab was squeezed by 20 % (linear, quadratic-spline, cubic-spline).
 
     See Also
     --------
@@ -75,13 +75,13 @@ class VelocityParticles(VelocityOfPoints):
 
 
 class InitialVelocityParticles(VelocityOfPoints):
-    """Give points a velocity before the first step after this line, and never again.
+    """Set the velocity of points once, before the next step.
 
     Parameters
     ----------
     velocity
-        vx, vy, vz: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a component alone; in
-        fewer dimensions the last ones may be left out, NULL or 0.
+        vx, vy, vz: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a component unchanged;
+        in 1D and 2D, omit the last ones or set them to NULL or 0.
 
     Example
     -------
@@ -90,8 +90,8 @@ class InitialVelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    With transfers that keep a gradient or moment of velocity (APIC, TPIC and others), points also
-    get that of the formulas. The first step then keeps an affine motion.
+    With transfers that store a velocity gradient or affine velocity (APIC, TPIC and others), points
+    also get the gradient of the formulas. The first step then preserves an affine motion.
 
     See Also
     --------
@@ -119,7 +119,7 @@ def gradient(
 ) -> np.ndarray:
     """Derivatives (n, d) of a formula by x (`moves`) or x0, by central differences over `step`.
 
-    Where a point is still at its reference position, x and x0 are the same coordinate.
+    If a point is still at its reference position, x and x0 are the same coordinate.
     """
     out = np.zeros_like(x, float)
     if formula.is_constant:
@@ -138,7 +138,7 @@ def gradient(
 
 
 def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
-    """Find the fixes that give way to this one, with what to say of them."""
+    """Find the fixes that this one overrides, with the data for the warning."""
     fixes = list(simulation.hub.fixes.values())
     first = [one for one in simulation.beginning if isinstance(one, VelocityOfPoints)]
     if not (fix.leads_points or fix in first):
@@ -148,7 +148,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and len(shared):
             yield _said(other, axes, shared)
-    # What begins with one velocity for all and has another for some is meant so.
+    # A common velocity, then another for some points, is intended.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and 0 < len(shared) == len(simulation.points.members(other.group)):
@@ -158,13 +158,13 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     for other in fixes if fix.leads_points else ():
         axes = unlike(other, fix) if other.prescribes_velocity else []
         caught = _within(simulation, other, fix) if axes else ()
-        # A tool that passes by a wall is none.
+        # A tool that passes by a wall is no conflict.
         if 2 * len(caught) > len(simulation.points.members(fix.group)):
             yield _said(other, axes, caught)
 
 
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
-    """The words on a fix that gives way in these directions, for points with these ids."""
+    """Return the data for a fix that is overridden in these directions, for these point ids."""
     held = other.prescribes_velocity
     return {
         "other": other,
@@ -178,13 +178,13 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
 
 
 def _shared(simulation: Any, other: Any, fix: Any) -> np.ndarray:
-    """Ids of the points that both act on."""
+    """Return the ids of the points on which both act."""
     ids = simulation.points.members(other.group)
     return ids[fix.group.has(ids)]
 
 
 def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -> bool:
-    """Tell whether two fixes give some of the points other velocities now."""
+    """Return True if two fixes give some of the points different velocities now."""
     ids = ids[:: max(1, len(ids) // SAMPLE)]
     x, x0 = simulation.hub.fields.position[ids], places_before(simulation.hub, ids)
     values = simulation.hub.values
@@ -194,7 +194,7 @@ def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -
 
 
 def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
-    """Ids of the driven points in cells all of whose corners are held."""
+    """Return the ids of the driven points in cells whose corners are all held."""
     hub, method = simulation.hub, simulation.hub.update.method
     still = np.zeros(held.group.total(), np.bool_)
     still[held.nodes] = True

@@ -19,10 +19,10 @@ from karamelo_py.styles.fixes.formulas import per_direction
 
 
 class ToolFix(PointForces):
-    """Base of fixes that push points, which they take for small cubes (in the plane squares)."""
+    """Base of fixes that push points, treated as small cubes (in 2D squares)."""
 
     follows_points = True
-    needs_stiffness = False  # whether the force goes with the shear modulus of the point
+    needs_stiffness = False  # whether the force is proportional to the point's shear modulus
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -36,16 +36,16 @@ class ToolFix(PointForces):
             )
 
     def behind(self, points: PointTable) -> tuple[int, float]:
-        """Count points that are in the tool now, and find how deep the deepest is."""
+        """Return the number of points in the tool now, and the largest depth."""
         depth = self.depth_of(points)
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
     def now(self, *formulas: Expression) -> np.ndarray:
-        """The present numbers (n,) of formulas of time."""
+        """Return the present values (n,) of formulas of time."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
 
     def of_time(self, name: str, formulas: Sequence[Expression]) -> tuple[Expression, ...]:
-        """Check that there is a formula of time for each direction."""
+        """Check that there is a formula of time per direction."""
         found = per_direction(self.hub, name, formulas, all_given=True)
         self.now(*found)
         return found
@@ -53,34 +53,34 @@ class ToolFix(PointForces):
     def from_place(
         self, points: PointsView | PointTable, place: Sequence[Expression]
     ) -> np.ndarray:
-        """Vectors (n, d) from a place to the points."""
+        """Vectors (n, d) from a position to the points."""
         return points.position.astype(float) - self.now(*place)
 
     def side(self, points: PointsView) -> np.ndarray:
-        """Edges (n,) of the cubes that points are taken for."""
+        """Edges (n,) of the cubes of the points."""
         return (points.column("volume") / self._radius(points)) ** (1 / self.hub.domain.dimension)
 
     def face(self, points: PointsView) -> np.ndarray:
-        """Areas (n,) of a face of these cubes, per radian around an axis."""
+        """Areas (n,) of a face of these cubes, per radian in axisymmetry."""
         return self.side(points) ** (self.hub.domain.dimension - 1) * self._radius(points)
 
     def _radius(self, points: PointsView) -> np.ndarray | float:
         return points.position[:, 0].astype(float) if self.hub.domain.axisymmetric else 1.0
 
     def stiffness(self, points: PointsView) -> np.ndarray:
-        """Shear moduli (n,) less what damage has taken of them."""
+        """Shear moduli (n,), reduced by damage."""
         moduli = np.array([_shear_modulus(solid) for solid in self.hub.solids.values()])
         return moduli[points.column("type").astype(int) - 1] * (1 - points.column("damage"))
 
 
 def _shear_modulus(solid: Solid) -> float:
-    """The shear modulus of a solid, 0 where it has none."""
+    """The shear modulus of a solid, 0 if it has none."""
     law: Any = elastic_law(solid.material.law)
     return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
-    """A vector (d,) of length 1; one without a direction is refused."""
+    """Return a vector (d,) of length 1; a zero vector is refused."""
     length = np.linalg.norm(vector)
     if not (np.isfinite(length) and length > 0):
         raise ScriptError("the normal has no direction", expected="a vector that is not 0")
@@ -88,7 +88,7 @@ def unit(vector: np.ndarray) -> np.ndarray:
 
 
 def begin_behind(plane: Any, scene: Any) -> Any:
-    """Count the points that are behind a surface before the first step, for words."""
+    """Count the points behind a surface before the first step, for the warning."""
     if scene.simulation.step > 0:
         return False
     counts, depths = zip(*scene.hub.fields.each(plane, "behind"), strict=True)
@@ -101,19 +101,19 @@ class PlaneTool(ToolFix):
     """Base of walls: a plane that may move, with points on the side of its normal."""
 
     def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
-        """Check the formulas of a place in the plane, and of its normal."""
+        """Check the formulas of a position on the plane, and of its normal."""
         self.origin = self.of_time("", place)
         self.towards = self.of_time("n", normal)
-        if not self.hub.rehearsing:  # which does not know all numbers
+        if not self.hub.rehearsing:  # a rehearsal lacks some values
             unit(self.now(*self.towards))
 
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Measure how far (n,) points are behind the plane now, and find its normal (d,)."""
+        """Return the present depth (n,) of points behind the plane, and its normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_place(points, self.origin) @ normal), normal
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Depth (n,) of points behind the plane now."""
+        """Return the present depth (n,) of points behind the plane."""
         return self.depth(points)[0]
 
 
@@ -128,7 +128,7 @@ known_failure(
 
 
 class BallTool(ToolFix):
-    """Base of balls (in the plane disks), of a `centre` and a radius `R`.
+    """Base of balls (in 2D disks) with a `centre` and a radius `R`.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class BallTool(ToolFix):
     R
         Radius of the ball: a number or a formula of time.
     x, y, z
-        Its centre: numbers or formulas of time; z is 0 in the plane.
+        Its centre: numbers or formulas of time; z is 0 in 2D.
     """
 
     published = ("x", "y", "z", "s")
@@ -145,7 +145,7 @@ class BallTool(ToolFix):
     centre: tuple[Expression, ...]
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Depth (n,) of points in the ball now."""
+        """Return the present depth (n,) of points in the ball."""
         return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
 
 

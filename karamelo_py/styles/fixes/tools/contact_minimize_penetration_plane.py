@@ -15,14 +15,14 @@ from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
 
 
 class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
-    """Let a solid touch a fixed plane, as stiffly as the step allows, with friction.
+    """Contact of a solid with a plane, as stiff as the step allows, with friction.
 
     Parameters
     ----------
     solid
         ID of the solid.
     x, y, z
-        A point of the plane: numbers or formulas of time; z is 0 in the plane.
+        A point of the plane: numbers or formulas of time; z is 0 in 2D.
     nx, ny, nz
         Its normal, of any length, towards the side where the solid is.
     mu
@@ -34,14 +34,14 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
 
     Notes
     -----
-    Points are balls with the radius rp of half the side of a cube of their present volume. Where
-    one reaches p = rp - n.(x - xq) > 0 into the plane it gets the force m p / dt^2. This takes a
-    free point out within one step. Friction is at most mu times that, against the slip (de
-    Vaucorbeil & Nguyen 2021). It stops and undoes the slip: what it can hold rests, and gives way
-    by mu p before it slides. A moving plane does not drag.
+    Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
+    volume. A point with penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2, which moves
+    a free point out within one step. Friction is at most mu times this force, against the slip (de
+    Vaucorbeil & Nguyen 2021). It stops and reverses the slip: a load that friction can hold stays
+    at rest, and yields by mu p before it slides. A moving plane does not drag.
 
-    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
-    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
+    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
 
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 

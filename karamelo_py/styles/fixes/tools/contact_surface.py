@@ -28,24 +28,23 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import begin_behind
 from karamelo_py.styles.fixes.tools.stiff import StiffTool
 
-# Seconds of a core for a point near a surface of some thousand faces, and one near a plain shape.
+# Core seconds per point near a surface of some thousand faces, and near a simple shape.
 OF_FACES, OF_SHAPE = 1.5e-6, 5e-8
 
 
 class ContactSurface(StiffTool):
-    """Let points touch the surface of a region, which may move, with friction.
+    """Contact of points with the surface of a region, which may move, with friction.
 
     Parameters
     ----------
     region
-        The region that pushes points out. It needs an inside: a mesh of solid elements (in the
-        plane of area elements), a closed STL surface, or a plane. With the word ``exterior`` it is
-        a mould.
+        The region that pushes points out. It needs an inside: a mesh of solid elements (in 2D of
+        area elements), a closed STL surface, or a plane. With the word ``exterior`` it is a mould.
     mu
-        Coefficient of friction (Coulomb); 0 when left out.
+        Coefficient of friction (Coulomb); default 0.
     way
-        ux, uy, uz, as many as the domain has dimensions: how far the region has moved, formulas of
-        time. Left out it stays.
+        ux, uy, uz, one per dimension of the domain: displacement of the region, formulas of time.
+        Default: it does not move.
 
     Example
     -------
@@ -56,24 +55,24 @@ class ContactSurface(StiffTool):
     -----
     Publishes the force on the points as ID_x, ID_y, ID_z.
 
-    Points are balls. Their radius is half the side of a cube of their present volume. A point at
-    the depth p that approaches with the speed v gets the force m (v / dt + p / (10 dt^2)) out of
-    the region. This stops the point within one step and removes a tenth of p. The force never
-    pulls. Friction is at most mu times this force. It stops the slip on the moving region and
-    undoes a tenth of the way that a point has slid, wherever its load comes from: what friction can
-    hold rests. Before a point slides it gives way by mu p.
+    Points are spheres (in 2D disks). Their radius is half the side of a cube of their present
+    volume. A point at the depth p that approaches with the speed v gets the force
+    m (v / dt + p / (10 dt^2)) out of the region. This stops the point within one step and removes
+    10 % of p. The force never pulls. Friction is at most mu times this force. It stops the slip on
+    the moving region and reverses 10 % of the slip distance per step, whatever loads the point: a
+    load that friction can hold stays at rest. Before a point slides it yields by mu p.
 
-    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
-    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
+    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
 
-    The force acts in the direction in which the depth falls fastest. A point deeper than a cell, or
-    in the middle of a thin region, ends the run. A region does not turn.
+    The force acts in the direction in which the depth decreases fastest. A point deeper than a
+    cell, or in the middle of a thin region, ends the run. A region does not rotate.
 
     A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.56 in tlmpm and 1.57 in
     ulmpm (exact 1.541; points=cut). Its energy is balanced to 0.3 %. It sinks in by ten times the
-    force on a point over m / dt^2, here a twentieth of a cell. A belt over half a bollard with mu =
+    force on a point divided by m / dt^2, here 5 % of a cell. A belt over half a bollard with mu =
     0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for one whose
-    thickness is a tenth of the radius, as here).
+    thickness is 10 % of the radius, as here).
 
     See Also
     --------
@@ -106,7 +105,7 @@ class ContactSurface(StiffTool):
             self.initial_integrate = touch_hook(self._touch)
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Find the way (d,) of the region so far, and its mean velocity (d,) in the next step."""
+        """Displacement (d,) of the region so far, and its mean velocity (d,) in the next step."""
         values, times = self.hub.values, {"time": self.hub.update.time + np.array([0.0, dt])}
         ways = np.zeros((self.hub.domain.dimension, 2))
         for k, formula in enumerate(self.way):
@@ -118,16 +117,16 @@ class ContactSurface(StiffTool):
         return self.region.depth(x, self.hub.domain.h)
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Depth (n,) of points in the region now."""
+        """Return the present depth (n,) of points in the region."""
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
 
     def faces_of(self) -> np.ndarray | None:
-        """Faces (m, d, d) of the region now, if it is made of them."""
+        """Return the present faces (m, d, d) of the region, if it consists of faces."""
         skin = getattr(self.region, "skin", None)
         return None if skin is None else skin.faces + self.moved(1.0)[0]
 
     def _touch(self, row: int, values: tuple) -> Touch:
-        """Make what stands for this fix in kernels."""
+        """Make the representation of this fix for kernels."""
         self.begin_to_touch()
         shape, h = self.region.outline(), float(self.hub.domain.h)
         return touch_kind(self.grip)(row, values, shape, float(self.mu), h, self._address)
@@ -152,7 +151,7 @@ class ContactSurface(StiffTool):
         )
 
     def forces(self, points: PointsView) -> np.ndarray:
-        """The forces (n, d) of a region that kernels do not know."""
+        """Forces (n, d) of a region without a kernel."""
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
         within, aside = self.depth(x), ASIDE * self.hub.domain.h

@@ -1,4 +1,4 @@
-"""The tip of a cutting tool in the plane."""
+"""The tip of a cutting tool in 2D."""
 
 from typing import Annotated
 
@@ -15,18 +15,19 @@ from karamelo_py.styles.fixes.tools.base import ToolFix
 
 
 class CuttingTool(ToolFix):
-    """Push points out of the tip of a rigid tool, in the plane.
+    """Push points out of the tip of a rigid cutting tool, in 2D.
 
     Parameters
     ----------
     K
-        Stiffness of the tool in shear moduli of the point: a number or a formula of time.
+        Stiffness of the tool, relative to the shear modulus of the point: a number or a formula of
+        time.
     x_tip, y_tip, z_tip
         The tip: numbers or formulas of time; z is 0.
     vx, vy, vz
-        Its velocity, which scripts of Karamelo give; there is no friction that would need it.
+        Its velocity, for compatibility with Karamelo; unused, as there is no friction.
     xA, yA, xB, yB
-        A point on each of the two faces that meet in the tip: numbers or formulas of time.
+        A point on each of the two faces that meet at the tip: numbers or formulas of time.
 
     Example
     -------
@@ -34,7 +35,7 @@ class CuttingTool(ToolFix):
 
     Notes
     -----
-    The tool lies between the two faces. A point in it, at the depth p from the nearer face, gets
+    The tool lies between the two faces. A point inside, at the depth p from the nearer face, gets
     the force K G (1 - D) p out of that face (de Vaucorbeil & Nguyen 2021). G is the shear modulus
     and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
 
@@ -57,22 +58,22 @@ class CuttingTool(ToolFix):
         self.K = K
         self.tip = self.of_time("", (x_tip, y_tip, z_tip))
         self.ends = (xA, yA), (xB, yB)
-        if not hub.rehearsing:  # which does not know all numbers
+        if not hub.rehearsing:  # a rehearsal lacks some values
             self._faces()
 
     def _faces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Unit normals (2, 2) out of the tool, of the faces to A and to B, and the tip."""
+        """Outward unit normals (2, 2) of the faces to A and to B, and the tip."""
         tip = self.now(*self.tip)
         a, b = (self.now(*end) - tip for end in self.ends)
         turn = a[0] * b[1] - a[1] * b[0]
         if not abs(turn) > 0:
             raise ScriptError("tip, A and B lie in one line", expected="two faces with an angle")
-        # Turned away from the other face.
+        # Away from the other face.
         normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Depth (n,) of points in the tool now, below the nearer face."""
+        """Return the present depth (n,) of points in the tool, below the nearer face."""
         normals, tip = self._faces()
         return ((tip - points.position.astype(float)) @ normals.T).min(axis=1)
 

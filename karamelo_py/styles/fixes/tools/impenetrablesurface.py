@@ -1,4 +1,4 @@
-"""A plane that pushes points back with a force of their shear modulus."""
+"""A plane that pushes points back with a force proportional to their shear modulus."""
 
 from typing import Annotated
 
@@ -13,14 +13,15 @@ from karamelo_py.styles.fixes.tools.base import PlaneTool
 
 
 class ImpenetrableSurface(PlaneTool):
-    """Push points back that come behind a plane, with a force that grows with the depth.
+    """Push points behind a plane back, with a force that grows with the depth.
 
     Parameters
     ----------
     K
-        Stiffness of the wall in shear moduli of the point: a number or a formula of time.
+        Stiffness of the wall, relative to the shear modulus of the point: a number or a formula of
+        time.
     xs, ys, zs
-        A point of the plane: numbers or formulas of time; z is 0 in the plane.
+        A point of the plane: numbers or formulas of time; z is 0 in 2D.
     nx, ny, nz
         Its normal, of any length, towards the side where points may be.
 

@@ -15,7 +15,7 @@ from karamelo_py.styles.fixes.tools.base import BallTool
 
 
 class Radius(Expression):
-    """For signatures: a radius above 0, which Karamelo had behind the centre in 2020."""
+    """For signatures: a radius above 0, which came after the centre in Karamelo in 2020."""
 
     script_kind = "a number or a formula above 0"
 
@@ -35,7 +35,7 @@ class Radius(Expression):
 
 
 class Indent(BallTool):
-    """Push points out of a ball (in the plane a disk) with a force that grows as depth squared.
+    """Push points out of a ball (in 2D a disk) with a force that grows as depth squared.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ class Indent(BallTool):
 
     Notes
     -----
-    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it.
-    ``fix indent`` of LAMMPS does the same, but not per mass. Publishes the force on the points as
+    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it. In
+    LAMMPS, ``fix indent`` does the same, but not per mass. Publishes the force on the points as
     ID_x, ID_y, ID_z and the number of pushed points as ID_s.
 
     See Also

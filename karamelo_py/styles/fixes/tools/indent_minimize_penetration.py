@@ -14,12 +14,12 @@ from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
 
 
 class IndentMinimizePenetration(StiffTool, BallTool):
-    """Press a rigid ball (in the plane a disk) into points, as stiffly as the step allows.
+    """Press a rigid ball (in 2D a disk) into points, as stiff as the step allows.
 
     Parameters
     ----------
     vx, vy, vz
-        Its velocity, which friction needs: the centre does not follow from it.
+        Velocity of the ball for friction; it does not move the centre.
     mu
         Coefficient of friction (Coulomb).
 
@@ -29,16 +29,16 @@ class IndentMinimizePenetration(StiffTool, BallTool):
 
     Notes
     -----
-    Points are balls, too, with the radius rp of half the side of a cube of their present volume.
-    One at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets the force m
-    p / dt^2. This takes a free point out within one step. Friction is at most mu times that,
-    against the slip (de Vaucorbeil & Nguyen 2021). It stops and undoes the slip: what it can hold
-    rests, and gives way by mu p before it slides.
+    Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
+    volume. A point at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets
+    the force m p / dt^2, which moves a free point out within one step. Friction is at most mu times
+    this force, against the slip (de Vaucorbeil & Nguyen 2021). It stops and reverses the slip: a
+    load that friction can hold stays at rest, and yields by mu p before it slides.
 
-    dt is the step of the scene. A step that is shorter to end a run on time leaves it unchanged.
-    Where steps fall at once, as by set_dt, it falls by 1 % of the time.
+    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
+    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
 
-    Publishes the force on the points as ID_x, ID_y, ID_z and the area of contact as ID_s. Each
+    Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s. Each
     touching point counts as one face of its cube.
 
     See Also

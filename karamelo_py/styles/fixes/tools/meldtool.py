@@ -15,23 +15,23 @@ from karamelo_py.styles.fixes.tools.base import ToolFix
 
 
 class MeldTool(ToolFix):
-    """Push points out of the tool of additive friction stir deposition, in space.
+    """Push points out of the tool of additive friction stir deposition, in 3D.
 
     Parameters
     ----------
     K
         Stiffness of the tool in shear moduli of the point, times a length: a number or a formula of
-        time, as are all that follow.
+        time, as are all the following.
     axis
         The word x, y or z: the direction of the axis.
     half_width
         Half the width of the square channel along the axis.
     c1, c2
-        The axis in the other two directions, in the order x, y, z.
+        Position of the axis in the other two directions, in the order x, y, z.
     theta
-        Angle by which the tool has turned, from the first of these directions to the second.
+        Rotation angle of the tool, from the first of these directions to the second.
     lo, hi
-        Ends of the tool along the axis; points are pushed out at the lower one.
+        Ends of the tool along the axis; points are pushed out at the lower end.
     Rmax
         Radius of the tool.
 
@@ -41,7 +41,7 @@ class MeldTool(ToolFix):
 
     Notes
     -----
-    The tool is a cylinder without its channel. A point in it gets the force K G (1 - D) times the
+    The tool is a cylinder without its channel. A point inside gets the force K G (1 - D) times the
     shortest way out: into the channel, out of the cylinder, or below its end. G is the shear
     modulus and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
 
@@ -62,12 +62,12 @@ class MeldTool(ToolFix):
         if hub.domain.dimension != 3:
             raise ScriptError("the tool is one in space", expected="a domain in 3D")
         self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
-        self.now(*self.numbers)  # refuses those of places
+        self.now(*self.numbers)  # refuses formulas of position
         self.along = "xyz".index(axis)
         self.across = [k for k in range(3) if k != self.along]
 
     def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
-        """Heights (n,) of points above the end, and their places (n, 2): as they are and turned."""
+        """Heights (n,) of points above the end, and positions (n, 2): fixed and rotating axes."""
         c1, c2, theta, lo = at
         x = points.position.astype(float)
         q = x[:, self.across] - np.array([c1, c2])
@@ -75,7 +75,7 @@ class MeldTool(ToolFix):
         return x[:, self.along] - lo, q, q @ turn.T, turn
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Depth (n,) of points in the tool now."""
+        """Return the present depth (n,) of points in the tool."""
         _, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
         height, q, own, _ = self._seen(points, c1, c2, theta, lo)
         ways = height, hi - lo - height, Rmax - np.linalg.norm(q, axis=1), abs(own).max(axis=1) - w
@@ -87,7 +87,7 @@ class MeldTool(ToolFix):
         r = np.linalg.norm(q, axis=1)
         inward = (np.clip(own, -w, w) - own) @ turn
         outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
-        # The ways out (n, 3): into the channel, radially, below; and how long they are.
+        # Ways out (n, 3): into the channel, radially, below; and their lengths.
         ways = np.zeros((3, len(r), 3))
         ways[0][:, self.across] = inward
         ways[1][:, self.across] = outward

@@ -11,15 +11,15 @@ from karamelo_py.styles.fixes.tools.base import ToolFix
 
 
 class NeumannBcMech(ToolFix):
-    """Load the surface of a body with a force per area.
+    """Apply a traction (force per area) to the surface of a body.
 
     Parameters
     ----------
     group
-        Group of points: one layer of them along the surface.
+        Group of points: a single layer along the surface.
     traction
-        tx, ty, tz, as many as the domain has dimensions: force per area. Numbers or formulas of x,
-        y, z, x0, y0, z0, time and published values. NULL leaves a component alone.
+        tx, ty, tz, one per dimension of the domain: force per area. Numbers or formulas of x, y, z,
+        x0, y0, z0, time and published values. NULL leaves a component unchanged.
 
     Example
     -------
@@ -27,10 +27,10 @@ class NeumannBcMech(ToolFix):
 
     Notes
     -----
-    A point has one face to the outside, the side of a cube of its present volume: V^(2/3) in space,
-    V^(1/2) in the plane, the whole section in one dimension. In axisymmetric scenes the face is at
-    the radius of the point. Points lie half a side inside the surface on which the real load acts.
-    Publishes the total force as ID_x, ID_y, ID_z.
+    A point has one outer face, the side of a cube of its present volume: V^(2/3) in 3D, V^(1/2) in
+    2D, the whole section in 1D. In axisymmetry the face is at the radius of the point. Points lie
+    half a side inside the surface on which the real load acts. Publishes the total force as ID_x,
+    ID_y, ID_z.
 
     See Also
     --------

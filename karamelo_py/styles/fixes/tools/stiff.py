@@ -1,4 +1,4 @@
-"""Tools that are as stiff as a step allows, with friction that remembers what it holds."""
+"""Tools as stiff as a step allows, with friction that stores its grip."""
 
 from typing import Any
 
@@ -13,20 +13,20 @@ from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.grip import GripOfTool, grip_for
 from karamelo_py.styles.fixes.tools.base import ToolFix
 
-CLOSE = 0.5  # radii off a surface at which points that bounce on it do not forget their hold
+CLOSE = 0.5  # radii off the surface, within which bouncing points retain their grip
 
 
 class StiffTool(ToolFix):
-    """Base of tools that push a point by what stops it within a step, and rub it."""
+    """Base of tools that stop a point within a step, with friction."""
 
     impulsive = True
     remembers = ("has_touched",)
-    has_touched = False  # else what grips hold is that of a tool before
+    has_touched = False  # until then, grips belong to an earlier tool
     grip: type[GripOfTool] | None = None
     mu = 0.0
 
     def rubs(self, hub: Hub, mu: float) -> None:
-        """Let the tool have a coefficient of friction."""
+        """Set a coefficient of friction."""
         judge_friction(hub, mu)
         self.mu = mu
         if mu > 0:
@@ -34,7 +34,7 @@ class StiffTool(ToolFix):
             self.point_fields = (*self.point_fields, self.grip)
 
     def begin_to_touch(self) -> None:
-        """Forget what grips hold of a tool before."""
+        """Clear the grips of an earlier tool."""
         if self.grip is not None and not self.has_touched:
             for block in self.hub.simulation.setup.blocks:
                 if (grip := field(block.points.fields, self.grip)) is not None:
@@ -52,11 +52,11 @@ class StiffTool(ToolFix):
         led: Any = 0.0,
         share: float = 1.0,
     ) -> np.ndarray:
-        """Forces (n, d) that take points by `push` (n,) along `normal` in a step: m push / dt^2.
+        """Forces (n, d) that move points by `push` (n,) along `normal` in a step: m push / dt^2.
 
-        Friction is at most mu times that (de Vaucorbeil & Nguyen 2021). It stops the slip on a tool
-        of this `velocity`, and undoes the `share` of the way that a point has slid: of the places
-        (n, d) that are `seen`, less the way that the tool has `led` it.
+        Friction is at most mu times this force (de Vaucorbeil & Nguyen 2021). It stops the slip on
+        a tool of this `velocity`, and reverses the fraction `share` of a point's slip distance: of
+        the positions (n, d) `seen`, minus the displacement `led` by the tool.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
         load = stiffness * np.maximum(push, 0)
@@ -69,7 +69,7 @@ class StiffTool(ToolFix):
             touched = before[:, d, None] > 0
             way = np.where(touched, led - (seen[near] - before[:, d + 2 :]), 0.0)
             pull = share * one * way
-            # Velocities of points have noise, by which they do not move.
+            # Velocities of points contain noise that does not move them.
             slip = way / (2 * points.kick - points.dt)
             slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
             stop = points.contact_dt * one * slip
