@@ -253,7 +253,8 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
     names = SimpleNamespace(
         particle_names=lambda: columns, shown_names=lambda: [*columns, *named_sets(scene)]
     )
-    hub = SimpleNamespace(fields=names, values=scene.values)
+    none = SimpleNamespace(variables={})  # columns are not told from variables of a script
+    hub = SimpleNamespace(fields=names, values=scene.values, interpreter=none)
     (field,) = (word for word in help_of("dump", "pyplot").parameters if word.name == "field")
     look = {}
     for word in [field, *_look_words()]:
