@@ -25,6 +25,7 @@ from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.xpic import XPIC
 
 
@@ -337,8 +338,12 @@ def light_node(s):
     """Return the mass below which USL limits gradients: d (c dt / h)^2 of a point that a node sees.
 
     Less than one: a share below m / m_p would be less than what comes back to the node through the
-    points' velocities, and the strain of the node would run ahead of its stress.
+    points' velocities, and the strain of the node would run ahead of its stress. None in the total
+    frame where points have moments: what comes back through these is all of the node's velocity,
+    and any limit makes it grow. The step knows such nodes there.
     """
+    if Moment in getattr(s.transfer, "point_fields", ()) and not s.frame.moves:
+        return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
     clock = s.control.clock[0]
     courant = clock.rate * s.control.values[arrays.DT] / clock.spacing
     masses = min(s.kin.dimension * courant * courant, 1.0)

@@ -18,6 +18,7 @@ from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_
 from karamelo_py.run import timestep
 from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
 from karamelo_py.run.diagnosis.explain import refuse_endless_speeds
+from karamelo_py.run.light_nodes import stable_share
 from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.scene_arrays import SceneArrays
@@ -46,6 +47,11 @@ class Simulation(SceneArrays):
     @cached_property
     def _whole(self) -> Whole:
         return Whole(self)
+
+    @cached_property
+    def light_nodes(self) -> float:
+        """Return the stable step over h/c that the nodes of thin and round solids allow."""
+        return stable_share(self.hub, self.setup.grids)
 
     def act(self, function: Callable[[Setup], None], s: Setup) -> None:
         """Call what acts from Python on the arrays of the whole scene."""

@@ -152,7 +152,18 @@ def common_velocity(simulation: Any, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Return the stable step over h/c; `longer` is that of points which stay where they are."""
+    """Return the stable step over h/c; `longer` is that of points which stay where they are.
+
+    In the total frame the nodes of a thin or round body allow less to points with moments.
+    """
+    update = hub.update
+    if keeps_moments(hub) and not (update.method.frame.moves or update.scheme.traits.implicit):
+        return min(_courant_of_scheme(hub, longer=longer), hub.simulation.light_nodes)
+    return _courant_of_scheme(hub, longer=longer)
+
+
+def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
+    """Return the stable step over h/c of scheme, basis and points per cell."""
     scheme, method = hub.update.scheme, hub.update.method
     two, one = scheme.traits.courant
     if min(two, one) < 1:
@@ -292,8 +303,9 @@ def ruling_limit(simulation: Any) -> str:
 
     ``set_dt`` and ``end`` (of the run) are no limits of stability; ``conduction`` is that of heat,
     ``viscosity`` that of waves which viscosity slows down, ``speed`` that of points which move
-    faster than waves, ``light_nodes`` that of usl, ``lone_points`` that of points with moments, and
-    ``waves`` that of the others.
+    faster than waves, ``light_nodes`` that of usl and of
+    :mod:`karamelo_py.run.light_nodes`, ``lone_points`` that of points with moments, and ``waves``
+    that of the others.
     """
     control = simulation.control
     clock = control.clock[0]

@@ -1,0 +1,164 @@
+"""The stable step of bodies in the total frame, by the mass of their nodes and its stiffness.
+
+Nodes at an edge that next to no matter reaches may be stiffer, for their mass, than those within a
+body. FLIP averages their motion away. Transfers with moments or gradients of velocity do not: their
+points follow any linear field. The step is stable below 2 / w, with the highest frequency w of the
+nodes (w^2 is an eigenvalue of M^-1 K, with lumped masses); in that frame it is known at set-up.
+"""
+
+from itertools import product
+from math import floor, inf, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.laws import law_on
+from karamelo_py.points.basis.product import along
+from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.points.laws import (
+    can,
+    constrained_velocity,
+    initial_state,
+    specific_volume,
+    wave_speed_squared,
+)
+from karamelo_py.points.laws.elastic import ElasticLaw
+from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
+
+LIGHT = 0.9  # of the mass of a node within the body, below which nodes are looked at
+MANY = 100_000  # pairs of points and nodes that are looked at, or a few times that
+STEPS = 24  # of the iteration: within 1 % of the highest frequency
+
+
+class _Line(NamedTuple):
+    """The nodes that points see in one direction."""
+
+    first: np.ndarray  # (n,)
+    weights: np.ndarray  # (n, m)
+    slopes: np.ndarray  # (n, m)
+
+
+def stable_share(hub: Hub, grids: NamedTuple) -> float:
+    """Return the stable step over h/c that the nodes of all solids allow; inf if nothing is known.
+
+    Rounded down to four digits, so that sums in another order give the same step.
+    """
+    if not along.defined(type(hub.update.method.basis)):
+        return inf
+    solids = [s for s in hub.solids.values() if not can(s.material.law, constrained_velocity)]
+    found = [_stable_share(hub, solid, grids) for solid in solids if solid.count]
+    return floor(1e4 * min(found, default=inf)) / 1e4 if found else inf
+
+
+def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
+    """Find the highest frequency among the light nodes of one solid, in units of c/h."""
+    method, volume = hub.update.method, solid.volume0
+    kin = method.kinematics(hub)
+    places = method.places(kin, solid, float)
+    grid = record(grids, method.lattice_of(hub, solid))
+    lines = [_line(method.basis, kin, grid, places, k) for k in range(kin.dimension)]
+    sizes = [int(line.first.max()) + line.weights.shape[1] for line in lines]
+    count, pairs = int(np.prod(sizes)), list(product(*(range(o.weights.shape[1]) for o in lines)))
+
+    def nodes(steps: tuple[int, ...]) -> np.ndarray:
+        at = [line.first + j for line, j in zip(lines, steps, strict=True)]
+        return np.ravel_multi_index(at, sizes)
+
+    def weight(steps: tuple[int, ...], slope: int = -1) -> np.ndarray:
+        factors = [
+            (one.slopes if k == slope else one.weights)[:, j]
+            for k, (one, j) in enumerate(zip(lines, steps, strict=True))
+        ]
+        return np.prod(factors, axis=0)
+
+    radius = places[:, 0] if isinstance(kin, Axisymmetric) else None
+    area = volume if radius is None else volume / radius
+    filled = sum(np.bincount(nodes(k), area * weight(k), count) for k in pairs)
+    limit = LIGHT * filled.max()
+    while True:
+        seen = (filled > 0) & (filled < limit)
+        for _ in range(2):  # their points, and all other points of the nodes of these
+            near = np.any([seen[nodes(k)] for k in pairs], axis=0)
+            seen = np.zeros(count, bool)
+            for k in pairs:
+                seen[nodes(k)[near]] = True
+        if near.sum() * len(pairs) <= MANY or limit < 0.01 * filled.max():
+            break
+        limit *= 0.7
+    if not near.any():
+        return inf
+    # The mass is that of all points.
+    mass = sum(np.bincount(nodes(k), volume * weight(k), count) for k in pairs)
+    number = np.cumsum(seen) - 1
+    at = np.stack([number[nodes(k)[near]] for k in pairs], axis=1)
+    slopes = [np.stack([weight(k, i)[near] for k in pairs], 1) for i in range(kin.dimension)]
+    hoop = None
+    if radius is not None:
+        hoop = np.stack([weight(k)[near] / radius[near] for k in pairs], 1)
+    shear = _shear_share(law_on(solid.material.law, solid.h, solid.T0), kin)
+    root = np.sqrt(mass[seen])
+    root[root == 0] = inf
+
+    def stiffness(u: np.ndarray) -> np.ndarray:
+        """Return M^-1/2 K M^-1/2 u of (nodes, d), in units of c^2."""
+        there = (u / root[:, None])[at]
+        gradient = np.stack([(there * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
+        trace = np.trace(gradient, axis1=1, axis2=2)
+        around = 0.0 if hoop is None else (there[:, :, 0] * hoop).sum(axis=1)
+        pressure = (1 - 2 * shear) * (trace + around)
+        stress = shear * (gradient + gradient.transpose(0, 2, 1))
+        stress += pressure[:, None, None] * np.eye(kin.dimension)
+        stress *= volume[near][:, None, None]
+        force = sum(g[:, :, None] * stress[:, None, :, i] for i, g in enumerate(slopes))
+        if hoop is not None:
+            force[:, :, 0] += hoop * (volume[near] * (pressure + 2 * shear * around))[:, None]
+        columns = [np.bincount(at.ravel(), f.ravel(), len(root)) for f in np.moveaxis(force, 2, 0)]
+        return np.stack(columns, axis=1) / root[:, None]
+
+    return 2 / (sqrt(_largest(stiffness, (len(root), kin.dimension))) * solid.h)
+
+
+def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -> _Line:
+    """Find the nodes along one direction; points at the same place in it see the same ones."""
+    d = kin.dimension
+    own = places[:, direction::d] if places.shape[1] > d else places[:, direction, None]
+    _, first, back = np.unique(own, axis=0, return_index=True, return_inverse=True)
+    found = [along(basis, kin, grid, tuple(place), direction) for place in places[first]]
+    back = back.ravel()
+    return _Line(
+        np.array([int(one.first) for one in found])[back],
+        np.array([one.weights for one in found], float)[back],
+        np.array([one.gradients for one in found], float)[back],
+    )
+
+
+def _shear_share(law: Any, kin: Any) -> float:
+    """Return the shear modulus over that of waves in the bulk; 1/2 is without a Poisson's ratio."""
+    strength = getattr(law, "strength", None)
+    G = law.G if isinstance(law, ElasticLaw) else shear_modulus(strength) if strength else inf
+    stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
+    return min(float(G / stiffness), 0.5)
+
+
+def _largest(operator: Any, shape: tuple[int, int]) -> float:
+    """Find the largest eigenvalue of a symmetric operator by the iteration of Lanczos (1950)."""
+    q = np.random.default_rng(0).standard_normal(shape)
+    q /= sqrt((q * q).sum())
+    basis, diagonal, beside = [q], [], []
+    for _ in range(min(STEPS, q.size)):
+        r = operator(basis[-1])
+        diagonal.append(float((r * basis[-1]).sum()))
+        for _ in range(2):
+            for one in basis:
+                r = r - (r * one).sum() * one
+        size = sqrt((r * r).sum())
+        if not size > 1e-9 * diagonal[0]:
+            break
+        beside.append(size)
+        basis.append(r / size)
+    n = len(diagonal)
+    matrix = np.diag(diagonal) + np.diag(beside[: n - 1], 1) + np.diag(beside[: n - 1], -1)
+    return float(np.linalg.eigvalsh(matrix)[-1])
