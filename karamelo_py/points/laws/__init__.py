@@ -1,24 +1,23 @@
-"""Constitutive laws of one point. One file each: what a script says, and the point functions.
+"""Constitutive laws of one point, one file each: the style for scripts, and the point functions.
 
 A law is a NamedTuple of parameters (its class is the tag). It owns a state, a NamedTuple of numbers
 and tensors; kernels only load it, pass it on and store it. Tensors have the components of the
 kinematics `kin` (`karamelo_py.points.kinematics`); `j` = det F is the volume over the reference
-volume. A law may
-be composed of parts, NamedTuples among its parameters (`eos_strength`).
+volume. A law may consist of parts, NamedTuples among its parameters (`eos_strength`).
 
-The class is the style, too: its docstring is the manual, and its fields with their annotations are
-the arguments. Where a script gives other numbers than the law computes with, a classmethod `given`
-has the arguments and returns the law; `checked`, a method, refuses what no annotation can, and
-returns the law or a simpler one that means the same.
+The class is also the style: its docstring is the manual, and its annotated fields are the
+arguments. If a script gives other parameters than the law uses, a classmethod `given` takes the
+arguments and returns the law. The method `checked` refuses values that annotations cannot, and
+returns the law or an equivalent simpler one.
 
-A law that says ``in_lanes``, as all its parts do, is computed for several points at once. Its point
-functions do not branch on numbers of a point, but `where`; those that do are named in
-``scalarised``. Points of other laws are visited one by one.
+A law with ``in_lanes``, as all its parts must have, is computed for several points at once. Its
+point functions do not branch on numbers of a point, except with `where`; those that do are named in
+``scalarised``. Points of other laws are processed one by one.
 
-A law that says ``rebounds`` bears tension and gives back all the work that it was given; of a
-composed law its strength says so.
+A law with ``rebounds`` sustains tension and returns all the work done on it; in a composed law the
+strength has this attribute.
 
-What dumps and plots can show of a law is declared beside it (`column`).
+Output columns of a law are declared next to it (`column`).
 """
 
 from __future__ import annotations
@@ -32,13 +31,13 @@ from karamelo_py.compiler.compile import point_function, real
 
 
 class Absent(NamedTuple):
-    """Tag of a part that a law does not have."""
+    """Tag of a missing part of a law."""
 
     in_lanes = True
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """The classes of a law and of its parts: laws of one kind share kernels and arrays.
+    """The classes of a law and its parts: laws of one kind share kernels and arrays.
 
     A table of laws (`karamelo_py.kernels.laws.law_table`) is of the kind of its laws.
     """
@@ -55,14 +54,14 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
 def column(part: type, name: str, what: Callable | NamedTuple) -> None:
-    """Declare that laws with `part`, or that are of this class, can show a number.
+    """Declare an output column of laws with `part`, or of this class.
 
     Parameters
     ----------
     part
         The class of the law, or of one of its parts.
     name
-        What dumps, plots and tables call it.
+        Its name in dumps, plots and tables.
     what
         A point function of the whole law (`number`), or a tag of `shown`.
     """
@@ -70,21 +69,21 @@ def column(part: type, name: str, what: Callable | NamedTuple) -> None:
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """The numbers that a law can show, those of its parts first: name, and tag for `shown`."""
+    """The output columns of a law, those from its parts first: name, and tag for `shown`."""
     kinds = reversed(law_kind(law))
     return {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
 
 
 @point_function()
 def shown(what, law, kin, state):
-    """The number that a tag stands for, of a point in `state`."""
+    """The value of a tag for a point in `state`."""
 
 
 def number(function: Callable) -> Callable:
-    """Mark a point function of (law, kin, state) whose value can be shown.
+    """Mark a point function of (law, kin, state) as an output column.
 
-    It gets a tag that stands for it where kernels choose by type. The tag's class is put beside
-    the function, so that it can be imported, and kernels with it be cached.
+    It gets a tag by which kernels choose by type. The tag's class is stored in the module of the
+    function, so that it can be imported, and kernels with it be cached.
     """
     name = f"{function.__name__}_tag"
     made = namedtuple(name, (), module=function.__module__)
@@ -106,13 +105,13 @@ def advance(law, kin, state, dl, dt):
 
 @point_function(otherwise=True)
 def advance_beside(law, kin, state, dl, dt, beside):
-    """The same, where forces have `beside` more pressure than the point (F-bar)."""
+    """As `advance`, if forces have `beside` more pressure than the point (F-bar)."""
     return advance(law, kin, state, dl, dt)
 
 
 @point_function()
 def kirchhoff_stress(law, kin, state):
-    """det F times the Cauchy stress, which times the reference volume makes the nodal forces."""
+    """det F times the Cauchy stress; times the reference volume it gives the nodal forces."""
 
 
 @point_function()
@@ -127,23 +126,23 @@ def jacobian(law, kin, state):
 
 @point_function()
 def deformation(law, kin, state):
-    """F, of laws whose state holds it; left out by the others."""
+    """F, for laws whose state holds it."""
 
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """Tell whether a law adds up strains, so that load steps need their logarithm: a constant."""
+    """Return True if a law sums strains, so that load steps need their logarithm: a constant."""
     return True
 
 
 @point_function()
 def wave_speed_squared(law, kin, state):
-    """Square of the speed of the fastest small disturbance, for the stable step."""
+    """Squared speed of the fastest small disturbance, for the stable step."""
 
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """Bound `wave_speed_squared` from above, where that is cheaper: most points are slower yet."""
+    """Upper bound of `wave_speed_squared`, if that is cheaper: most points are slower anyway."""
     return wave_speed_squared(law, kin, state)
 
 
@@ -155,7 +154,7 @@ def energy_density(law, kin, state):
 
 @point_function(otherwise=True)
 def constrained_velocity(law, own, given):
-    """Velocity of a point after a step: what the grid gives, or of rigid bodies their own."""
+    """Velocity of a point after a step: from the grid, or for rigid bodies their own."""
     return given
 
 
@@ -167,50 +166,50 @@ def moves_as_told(law: tuple) -> bool:
 @number
 @point_function(otherwise=True)
 def dissipated_energy(law, kin, state):
-    """Energy that is gone, per reference volume; left out by laws that dissipate nothing."""
+    """Dissipated energy per reference volume; undefined for laws without dissipation."""
     return specific_volume(law) - specific_volume(law)
 
 
 @number
 @point_function()
 def damage(law, kin, state):
-    """0 intact to 1 broken; left out by laws without."""
+    """0 intact to 1 broken; undefined for laws without damage."""
 
 
 @number
 @point_function()
 def damage_initiation(law, kin, state):
-    """Grows from 0, damage begins at 1; left out by laws without."""
+    """Grows from 0, damage begins at 1; undefined for laws without damage."""
 
 
 @number
 @point_function(otherwise=True)
 def temperature(law, kin, state):
-    """Temperature; 0 of laws without."""
+    """Temperature; 0 for laws without one."""
     return specific_volume(law) - specific_volume(law)
 
 
 @point_function(otherwise=True)
 def with_temperature(law, kin, state, T):
-    """The state at the temperature `T`, which laws without a temperature pass over."""
+    """The state at the temperature `T`; unchanged for laws without a temperature."""
     return state
 
 
 @point_function(otherwise=True)
 def heat_capacity(law, like):
-    """Heat per mass and kelvin; 0 of laws without temperature."""
+    """Heat per mass and kelvin; 0 for laws without temperature."""
     return real(0, like)
 
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """The state with `heat` more of internal energy, per reference volume, where there is any."""
+    """The state with `heat` more internal energy per reference volume, if the law has any."""
     return state
 
 
 @point_function(otherwise=True)
 def conductivity(law, like):
-    """Heat flux per gradient of temperature; 0 of laws without temperature."""
+    """Heat flux per temperature gradient; 0 for laws without temperature."""
     return real(0, like)
 
 
@@ -222,12 +221,12 @@ def elastic_strain(law, kin, state):
 @number
 @point_function()
 def plastic_strain(law, kin, state):
-    """Equivalent plastic strain, for output; left out by laws without."""
+    """Equivalent plastic strain, for output; undefined for laws without."""
 
 
 @point_function()
 def with_stress(law, kin, state, stress):
-    """The state whose Cauchy stress is `stress` (initial_stress); left out by laws without."""
+    """The state with the Cauchy stress `stress` (initial_stress); undefined for laws without."""
 
 
 @point_function(otherwise=True)

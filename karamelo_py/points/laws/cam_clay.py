@@ -24,24 +24,24 @@ from karamelo_py.script.errors import ScriptError
 
 
 class CamClay(NamedTuple):
-    """Clay that consolidates, yields on an ellipse, and flows on at a critical state.
+    """Modified Cam-clay: consolidation, elliptic yield surface, flow at the critical state.
 
     Parameters
     ----------
     rho
-        Density at the beginning.
+        Initial density.
     G
         Shear modulus.
     M
-        Ratio q/p of the critical state; 6 sin(phi)/(3 - sin(phi)) in triaxial compression.
+        Critical state ratio q/p; 6 sin(phi)/(3 - sin(phi)) in triaxial compression.
     lam
-        Slope of ln(volume) over ln(p) of virgin consolidation: about lambda/(1 + e).
+        Slope of -ln(volume) over ln(p) in virgin consolidation: about lambda/(1 + e).
     kappa
-        The same of swelling, below lam.
+        The same slope in swelling, below lam.
     p0
-        Pressure at the beginning: a point without a load has it.
+        Initial pressure, present without any load.
     pc
-        Preconsolidation pressure at the beginning, of at least p0; p0 when left out.
+        Initial preconsolidation pressure, at least p0; default p0.
 
     Example
     -------
@@ -50,22 +50,21 @@ class CamClay(NamedTuple):
 
     Notes
     -----
-    Stresses are Kirchhoff's, J times Cauchy's: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with the
-    logarithmic elastic strain e. The yield surface is q^2/M^2 + p (p - pc) = 0. Plastic flow is
-    normal to it. pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland
-    1968; in logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III",
-    Comput. Methods Appl. Mech. Eng. 155). A step ends on the surface, whatever its size.
+    Stresses are Kirchhoff stresses, J times Cauchy: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with
+    the logarithmic elastic strain e. The yield surface is q^2/M^2 + p (p - pc) = 0, with associated
+    flow. pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in
+    logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III", Comput.
+    Methods Appl. Mech. Eng. 155). A step ends on the surface, whatever its size.
 
     Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
     q/p. At the critical state this is p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic
     strain ep, and pc. If fix initial_stress gives a stress outside the surface, pc moves the
-    surface there. p tends to 0, but there is no tension.
+    surface there. p may approach 0, but there is no tension.
 
-    At a free surface a load must balance p0. Hold the other sides and write
-    ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or
-    ``fix(cell, edge_pressure, all, b, 100e3)`` all around. b is the region of the solid. Otherwise
-    the first step releases p0. If fix initial_stress gives another stress, the load is its normal
-    component.
+    At a free surface a load must balance p0, or the first step releases p0. Hold the other sides
+    and write ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or
+    ``fix(cell, edge_pressure, all, b, 100e3)`` all around. b is the region of the solid. If fix
+    initial_stress gives another stress, the load is its normal component.
 
     See Also
     --------
@@ -96,7 +95,7 @@ class CamClay(NamedTuple):
         *,
         pc: Annotated[float, Positive] | None = None,
     ):
-        """The law from its parameters."""
+        """Make the law from its parameters."""
         if kappa >= lam:
             raise ScriptError(
                 f"swelling is as soft as virgin consolidation: kappa {kappa:g}, lam {lam:g}",
@@ -123,7 +122,7 @@ class State(NamedTuple):
 
 
 def pressure(law, e):
-    """Kirchhoff pressure of an elastic strain."""
+    """Kirchhoff pressure for an elastic strain."""
     return law.p0 * exp(-tr(e) / law.kappa)
 
 
@@ -159,13 +158,13 @@ def at_step(law, q, p, pc, y, w):
 
 
 def unbalanced(law, q, p, pc, y, w):
-    """Find what is left of the yield function, and of the flow rule y = w M^2/6G (2 p - pc)."""
+    """Return the residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
     q, p, pc = at_step(law, q, p, pc, y, w)
     return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
 
 
 def corrections(law, q, p, pc, y, w, f, g):
-    """Newton's corrections of y and w, from what is left there, `f` and `g`."""
+    """Newton corrections of y and w, from the residuals `f` and `g`."""
     q, p, pc = at_step(law, q, p, pc, y, w)
     c, apart = law.M**2 / (6 * law.G), 2 * p - pc
     falls, rises = p / law.kappa, pc / (law.lam - law.kappa)
@@ -183,13 +182,13 @@ _NEWTON = 4
 
 @shared
 def plastic_flow(law, q, p, pc):
-    """Find y and w that return a trial with q and p to the surface, or 0 where it is within.
+    """Find y and w that return a trial with q and p to the surface, or 0 inside it.
 
-    With (1 + w) = q / q_s, q_s on the surface, one equation of y is left. Its solution lies between
-    y = 0, or p = pc where the trial has more, and the critical state, 2 p = pc.
+    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution lies
+    between y = 0, or p = pc if the trial has more, and the critical state, 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
-    q = where(yields, q, law.M * pc)  # a trial beyond, for what is not used
+    q = where(yields, q, law.M * pc)  # a value outside the surface, for unused lanes
     c, a = law.M**2 / (6 * law.G), law.kappa * (law.lam - law.kappa) / law.lam
     isotropic = a * log(p / pc)
     critical = isotropic + a * log(real(2, p))
@@ -207,7 +206,7 @@ def plastic_flow(law, q, p, pc):
         )
         low, high = where(far, low, y), where(far, y, high)
         y = 0.5 * (low + high)
-    w = max(w, 0)  # but for rounding
+    w = max(w, 0)  # against rounding
     for _ in range(_NEWTON):
         f, g = unbalanced(law, q, p, pc, y, w)
         dy, dw = corrections(law, q, p, pc, y, w, f, g)
@@ -217,7 +216,7 @@ def plastic_flow(law, q, p, pc):
 
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
-    # What is left stays 0: a correction by its slopes gives those of y and w.
+    # The residual stays 0: a Newton correction with its slopes gives the slopes of y and w.
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0

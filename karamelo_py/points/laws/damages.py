@@ -1,9 +1,9 @@
-"""Damage of one point: the share D of its strength that is gone.
+"""Damage of one point: the fraction D of its strength that is lost.
 
 A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times that of the intact material,
-except for pressure. Equation of state and strength do not depend on it, so it enters once. What it
-remembers is its memory, a tuple.
+(`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times the stress of the intact
+material, except for pressure. Equation of state and strength do not depend on it, so it enters
+once. Its memory is a tuple.
 """
 
 from typing import Annotated, Any, NamedTuple
@@ -19,13 +19,13 @@ from karamelo_py.script.errors import ScriptError
 
 @point_function(otherwise=True)
 def initial_damage(damage, like):
-    """The memory of an intact point, or () where nothing breaks."""
+    """The memory of an intact point, or () without damage."""
     return ()
 
 
 @point_function()
 def damage_after(damage, memory, strain, triaxiality, heat, dt):
-    """The memory after an increment of the equivalent plastic strain in a step dt.
+    """The memory after an increment of equivalent plastic strain in a step dt.
 
     `triaxiality` is the mean stress over the von Mises stress.
     """
@@ -38,13 +38,13 @@ def integrity(damage, memory):
 
 @point_function()
 def initiation(damage, memory):
-    """Return the initiation of damage: it grows to 1 before damage begins."""
+    """Return the damage initiation: it grows to 1 before damage begins."""
 
 
-# Under triaxialities below this, failure strain is without bounds for most metals.
+# Below this triaxiality, most metals have no finite failure strain.
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
-# Damage grows from 0 to 1 while the sum of strain over failure strain grows from 1 by 1 / this.
+# Damage grows from 0 to 1 while the sum of strain over failure strain grows from 1 to 1 + 1/this.
 _BRITTLENESS = 10.0
 
 
@@ -57,11 +57,11 @@ class JohnsonCookDamage(NamedTuple):
         Failure strain at the reference rate: d1 + d2 exp(d3 t), with t the mean stress over the von
         Mises stress.
     d4
-        Coefficient of the rate; 0 for none.
+        Rate coefficient; 0 for none.
     d5
-        Coefficient of temperature; 0 for none.
+        Temperature coefficient; 0 for none.
     epsdot0
-        Reference rate of plastic strain.
+        Reference plastic strain rate.
     Tr, Tm
         Reference and melting temperature.
 
@@ -73,13 +73,13 @@ class JohnsonCookDamage(NamedTuple):
     -----
     The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
     Tr) / (Tm - Tr) (Johnson & Cook 1985). At and below the reference rate the second factor is 1.
-    Without a temperature the third one is 1. w is the sum of plastic strain over failure strain
-    (dump column damage_init). From w = 1 on the damage D (dump column damage) grows to 1 as 10 (w -
-    1). With t below -3 nothing fails. d1 may be negative. Failure strains are at least 1e-6.
+    Without a temperature the third factor is 1. w is the sum of plastic strain over failure strain
+    (dump column damage_init). From w = 1, the damage D (dump column damage) grows to 1 as 10 (w -
+    1). Nothing fails for t below -3. d1 may be negative. Failure strains are at least 1e-6.
 
-    D reduces the deviatoric stress and tension, not pressure in compression: sigma = (1 - D) s - p
-    I, with p times 1 - D in tension. The rest of the intact material flows on plastically. The
-    stored energy that is lost counts as dissipated.
+    D reduces the deviatoric stress and tension, not compression: sigma = (1 - D) s - p I, with p
+    times 1 - D in tension. The remaining intact material continues to flow plastically. The lost
+    stored energy counts as dissipated.
 
     See Also
     --------
@@ -98,7 +98,7 @@ class JohnsonCookDamage(NamedTuple):
     Tm: float
 
     def checked(self):
-        """The law, after a look at what no annotation says."""
+        """Return the law after checks beyond the annotations."""
         check_temperatures(self.Tr, self.Tm)
         if not self.d1 + self.d2 > 0:
             raise ScriptError(

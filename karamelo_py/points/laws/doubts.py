@@ -1,4 +1,4 @@
-"""Numbers of materials that a law can have and hardly any body has: slips in a script."""
+"""Material constants that are possible but implausible: likely mistakes in a script."""
 
 from collections.abc import Iterator
 from math import asin, degrees, inf, radians, sin, sqrt
@@ -16,22 +16,22 @@ from karamelo_py.points.laws.eos import bulk_modulus
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
 
-SLOW = 0.01  # of a body whose density and modulus have changed places, in m/s as in mm/ms
-SMALL = 2.0  # degrees: angles of friction are larger, and those in radians are not
-EXPANSION = 1e-10, 1e-3  # a kelvin, from quartz to polymers, and far beyond
-TOUGH = 50.0  # of a failure strain in shear that was given in percent
-APART = 100.0  # kelvin between reference temperatures that are counted from one point
-MELTS = 0.1  # a plastic strain by whose heat nothing melts
-COEFFICIENT = 2.0  # of friction between grains, far beyond
-STEEP, THICK = 10.0, 20.0  # slopes of Hugoniot curves and coefficients of viscosity, far beyond
+SLOW = 0.01  # wave speed with density and modulus exchanged, in m/s or mm/ms
+SMALL = 2.0  # degrees: friction angles are larger, unless given in radians
+EXPANSION = 1e-10, 1e-3  # per kelvin, far beyond quartz and polymers
+TOUGH = 50.0  # failure strain in shear, if given in percent
+APART = 100.0  # kelvin between reference temperatures on the same scale
+MELTS = 0.1  # plastic strain whose heat melts nothing real
+COEFFICIENT = 2.0  # friction between grains, far above real values
+STEEP, THICK = 10.0, 20.0  # Hugoniot slopes and viscosity coefficients, far above real values
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
-    """Yield what is strange about a law, and what may be meant."""
+    """Yield each implausibility of a law, and the likely intention."""
     if can(law, constrained_velocity):
         return
     if hasattr(getattr(law, "strength", None), "cell_size"):
-        # Viscosity slows the waves of the cells, whose size is not known yet.
+        # Viscosity damps waves by the cell size, which is not known yet.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)
@@ -114,7 +114,7 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
 
 
 def reference_temperatures(law: Any) -> dict[str, float]:
-    """Name the temperatures from which parts of a law count, as far as it has a temperature."""
+    """Return the reference temperatures of the parts of a law, if it has a temperature."""
     heat, softening = getattr(law, "temperature", None), getattr(law, "strength", None)
     if not hasattr(heat, "T0"):
         return {}
@@ -130,7 +130,7 @@ def reference_temperatures(law: Any) -> dict[str, float]:
 
 
 def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]]:
-    """Yield what is strange about the temperature of a law that yields at `flow`."""
+    """Yield implausible temperatures of a law with flow stress `flow`."""
     heat, counted = law.temperature, reference_temperatures(law)
     if counted and max(counted.values()) - min(counted.values()) > APART:
         yield (

@@ -1,4 +1,4 @@
-"""Base of isotropic elastic laws; and of those whose state is the deformation gradient."""
+"""Base of isotropic elastic laws, and of laws whose state is the deformation gradient."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -10,7 +10,7 @@ from karamelo_py.points.laws.thermoelastic import expanding
 
 
 class ElasticLaw(NamedTuple):
-    """Elastic solid by Young's modulus and Poisson's ratio, perhaps with a temperature."""
+    """Elastic solid with Young's modulus and Poisson's ratio, optionally with a temperature."""
 
     in_lanes = True
     rebounds = True
@@ -29,7 +29,7 @@ class ElasticLaw(NamedTuple):
         kappa: Annotated[float, NonNegative] | None = None,
         alpha: float = 0.0,
     ):
-        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
+        """Make the law from Young's modulus and Poisson's ratio, and optional thermal constants."""
         return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 

@@ -2,10 +2,10 @@
 
 Pressure comes from an equation of state, deviatoric stress from a strength. Viscosity, damage and
 temperature may be added. The parts are NamedTuples inside the law's, so that their types select
-their point functions; `Absent` stands for those that are not there, which have no numbers in the
-state. The state of a point is det F, the deviatoric stress of the intact material, what each part
-remembers (`Memory`), and the dissipated energy where there is any. Parts of other kinds,
-a plug-in's, are chained (`karamelo_py.points.laws.further`).
+their point functions; `Absent` marks missing parts, which have no numbers in the state. The state
+of a point is det F, the deviatoric stress of the intact material, the memory of each part
+(`Memory`), and the dissipated energy if there is any. Parts of other kinds, from plug-ins, are
+chained (`karamelo_py.points.laws.further`).
 """
 
 from math import log, sqrt
@@ -36,20 +36,20 @@ from karamelo_py.points.laws.temperatures import (
 from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
 from karamelo_py.script.errors import ScriptError, unknown
 
-WARMER = 1.0, 100.0, 1000.0  # than a point that is tried
+WARMER = 1.0, 100.0, 1000.0  # than a test point
 
 # --- the parts, as a script names them --------------------------------------------------------
 
 
 class Eos:
-    """For signatures: an equation of state that the script has named."""
+    """For signatures: an equation of state named in the script."""
 
     script_kind: ClassVar[str] = "the ID of an equation of state"
     kind: ClassVar[str] = "eos"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """The part that `argument` names."""
+        """Return the part that `argument` names."""
         return look_up(hub.parts[cls.kind], argument)
 
 
@@ -61,13 +61,13 @@ class Strength(Eos):
 
 
 class Option:
-    """For signatures: a part that may be left out."""
+    """For signatures: an optional part."""
 
     script_kind: ClassVar[str] = "the ID of a damage or of a temperature"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """The part that `argument` names."""
+        """Return the part that `argument` names."""
         word = argument.word()
         optional = {
             kind: named for kind, named in hub.parts.items() if kind not in ("eos", "strength")
@@ -96,15 +96,15 @@ class EosStrength(NamedTuple):
     Parameters
     ----------
     eos
-        ID of an equation of state, which has the density too.
+        ID of an equation of state, which also sets the density.
     strength
         ID of a strength.
     parts
-        ID of a damage, ID of a temperature, in either order; each may be left out.
+        ID of a damage, ID of a temperature, in either order; both optional.
     strain
-        ``rate``: the strain of a step is the symmetric part of dt grad v, and s turns by the skew
-        part. ``logarithmic``: the elastic part of s is the logarithm of a stretch, which steps of
-        any size take along exactly.
+        ``rate``: the strain of a step is the symmetric part of dt grad v, and the skew part rotates
+        s. ``logarithmic``: the elastic part of s is based on the logarithm of the elastic stretch,
+        which is updated exactly for steps of any size.
 
     Example
     -------
@@ -115,12 +115,13 @@ class EosStrength(NamedTuple):
 
     Notes
     -----
-    sigma = s - p I. The deviatoric stress s turns with the point (Jaumann rate; Hughes & Winget
-    1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992). With small
-    steps both agree, except in large elastic shear. The elastic strain is that of s plus ln J / 3.
-    J is the volume over the reference volume; for soils, its elastic part. The strain energy is
-    what unloading gives back, without plastic work, which compute dissipated_energy measures. If
-    fix initial_stress sets a pressure, points get the volume that has this pressure.
+    sigma = s - p I. The deviatoric stress s rotates with the point (Jaumann rate; Hughes & Winget
+    1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992). For small
+    steps both agree, except at large elastic shear. The elastic strain is the strain of s plus
+    ln J / 3. J is the volume over the reference volume; for soils, its elastic part. The strain
+    energy is the energy recovered on unloading, without plastic work, which compute
+    dissipated_energy measures. If fix initial_stress sets a pressure, points get the volume with
+    this pressure.
 
     See Also
     --------
@@ -134,8 +135,8 @@ class EosStrength(NamedTuple):
     viscosity: Any = Absent()
     damage: Any = Absent()
     temperature: Any = Absent()
-    strain: Any = Absent()  # by rates
-    further: Any = Absent()  # of other kinds
+    strain: Any = Absent()  # default: rates
+    further: Any = Absent()  # other kinds
 
     syntax = "eos, strength[, damage][, temperature][, strain=logarithmic]"
 
@@ -147,7 +148,7 @@ class EosStrength(NamedTuple):
         *parts: Option,
         strain: Literal["rate", "logarithmic"] = "rate",
     ):
-        """The law of the parts that a script has named, each in the place of its kind."""
+        """Make the law from the parts that a script has named, each by its kind."""
         kinds: dict[str, Any] = {}
         for part in parts:
             if part.kind in kinds:
@@ -166,7 +167,7 @@ class EosStrength(NamedTuple):
 column(EosStrength, "dissipated", laws.dissipated_energy)
 
 
-# --- parts that never act, told by `check` ------------------------------------------------------
+# --- parts without effect, reported by `check` --------------------------------------------------
 
 
 def _idle_damage(law, scene):
@@ -177,7 +178,7 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """Tell that strength, pressure and damage depend on no temperature, and no one reads it."""
+    """Report a temperature that affects neither strength, pressure nor damage, and is not read."""
     pressures = getattr(law.eos, "thermal", 0), getattr(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
@@ -188,7 +189,7 @@ def _idle_heat(law, scene):
 
 
 def _strained(law, heat):
-    """Give flow stress and damage of a point after a plastic strain, at a temperature."""
+    """Return flow stress and damage of a point after a plastic strain, at a temperature."""
     strength, damage, strain, found = law.strength, law.damage, 0.1, []
     if damage_after.defined(type(damage)):
         found.append(damage_after(damage, initial_damage(damage, 1.0), strain, 1.0, heat, 1.0))
@@ -246,7 +247,7 @@ known_failure(
 
 
 def _locks(law, scene):
-    """Tell whether a body flows without a change of volume in load steps, which cells cannot."""
+    """Return True if a body flows at constant volume in load steps, which linear cells cannot."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.axisymmetric
     flows = strengths.equivalent_plastic_strain.defined(type(law.strength))
     by_shear = flows and not strengths.pressure_response.defined(type(law.strength))
@@ -268,7 +269,7 @@ known_failure(
 
 
 class Memory(NamedTuple):
-    """States of the parts of a law at one point: tuples, empty for parts without."""
+    """States of the parts of a law at one point: tuples, empty for parts without a state."""
 
     energy: Any  # of the equation of state
     viscous: Any  # viscous pressure
@@ -329,12 +330,12 @@ def _advance_beside_eos_strength(law, kin, state, dl, dt, beside):
 
 
 def carried_along(law, kin, s, dl):
-    """Carry the deviatoric stress along with an increment; and find the strain that adds to it."""
+    """Update the deviatoric stress for an increment, and return the strain that adds to it."""
     if isinstance(law.strain, Absent):
-        # What flows is in balance with the strain at the end of the step, which has not turned.
+        # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = getattr(law.strength, "rebounds", False)
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
-    # The part of the old strain that turns is in the difference.
+    # The difference contains the rotation of the old strain.
     e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))
     return s, elastic_trial(law.strain, e, dl) - e
 
@@ -351,19 +352,19 @@ def intact_pressure(law, j, m):
 
 
 def volume_energy(law, j, m):
-    """Energy of the change of volume of the intact material, at its temperature."""
+    """Energy of the volume change of the intact material, at its temperature."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     energy = eos.compression_energy(law.eos, elastic, m.energy)
     energy -= eos.stored_heat(law.eos, sum(m.loss))
     warm = sum(thermal_pressure(law.temperature, m.heat))
-    if len(m.heat):  # what the equation of state itself adds for it
+    if len(m.heat):  # the thermal pressure of the equation of state
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
     return energy + warm * (1 - j)
 
 
 def full_pressure(law, j, m):
-    """The pressure in the stress: damage takes of tension, not of compression."""
+    """The pressure in the stress: damage reduces tension, not compression."""
     p = intact_pressure(law, j, m)
     return where(p < 0, p * borne_share(law, m.damage), p) + sum(m.viscous)
 
@@ -376,10 +377,10 @@ def sound(law, j, m):
 
 
 def unborne(law, j, m):
-    """The part of the squared speed of sound that damage takes.
+    """The reduction of the squared speed of sound by damage.
 
-    A broken point in tension has no waves, however large it has grown. Where it closes again, at
-    its first volume, it has those of rubble; it always counts with these, as it may close soon.
+    A broken point in tension has no waves, however far it has expanded. When it closes again, at
+    its initial volume, it has the waves of rubble; these always count, as it may close soon.
     """
     if isinstance(law.damage, Absent):
         return 0
@@ -393,7 +394,7 @@ def unborne(law, j, m):
 
 
 def viscous_after(law, j, m, rate):
-    """Viscous pressure (q,) at a rate of volume change, or ()."""
+    """Viscous pressure (q,) for a rate of volume change, or ()."""
     if isinstance(law.viscosity, Absent):
         return ()
     density = 1 / (laws.specific_volume(law.eos) * j)
@@ -404,12 +405,12 @@ def viscous_after(law, j, m, rate):
 
 
 def borne_share(law, memory):
-    """The share of a stress or energy that the damaged material bears, 1 - D."""
+    """The fraction of stress or energy that the damaged material sustains, 1 - D."""
     return 1 if isinstance(law.damage, Absent) else integrity(law.damage, memory)
 
 
 def broken_further(law, m, strain, s, j, dt):
-    """Memory of the damage after an increment of plastic strain; () where nothing breaks."""
+    """Memory of the damage after an increment of plastic strain; () if nothing breaks."""
     if isinstance(law.damage, Absent):
         return ()
     p = intact_pressure(law, j, m)
@@ -420,7 +421,7 @@ def broken_further(law, m, strain, s, j, dt):
 
 
 def released(law, kin, j, s, m, broken):
-    """Stored energy that an increment of damage sets free."""
+    """Stored energy released by an increment of damage."""
     if isinstance(law.damage, Absent):
         return 0
     shear = j * strengths.shear_energy(law.strength, kin, s)
@@ -430,7 +431,7 @@ def released(law, kin, j, s, m, broken):
 
 
 def stress_left(law, state):
-    """The deviatoric stress that damage leaves, (1 - D) s."""
+    """The deviatoric stress after damage, (1 - D) s."""
     return borne_share(law, state.m.damage) * state.s
 
 
@@ -475,7 +476,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
 
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """Return the energy that unloading at this temperature frees: plastic work is not stored."""
+    """Return the energy released by unloading at this temperature, without plastic work."""
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0
@@ -504,7 +505,7 @@ def _shown_remembered(what, law, kin, state):
 
 @laws.with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
-    # Pressure follows from volume, so the point gets the volume that has this pressure.
+    # Pressure follows from volume, so the point gets the volume with this pressure.
     J, _, m = state
     stress = symmetric_tensor(kin, stress)
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)

@@ -1,9 +1,9 @@
-"""Parts of a composed law of further kinds, which a plug-in may bring: any number of them.
+"""Further parts of a composed law, of kinds that plug-ins may define: any number of them.
 
-Lowering adds one itself when asked: the rate of plastic strain, for output.
+Lowering adds one itself on request: the plastic strain rate, for output.
 
-A part is a NamedTuple of parameters (its class is the tag). It may remember numbers of its own, and
-add a pressure. What is not defined for a class is that of a part that remembers and adds nothing.
+A part is a NamedTuple of parameters (its class is the tag). It may have a memory, and add a
+pressure. By default a part has no memory and adds nothing.
 """
 
 from functools import reduce
@@ -32,7 +32,7 @@ def chained(parts: list) -> NamedTuple:
 
 @point_function(otherwise=True)
 def initial_part(part, like):
-    """The memory of a point without a past."""
+    """The initial memory of a point."""
     return ()
 
 
@@ -52,7 +52,7 @@ def part_pressure(part, memory):
 
 
 def initial_further(parts, like):
-    """Memory of the first part, and that of the others; () of none."""
+    """Memory of the first part, and of the rest; () without parts."""
     if isinstance(parts, Absent):
         return ()
     return initial_part(parts.part, like), initial_further(parts.rest, like)
@@ -68,19 +68,19 @@ def further_after(parts, memory, law, kin, j, s, memories, dt):
 
 
 def further_pressure(parts, memory, p):
-    """p and what all parts add to it."""
+    """p plus the pressure of all parts."""
     if isinstance(parts, Absent):
         return p
     own, rest = memory
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, own)))
 
 
-# Karamelo smooths over the time in which sound goes through this many cells.
+# Karamelo smooths over the time in which sound crosses this many cells.
 CELLS = 1000
 
 
 class PlasticRate(NamedTuple):
-    """Rate of the equivalent plastic strain, smoothed over a time."""
+    """Rate of the equivalent plastic strain, smoothed over time."""
 
     in_lanes = True
 
@@ -98,7 +98,7 @@ class RateMemory(NamedTuple):
     """State of a point."""
 
     rate: Any
-    ep: Any  # plastic strain, -1 where none is known yet
+    ep: Any  # plastic strain, -1 if not known yet
 
 
 initial_part.on(PlasticRate)(lambda part, like: RateMemory(0.0, -1.0))
@@ -129,7 +129,7 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """A law that keeps its rate behind all that it keeps else; `h` is the cell size."""
+    """A law that also stores its rate, after its other memory; `h` is the cell size."""
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))
@@ -137,7 +137,7 @@ def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
 
 
 def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
-    """The kinds of a law (`law_kind`) as they are when nobody asks for the rate."""
+    """The kinds of a law (`law_kind`) without the rate."""
     if PlasticRate not in kinds:
         return kinds
     k = kinds.index(PlasticRate)

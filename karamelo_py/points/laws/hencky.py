@@ -1,4 +1,4 @@
-"""material hencky: elasticity by logarithmic strain."""
+"""material hencky: elasticity in logarithmic strain."""
 
 from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.points import laws
@@ -8,7 +8,7 @@ from karamelo_py.points.laws.elastic import Hyperelastic
 
 
 class Hencky(Hyperelastic):
-    """Elastic solid whose stress follows the logarithmic strain, at any strain and rotation.
+    """Elastic solid with a stress linear in logarithmic strain, for any strain and rotation.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ class Hencky(Hyperelastic):
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
         Heat capacity per mass, and conductivity; both or neither. With them points have a
-        temperature, at first that of their solid.
+        temperature, initially the temperature of their solid.
     alpha
         Coefficient of linear expansion.
 
@@ -33,11 +33,11 @@ class Hencky(Hyperelastic):
     Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I with the left stretch V, ln V = 1/2 ln F
     F^T. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
     Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). It
-    is Hooke's law in the strains that add up, and the elastic part of most soil plasticity at large
+    is Hooke's law in additive strains, and the elastic part of most soil plasticity at large
     strain.
 
-    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
-    T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the initial
+    temperature T0. The elastic strain does not contain the expansion alpha (T - T0).
 
     See Also
     --------

@@ -10,7 +10,7 @@ from karamelo_py.points.laws.elastic import ElasticLaw
 
 
 class LinearElastic(ElasticLaw):
-    """Hooke's law in rate form: the stress rate follows the strain rate, and turns with the point.
+    """Hooke's law in rate form: the stress rate follows the strain rate and the rotation.
 
     Parameters
     ----------
@@ -22,12 +22,12 @@ class LinearElastic(ElasticLaw):
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
         Heat capacity per mass, and conductivity; both or neither. With them points have a
-        temperature, at first that of their solid.
+        temperature, initially the temperature of their solid.
     alpha
         Coefficient of linear expansion.
     rate
-        ``jaumann``: the stress turns with the point, as it must. ``none``: it does not, as in
-        Karamelo; only to repeat results of programs that leave the turn out.
+        ``jaumann``: the stress rotates with the point, as it should. ``none``: it does not, as in
+        Karamelo; only to reproduce results of programs that omit the rotation.
 
     Example
     -------
@@ -38,10 +38,10 @@ class LinearElastic(ElasticLaw):
     -----
     sigma' = R sigma R^T + 2 G d + lambda tr(d) I (Jaumann rate; Hughes & Winget 1980). d is the
     strain increment and R the rotation increment of the step. For strains above ten per cent a
-    hyperelastic law such as neo-hookean is the better model. One dimension means uniaxial strain.
+    hyperelastic law such as neo-hookean is the better model. In 1D, strain is uniaxial.
 
-    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
-    T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the initial
+    temperature T0. The elastic strain does not contain the expansion alpha (T - T0).
 
     See Also
     --------
@@ -63,13 +63,13 @@ class LinearElastic(ElasticLaw):
         *,
         rate: Literal["jaumann", "none"] = "jaumann",
     ):
-        """The law from Young's modulus and Poisson's ratio; with a temperature where it has one."""
+        """Make the law from Young's modulus and Poisson's ratio, and optional thermal constants."""
         law = cls if rate == "jaumann" else FixedFrame
         return super(LinearElastic, law).given(rho, E, nu, cp, kappa, alpha)
 
 
 class FixedFrame(LinearElastic):
-    """The same law without the turn: its stress stays behind when a point turns (Karamelo's)."""
+    """Linear elasticity whose stress does not rotate with the point (Karamelo's)."""
 
     __slots__ = ()
     rebounds = False
@@ -111,13 +111,13 @@ def _kirchhoff_stress_linear_elastic(law, kin, state):
 
 @laws.wave_speed_squared.on(LinearElastic)
 def _wave_speed_squared_linear_elastic(law, kin, state):
-    # (lam + 2 G) / rho: the moduli are constant, the volume per mass has grown by det F
+    # (lam + 2 G) / rho: constant moduli, and a volume per mass that has grown by det F
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
 @laws.elastic_strain.on(LinearElastic)
 def _elastic_strain_linear_elastic(law, kin, state):
-    # Hooke's law is isotropic and turns with the point, so the strain follows from the stress.
+    # Hooke's law is isotropic and rotates with the point, so the strain follows from the stress.
     mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
     return 0.5 / law.G * (state.sigma - mean * I)
 

@@ -1,4 +1,4 @@
-"""Logarithmic elastic strains, of laws that follow steps of any size and turn."""
+"""Logarithmic elastic strains, for laws that handle steps of any size and rotation."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from karamelo_py.points.kinematics.principal import exponential_of, logarithm_of
 
 
 class Logarithmic(NamedTuple):
-    """Tag: elastic strain is ln V, of the elastic part V of the left stretch."""
+    """Tag: elastic strain is ln V, with the left elastic stretch V."""
 
     in_lanes = True
     scalarised = ("elastic_trial",)
@@ -15,12 +15,12 @@ class Logarithmic(NamedTuple):
 
 @point_function()
 def elastic_trial(strain, e, dl):
-    """Elastic strain `e` after an increment, were it all elastic.
+    """Elastic strain `e` after an increment that is assumed to be elastic.
 
-    V becomes that of (I + dl) V: 1/2 ln[(I + dl) exp(2 e) (I + dl)^T] (Simo 1992, "Algorithms for
-    static and dynamic multiplicative plasticity that preserve the classical return mapping schemes
-    of the infinitesimal theory", Comput. Methods Appl. Mech. Eng. 99). Steps of any size are exact,
-    and what turns takes its strain along.
+    V becomes the left stretch of (I + dl) V: 1/2 ln[(I + dl) exp(2 e) (I + dl)^T] (Simo 1992,
+    "Algorithms for static and dynamic multiplicative plasticity that preserve the classical return
+    mapping schemes of the infinitesimal theory", Comput. Methods Appl. Mech. Eng. 99). Steps of any
+    size are exact, and the strain rotates with the point.
     """
 
 

@@ -9,7 +9,7 @@ from karamelo_py.points.laws.elastic import Hyperelastic
 
 
 class NeoHookean(Hyperelastic):
-    """Compressible neo-Hookean solid, right at any strain and rotation.
+    """Compressible neo-Hookean solid, valid for any strain and rotation.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class NeoHookean(Hyperelastic):
         Poisson's ratio at small strain, above -1 and below 0.5.
     cp, kappa
         Heat capacity per mass, and conductivity; both or neither. With them points have a
-        temperature, at first that of their solid.
+        temperature, initially the temperature of their solid.
     alpha
         Coefficient of linear expansion.
 
@@ -35,8 +35,8 @@ class NeoHookean(Hyperelastic):
     First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T. Stored energy W = G/2 (tr
     F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
 
-    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the temperature
-    T0 at the start. The elastic strain does not contain the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the initial
+    temperature T0. The elastic strain does not contain the expansion alpha (T - T0).
 
     See Also
     --------
@@ -62,7 +62,7 @@ def _wave_speed_squared_neo_hookean(law, kin, state):
 
 @laws.wave_speed_bound.on(NeoHookean)
 def _wave_speed_bound_neo_hookean(law, kin, state):
-    # Without a series: 1 / J is above 1 - ln J (by 2 % at J = 0.8), and J / e^2 above its negative.
+    # Avoids the logarithm: 1/J > 1 - ln J (by 2 % at J = 0.8), and J / e^2 > -(1 - ln J).
     J = det(state.F)
     return speed_squared(law, state.F, max(law.lam / J, -law.lam * J * exp(-2)))
 

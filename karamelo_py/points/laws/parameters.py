@@ -1,11 +1,11 @@
-"""Parameters that several laws have: their checks, moduli, and numbers in a row."""
+"""Checks and conversions of parameters of several laws, and sequences of numbers."""
 
 from dataclasses import dataclass
 
 from karamelo_py.language.rules import known_failure
 from karamelo_py.script.errors import ScriptError
 
-LOCKED = 0.49  # Poisson's ratio from where on hat functions are a fifth too stiff
+LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 
 
 def lame_parameters(E: float, nu: float) -> tuple[float, float]:
@@ -20,7 +20,7 @@ def lame_parameters(E: float, nu: float) -> tuple[float, float]:
 
 
 def tell_of_locking(law: type) -> None:
-    """Warn of `law`, with fields ``lam`` and ``G``, where its volume hardly changes."""
+    """Warn of a nearly incompressible `law`, with fields ``lam`` and ``G``."""
 
     def keeps_volume(law, scene):
         nu = law.lam / (2 * (law.lam + law.G))
@@ -49,7 +49,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """The reference rate of 1 + `factor` ln(rate/epsdot0), not 0; any where that is always 1."""
+    """The reference rate in 1 + `factor` ln(rate/epsdot0), not 0; arbitrary if `factor` is 0."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
@@ -63,10 +63,10 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 
 @dataclass(frozen=True)
 class Numbers:
-    """Numbers in a row, a curve or a formula, which do not change; kernels see an array.
+    """Constant sequence of numbers, a curve or a formula; kernels see an array.
 
-    Laws of one kind may have rows of different lengths: the shorter ones are filled up with their
-    last number, so that a law that has to know the length keeps it beside.
+    Laws of one kind may have sequences of different lengths: the shorter ones are padded with their
+    last number, so a law that needs the length stores it separately.
     """
 
     values: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""material rigid: a body that moves as it is told. Its state is empty."""
+"""material rigid: a body with prescribed velocity. Its state is empty."""
 
 from typing import Annotated, NamedTuple
 
@@ -8,7 +8,7 @@ from karamelo_py.points.kinematics import nothing
 
 
 class Rigid(NamedTuple):
-    """A body that moves as it is told, whatever it meets.
+    """A body with prescribed velocity that nothing can deform or deflect.
 
     Parameters
     ----------
@@ -21,17 +21,16 @@ class Rigid(NamedTuple):
 
     Notes
     -----
-    Each point keeps the velocity that fix initial_velocity_particles or fix velocity_particles
-    gives it. Forces, contact and velocities of nodes do not change it. There is no stress, and no
-    limit of the time step but that a point stays within a cell.
+    Each point retains the velocity set by fix initial_velocity_particles or fix velocity_particles.
+    Forces, contact and nodal velocities do not change it. There is no stress. The time step is
+    limited only in that a point must stay within a cell.
 
-    In ulmpm and ulcpdi nodes that see points of the body have its velocity, whatever its density.
-    In ulmpm/contacts contact does not move it. These methods publish the force on the solid ID as
-    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z. The torque about the origin is
+    In ulmpm and ulcpdi, nodes around points of the body have its velocity, whatever its density. In
+    ulmpm/contacts, contact does not move it. These methods publish the force on the solid ID as
+    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and the torque about the origin as
     ContactTorque_ID_x and so on.
 
-    Domains of points that deform with the grid (CPDI, cpgimp) would not stay rigid, and are
-    refused.
+    Point domains that deform with the grid (CPDI, cpgimp) would not stay rigid, and are refused.
 
     See Also
     --------
@@ -44,7 +43,7 @@ class Rigid(NamedTuple):
 
     @classmethod
     def given(cls, rho: Annotated[float, Positive]):
-        """The law from the density."""
+        """Make the law from the density."""
         return cls(1 / rho)
 
 

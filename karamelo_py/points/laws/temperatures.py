@@ -1,8 +1,8 @@
-"""Temperature of one point, as far as the law itself changes it.
+"""Temperature of one point, as changed by the law itself.
 
 A temperature is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). Its memory is the temperature itself (`Warm`), which the
-other parts see as `heat`: () where the law has no temperature.
+other parts get as `heat`: () if the law has no temperature.
 """
 
 from typing import Annotated, NamedTuple
@@ -14,14 +14,14 @@ from karamelo_py.points.laws.parameters import check_temperatures
 
 
 class Warm(NamedTuple):
-    """Temperature of a point of a law that has one."""
+    """Temperature of a point, for laws with a temperature."""
 
     T: float
 
 
 @point_function(otherwise=True)
 def initial_heat(temperature, like):
-    """Warm(T) at the start, or ()."""
+    """Initial Warm(T), or ()."""
     return ()
 
 
@@ -33,17 +33,17 @@ def heated(temperature, heat, work):
 
 @point_function(otherwise=True)
 def thermal_pressure(temperature, heat):
-    """(p,), the pressure of the temperature, or ()."""
+    """(p,), the thermal pressure, or ()."""
     return ()
 
 
 def temperature_or(heat, otherwise):
-    """The temperature, or `otherwise` where the law has none."""
+    """The temperature, or `otherwise` if the law has none."""
     return heat.T if len(heat) else otherwise
 
 
 def at_temperature(heat, T):
-    """Warm(T), or () where the law has no temperature."""
+    """Warm(T), or () if the law has no temperature."""
     return Warm(T) if len(heat) else ()
 
 
@@ -53,24 +53,23 @@ def homologous(heat, Tr, Tm):
 
 
 class PlasticWork(NamedTuple):
-    """Heating by plastic work, and the pressure that heat makes.
+    """Heating by plastic work, and thermal pressure.
 
     Parameters
     ----------
     chi
-        Share of plastic work that becomes heat (Taylor & Quinney 1934), often 0.9.
+        Fraction of plastic work converted to heat (Taylor & Quinney 1934), often 0.9.
     cp
         Heat capacity per mass.
     kappa
-        Conductivity, by which heat flows with ``method(..., thermo-mechanical)``; without, heat
-        stays where it is made.
+        Conductivity, for heat flow with ``method(..., thermo-mechanical)``; otherwise heat stays
+        where it is generated.
     alpha
         Pressure per kelvin: 3 K times the coefficient of linear expansion, with the bulk modulus K.
     T0
-        Temperature without thermal pressure, at which points start where their solid does not
-        say otherwise.
+        Temperature without thermal pressure, and initial temperature unless the solid has another.
     Tm
-        Melting temperature, from which on there is no heating.
+        Melting temperature, from which there is no heating.
 
     Example
     -------
@@ -78,9 +77,9 @@ class PlasticWork(NamedTuple):
 
     Notes
     -----
-    T grows by chi/(rho0 cp) times the plastic work per volume before deformation. The pressure
-    grows by alpha (T - T0), so a warm body that cannot expand is under pressure. The column T of
-    dumps shows the temperature.
+    T grows by chi/(rho0 cp) times the plastic work per reference volume. The pressure grows by
+    alpha (T - T0), so a warm body that cannot expand is under pressure. The dump column T shows the
+    temperature.
 
     See Also
     --------
@@ -97,7 +96,7 @@ class PlasticWork(NamedTuple):
     Tm: float
 
     def checked(self):
-        """The law, after a look at its temperatures."""
+        """Return the law after a check of its temperatures."""
         check_temperatures(self.T0, self.Tm, "T0")
         return self
 

@@ -1,4 +1,4 @@
-"""Elastic laws with a temperature: they expand, and know what conduction has to know."""
+"""Elastic laws with a temperature: thermal expansion, and constants for conduction."""
 
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ class Expansion(NamedTuple):
 
 
 class Thermoelastic(NamedTuple):
-    """An elastic law and its temperature; the state is that of the elastic law, then T."""
+    """An elastic law and its temperature; the state is the state of the elastic law, then T."""
 
     in_lanes = True
     rebounds = True
@@ -42,7 +42,7 @@ suggestion(
 
 
 def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> NamedTuple:
-    """An elastic law with a temperature where heat capacity and conductivity are given."""
+    """An elastic law, with a temperature if heat capacity and conductivity are given."""
     if cp is None or kappa is None:
         if cp is not None:
             raise ScriptError(
@@ -67,7 +67,7 @@ def _thermal_pressure_expansion(heat, T):
 class State(NamedTuple):
     """State of a point."""
 
-    elastic: Any  # that of the elastic law
+    elastic: Any  # state of the elastic law
     T: Any  # temperature
 
 
@@ -98,7 +98,7 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
 
 
 def of_elastic_law(function) -> None:
-    """Let a function of a state be that of the elastic law."""
+    """Apply a function of the elastic law to the elastic part of a state."""
 
     @function.on(Thermoelastic)
     def _of_elastic_law(law, kin, state):
@@ -113,7 +113,7 @@ of_elastic_law(laws.wave_speed_bound)
 
 @laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
-    """Return the energy that unloading at this temperature frees."""
+    """Return the energy released by unloading at this temperature."""
     j = laws.jacobian(law, kin, state)
     elastic = laws.energy_density(law.elastic, kin, state.elastic)
     return elastic + expansion_pressure(law, state) * (1 - j)

@@ -1,7 +1,7 @@
 """Artificial viscosity of one point, which spreads shocks over a few cells.
 
-It is a part of a composed law (`karamelo_py.points.laws.eos_strength`) that an equation of state
-brings. Its memory is (q,), the viscous pressure.
+It is a part of a composed law (`karamelo_py.points.laws.eos_strength`), added by an equation of
+state. Its memory is (q,), the viscous pressure.
 """
 
 from math import sqrt
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class ArtificialViscosity(NamedTuple):
-    """q = rho h (Q1 h d^2 - Q2 c d) where the rate of volume change d is negative."""
+    """q = rho h (Q1 h d^2 - Q2 c d) for a negative rate of volume change d."""
 
     in_lanes = True
 
@@ -19,12 +19,12 @@ class ArtificialViscosity(NamedTuple):
 
 
 def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
-    """The part that an equation of state with these coefficients brings; none where both are 0."""
+    """The part for an equation of state with these coefficients; none if both are 0."""
     return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
 
 
 def viscous_pressure(viscosity, rate, density, sound):
-    """Viscous pressure at a rate of volume change, positive in compression."""
+    """Viscous pressure for a rate of volume change, positive in compression."""
     closing = max(-rate, 0)
     h = viscosity.cell_size
     return density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound)

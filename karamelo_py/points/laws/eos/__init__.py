@@ -1,15 +1,15 @@
 """Equations of state of one point: pressure from volume.
 
 An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
-the volume over the reference volume, `heat` the temperature (`Warm`), or () where the law has none.
-What it remembers of the past is its memory, a tuple, nothing for most. It also has a
-`specific_volume`, as a law does. Where these are not usual, a class has
+(`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is the
+volume over the reference volume, `heat` the temperature (`Warm`), or () if the law has none. Its
+memory is a tuple, empty for most. It also has a `specific_volume`, like a law. Class attributes
+that differ from the defaults:
 
 any_speed
-    whether bodies bear to move many times as fast as waves;
+    whether bodies may move many times faster than waves;
 least_density
-    below which, in kg/m^3, units are likely wrong.
+    in kg/m^3, below which units are likely wrong.
 """
 
 from typing import Annotated, NamedTuple
@@ -20,13 +20,13 @@ from karamelo_py.language.signature import Positive
 
 @point_function(otherwise=True)
 def initial_energy(eos, like):
-    """The memory of a point without a past, in the number type of `like`."""
+    """The initial memory of a point, in the number type of `like`."""
     return ()
 
 
 @point_function(otherwise=True)
 def compressed(eos, memory, before, j, heating):
-    """The memory after the volume ratio went from `before` to j, and heating by work.
+    """The memory after the volume ratio changed from `before` to j, with heating by work.
 
     `heating` is per reference volume: plastic and viscous work.
     """
@@ -35,13 +35,13 @@ def compressed(eos, memory, before, j, heating):
 
 @point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
-    """(heat,) that internal energy in the memory takes of `heat`; () where there is none."""
+    """(heat,), the part of `heat` that internal energy in the memory takes; () without."""
     return ()
 
 
 @point_function(otherwise=True)
 def stored_heat(eos, loss):
-    """Return the dissipated energy that is in the memory and so in `compression_energy`."""
+    """Return the dissipated energy that is in the memory and thus in `compression_energy`."""
     return loss - loss
 
 
@@ -52,7 +52,7 @@ def pressure(eos, j, memory, heat):
 
 @point_function()
 def bulk_modulus(eos, j, memory, heat):
-    """-j dp/dj, the stiffness against a further change of volume."""
+    """-j dp/dj, the stiffness against a further volume change."""
 
 
 @point_function()
@@ -62,7 +62,7 @@ def compression_energy(eos, j, memory):
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """The volume ratio at which the pressure is p, or is nearest to it."""
+    """The volume ratio at which the pressure is p, or nearest to it."""
 
 
 @point_function(otherwise=True)
@@ -72,7 +72,7 @@ def at_pressure(eos, j, memory, p, heat):
 
 
 class LinearPressure(NamedTuple):
-    """Pressure in proportion to the change of volume.
+    """Pressure proportional to the volume change.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class LinearPressure(NamedTuple):
 
     @classmethod
     def given(cls, rho0: Annotated[float, Positive], K: Annotated[float, Positive]):
-        """The law from density and bulk modulus."""
+        """Make the law from density and bulk modulus."""
         return cls(1 / rho0, K)
 
 

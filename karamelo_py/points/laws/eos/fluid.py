@@ -1,4 +1,4 @@
-"""eos fluid and ideal-gas: liquids by Tait's equation, gases whose energy follows from work."""
+"""eos fluid and ideal-gas: liquids by Tait's equation, gases with internal energy."""
 
 from math import inf, sqrt
 from typing import Annotated, Any, NamedTuple
@@ -21,8 +21,8 @@ from karamelo_py.points.laws.eos import (
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-LONG = 6.0, 0.5  # times in which a liquid falls, or whirls, by its own size: dams break in 4
-STEP, STRONG = 2.0, 20.0  # ratios of pressures that make a shock, and a strong one
+LONG = 6.0, 0.5  # times to fall, or rotate, by the liquid's size: dam breaks take 4
+STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock, and of a strong one
 
 
 class Tait(NamedTuple):
@@ -37,7 +37,7 @@ class Tait(NamedTuple):
     gamma
         Exponent, 7 for water.
     tension
-        Tension that the liquid bears (0: none); by default what the formula gives, up to K.
+        Tension that the liquid sustains (0: none); default: from the formula, up to K.
 
     Example
     -------
@@ -47,9 +47,9 @@ class Tait(NamedTuple):
     Notes
     -----
     p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is sqrt(K
-    gamma/rho0) at zero pressure. A smaller K than that of the liquid allows longer time steps. The
-    density stays within 1 % if speeds stay below a tenth of the speed of sound. In splashes,
-    tension makes drops swell and cling together. ``tension=0`` lets them separate.
+    gamma/rho0) at zero pressure. A smaller K than the real one allows longer time steps: the
+    density stays within 1 % if speeds stay below 10 % of the speed of sound. In splashes, tension
+    makes drops swell and stick together. ``tension=0`` lets them separate.
 
     See Also
     --------
@@ -63,7 +63,7 @@ class Tait(NamedTuple):
     specific_volume: float  # reference volume per mass
     K: float  # reference pressure; K gamma is the bulk modulus
     gamma: float
-    tension: float = inf  # that the liquid bears; from K on what the formula says
+    tension: float = inf  # sustainable; from K on the formula limits it
 
     @classmethod
     def given(
@@ -74,7 +74,7 @@ class Tait(NamedTuple):
         *,
         tension: Annotated[float, NonNegative] = inf,
     ):
-        """The law from density, reference pressure and exponent."""
+        """Make the law from density, reference pressure and exponent."""
         return cls(1 / rho0, K, gamma, tension)
 
 
@@ -125,7 +125,7 @@ def _compression_energy_tait(eos, j, memory):
     whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
     grown = -logarithm(whole) if exponent == 0 else (1 - power(whole, exponent)) / exponent
     energy = eos.K * (grown - (1 - whole))
-    # From there on at constant tension.
+    # From there, constant tension.
     return energy + eos.tension * (j - whole) if j > whole else energy
 
 
@@ -137,18 +137,18 @@ def _ratio_at_pressure_tait(eos, p, heat):
 
 
 class IdealGas(NamedTuple):
-    """Pressure of an ideal gas without conduction of heat.
+    """Pressure of an ideal gas without heat conduction.
 
     Parameters
     ----------
     rho0
-        Density at the start.
+        Initial density.
     gamma
         Ratio of specific heats, above 1.
     p
-        Pressure at the start.
+        Initial pressure.
     e
-        Internal energy per mass at the start, in the place of p.
+        Initial internal energy per mass, instead of p.
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear, as in eos shock.
 
@@ -159,12 +159,12 @@ class IdealGas(NamedTuple):
     Notes
     -----
     p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. Along an adiabat e grows as
-    rho^(gamma - 1). Each step follows this exactly. Viscous work heats the gas, and so does the
-    kinetic energy that PIC, FLIP, APIC, MLS and TPIC take. Where there are shocks, Q1 = 2 and Q2 =
-    0.2 are usual.
+    rho^(gamma - 1), which each step follows exactly. The gas is heated by viscous work, and by the
+    kinetic energy that PIC, FLIP, APIC, MLS and TPIC dissipate. With shocks, Q1 = 2 and Q2 = 0.2
+    are usual.
 
     The gas has pressure from the first step, so a free surface expands. Fix initial_stress sets the
-    pressure by the energy, and leaves the volume.
+    pressure through the energy, at constant volume.
 
     See Also
     --------
@@ -177,7 +177,7 @@ class IdealGas(NamedTuple):
 
     specific_volume: float  # reference volume per mass
     gamma: float  # ratio of specific heats
-    energy: float  # E at the start, per reference volume
+    energy: float  # initial E, per reference volume
 
     @classmethod
     def given(
@@ -190,7 +190,7 @@ class IdealGas(NamedTuple):
         Q1: Annotated[float, NonNegative] = 0.0,
         Q2: Annotated[float, NonNegative] = 0.0,
     ):
-        """The gas and its artificial viscosity; the memory is its energy."""
+        """Make the gas and its artificial viscosity; the memory is its energy."""
         if not gamma > 1:
             raise ScriptError(
                 f"the ratio of specific heats {gamma:g} is impossible",
@@ -262,13 +262,13 @@ stored_heat.on(IdealGas)(lambda eos, loss: loss)
 
 @compressed.on(IdealGas)
 def _compressed_ideal_gas(eos, memory, before, j, heating):
-    # dE = -p dJ has the solution E J^(gamma - 1) = const, whatever the size of the step.
+    # dE = -p dJ has the solution E J^(gamma - 1) = const, for any step size.
     return InternalEnergy(memory.E * power(before / j, eos.gamma - 1) + heating)
 
 
 @taken_heat.on(IdealGas)
 def _taken_heat_ideal_gas(eos, memory, heat):
-    # A moment may hold a little more than there was: a cold gas does not pay all of that at once.
+    # A moment may hold slightly more than there was: a cold gas does not lose all that at once.
     return (max(heat, -0.1 * memory.E),)
 
 
@@ -289,5 +289,5 @@ def _compression_energy_ideal_gas(eos, j, memory):
 
 @at_pressure.on(IdealGas)
 def _at_pressure_ideal_gas(eos, j, memory, p, heat):
-    # The volume stays, the energy follows; a gas bears no tension.
+    # The volume is constant and the energy follows; a gas sustains no tension.
     return j, InternalEnergy(max(p, 0) * j / (eos.gamma - 1))

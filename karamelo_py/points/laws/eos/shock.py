@@ -16,26 +16,26 @@ from karamelo_py.points.laws.eos import (
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-# S (1 - J) from where on the pressure goes on along its tangent: at 1 the Hugoniot has a pole.
+# S (1 - J) from which the pressure follows its tangent: at 1 the Hugoniot has a pole.
 _STEEPEST = 0.9
 
 
 class Shock(NamedTuple):
-    """Pressure of shocked metals: the Hugoniot curve, heat, and artificial viscosity.
+    """Pressure of shocked metals: Hugoniot curve, thermal pressure and artificial viscosity.
 
     Parameters
     ----------
     rho0
         Density before deformation.
     K
-        Bulk modulus, as Karamelo's scripts have it. Nothing depends on it: the stiffness is that of
-        the Hugoniot curve, rho0 c0^2 at first.
+        Bulk modulus, for compatibility with Karamelo; unused. The initial stiffness is that of the
+        Hugoniot curve, rho0 c0^2.
     c0
         Speed of sound without shear, at zero pressure.
     S
-        Slope of the shock speed U = c0 + S u over the speed u of the material behind the shock.
+        Slope of the shock speed U = c0 + S u over the speed u of the material after the shock.
     Gamma
-        Grueneisen's parameter, of the density before deformation.
+        Grueneisen parameter, at the density before deformation.
     cv
         Heat capacity per mass.
     Tr
@@ -43,8 +43,7 @@ class Shock(NamedTuple):
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
     tension
-        Tension that the material bears before it spalls (0: none); by default what the formula
-        gives.
+        Tension that the material sustains before it spalls (0: none); default: from the formula.
 
     Example
     -------
@@ -59,15 +58,14 @@ class Shock(NamedTuple):
     rho0 c0^2 mu. The curve has a pole at (S - 1) mu = 1. Beyond S (1 - rho0/rho) = 0.9 the pressure
     follows the tangent.
 
-    The pressure is never below -tension: material spalls, its voids open at constant tension, and
-    they close before it bears pressure again. The velocity of a free surface drops by du = 2
-    tension/(rho0 c0) then, in the acoustic approximation (Antoun et al. 2003, Spall Fracture,
-    section 4.2). As the tension goes on acting, the layer that spalls is slowed down further; a
-    damage lets it go.
+    The pressure is never below -tension: the material spalls, its voids open at constant tension,
+    and close before it sustains pressure again. The velocity of a free surface then drops by du = 2
+    tension/(rho0 c0), in the acoustic approximation (Antoun et al. 2003, Spall Fracture, section
+    4.2). The remaining tension slows the spalled layer further; a damage releases it.
 
-    Where the volume shrinks at a rate d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d) is
-    added (von Neumann & Richtmyer 1950; Landshoff 1955). h is the cell size and c the speed of
-    sound. It spreads a shock over a few cells, and shortens the time step.
+    If the volume decreases at a rate d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d) is added
+    (von Neumann & Richtmyer 1950; Landshoff 1955). h is the cell size and c the speed of sound. It
+    spreads a shock over a few cells, and shortens the time step.
 
     See Also
     --------
@@ -82,7 +80,7 @@ class Shock(NamedTuple):
     S: float
     thermal: float  # Gamma rho0 cv, pressure per kelvin above Tr
     Tr: float
-    tension: float = inf  # that the material bears
+    tension: float = inf  # sustainable
 
     @classmethod
     def given(
@@ -99,8 +97,8 @@ class Shock(NamedTuple):
         *,
         tension: Annotated[float, NonNegative] = inf,
     ):
-        """The equation of state and its artificial viscosity."""
-        # K, which is rho0 c0^2, is not used; in the place of c0 it would be.
+        """Make the equation of state and its artificial viscosity."""
+        # K is unused because rho0 c0^2 replaces it; it could only replace c0.
         if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
             raise ScriptError(
                 f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
@@ -126,7 +124,7 @@ known_failure(
 
 
 def tangent_from(eos, j):
-    """The compression 1 - J beyond which pressure is a straight line."""
+    """The compression 1 - J beyond which the pressure is linear."""
     return where(_STEEPEST < eos.S, _STEEPEST / max(eos.S, _STEEPEST), _STEEPEST)
 
 
@@ -165,7 +163,7 @@ def _bulk_modulus_shock(eos, j, memory, heat):
 
 @compression_energy.on(Shock)
 def _compression_energy_shock(eos, j, memory):
-    # Beyond the volume ratio at which cold material has its tension, that is constant.
+    # Beyond the volume ratio at which cold material reaches its tension, that is constant.
     most = min(eos.tension, eos.modulus)
     bounded = most < eos.modulus
     whole = where(bounded, eos.modulus / where(bounded, eos.modulus - most, 1), inf)
@@ -179,7 +177,7 @@ def _compression_energy_shock(eos, j, memory):
     log_of = logarithm(where(in_tension, j, flat))
     # From J to 1 rho0 c0^2 (1 - J) / J in tension; the closed form is a small difference near 1.
     few = inside * inside * (0.5 + y * (2 / 3 + 0.75 * y))
-    log_of_flat = log_of + ((1 - flat) - y) / flat  # y is not what 1 - y is rounded to
+    log_of_flat = log_of + ((1 - flat) - y) / flat  # corrects the rounding of 1 - y
     energy = where(near, few, (y / flat + log_of_flat) / where(near, 1, eos.S * eos.S))
     slope = (1 + y) / (flat * flat * flat)
     further = closed - inside

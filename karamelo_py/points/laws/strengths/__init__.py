@@ -1,21 +1,21 @@
 """Strength of one point: deviatoric stress from strain. One file each.
 
 A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). What it remembers of the past (plastic strain and
-the like) is its memory, a NamedTuple of as many numbers as it needs, none at best (`remembers`).
-`heat` is the temperature (`Warm`), or () where the law has none.
+(`karamelo_py.points.laws.eos_strength`). Its memory (plastic strain and the like) is a NamedTuple
+of as many numbers as needed, preferably none (`remembers`). `heat` is the temperature (`Warm`), or
+() if the law has none.
 
-Strengths that depend on pressure, and change the volume, have `pressure_response` in the place of
-`shear_response` (`karamelo_py.points.laws.strengths.frictional`). What is not defined for a class
-is that of an elastic strength with a shear modulus ``G`` that remembers nothing. Where these are
-not usual, a class has
+Strengths that depend on pressure, and change the volume, define `pressure_response` instead of
+`shear_response` (`karamelo_py.points.laws.strengths.frictional`). The defaults are those of an
+elastic strength with a shear modulus ``G`` and no memory. Class attributes that differ from the
+defaults:
 
 rebounds
     True: it never yields;
 flows
-    True: a body of it has no shape of its own, as liquids and soils;
+    True: a body of it has no stable shape, like liquids and soils;
 rings
-    False: nor does it vibrate.
+    False: it does not vibrate.
 """
 
 import sys
@@ -28,25 +28,25 @@ from karamelo_py.points.laws import column
 
 
 class Remembered(NamedTuple):
-    """Tag of a number that a strength remembers, by its place in the memory."""
+    """Tag of a number in the memory of a strength, by its index."""
 
     place: int
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare what `strength` remembers: its memory has these names.
+    """Declare the memory of `strength`: the names of its numbers.
 
     Parameters
     ----------
     strength
         The class.
     **numbers
-        For each number the name of its column, and what it starts from: a value, or the name of a
+        For each number the name of its column, and its initial value: a number, or the name of a
         parameter. ``ep`` is the equivalent plastic strain; it comes first.
     """
     name = f"{strength.__name__}Memory"
     made = namedtuple(name, numbers, module=strength.__module__)
-    setattr(sys.modules[strength.__module__], name, made)  # kernels on disk name it
+    setattr(sys.modules[strength.__module__], name, made)  # cached kernels refer to it
     starts = tuple(numbers.values())
     parameters = tuple(start if isinstance(start, str) else "" for start in starts)
 
@@ -64,7 +64,7 @@ def remembers(strength: type, **numbers: float | str) -> None:
 
 @point_function(otherwise=True)
 def initial_memory(strength, like):
-    """Memory of a point without a past."""
+    """Initial memory of a point."""
     return ()
 
 
@@ -72,8 +72,8 @@ def initial_memory(strength, like):
 def respond(strength, law, kin, s, strain, j, memories, dt, beside):
     """Deviatoric stress, memory, and work per volume that is not stored, after a step dt.
 
-    `s` is the old deviatoric stress, turned with the point already; `strain`, the increment, is not
-    deviatoric; `memories` are those of all parts of the `law`. With averaged volumes forces have
+    `s` is the old deviatoric stress, already rotated with the point; `strain`, the increment, is
+    not deviatoric; `memories` are the memories of all parts of the `law`. With F-bar, forces have
     `beside` more pressure than the point.
     """
     return shear_response(strength, kin, s, strain, memories.strength, memories.heat, dt)
@@ -81,12 +81,12 @@ def respond(strength, law, kin, s, strain, j, memories, dt, beside):
 
 @point_function()
 def shear_response(strength, kin, s, strain, memory, heat, dt):
-    """The same of strengths that need to know nothing of the other parts."""
+    """As `respond`, for strengths that need nothing from the other parts."""
 
 
 @point_function()
 def pressure_response(strength, kin, s, p, K, strain):
-    """Deviatoric stress and pressure on or within the yield surface, from an elastic trial.
+    """Deviatoric stress and pressure on or inside the yield surface, from an elastic trial.
 
     `K` is the bulk modulus, `strain` the equivalent plastic strain.
     """
@@ -94,9 +94,9 @@ def pressure_response(strength, kin, s, p, K, strain):
 
 @point_function()
 def share_beside(strength, memory):
-    """The share of the averaged pressure that the yield surface takes, with averaged volumes.
+    """The fraction of the averaged pressure that the yield surface uses, with F-bar.
 
-    Left out by strengths that do not depend on pressure.
+    Undefined for strengths that do not depend on pressure.
     """
 
 
@@ -108,19 +108,19 @@ def initial_loss(strength, like):
 
 @point_function(otherwise=True)
 def elastic_ratio(strength, memory, j):
-    """The part of the volume ratio j that is elastic: what makes pressure."""
+    """The elastic part of the volume ratio j, which determines pressure."""
     return j
 
 
 @point_function(otherwise=True)
 def shear_modulus(strength):
-    """Stiffness against a further change of shape, for the speed of waves."""
+    """Stiffness against further shear, for the wave speed."""
     return strength.G
 
 
 @point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
-    """The square of the speed of waves, with what a viscous strength takes of the stable step."""
+    """The squared wave speed, increased by viscosity, which reduces the stable step."""
     return squared
 
 

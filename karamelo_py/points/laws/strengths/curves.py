@@ -1,4 +1,4 @@
-"""Strengths tabulated and formula: a flow stress that the script gives."""
+"""Strengths tabulated and formula: a flow stress given in the script."""
 
 from pathlib import Path
 from typing import Annotated, ClassVar, NamedTuple
@@ -21,15 +21,15 @@ from karamelo_py.script.reading import read_text
 
 
 class Tabulated(NamedTuple):
-    """Flow stress by plastic strain, as measured: straight lines between points of a curve.
+    """Flow stress over plastic strain, from a measured curve with linear interpolation.
 
     Parameters
     ----------
     G
         Shear modulus.
     curve
-        Plastic strain and flow stress, in turn, from strain 0 on. Or the name of a file with a line
-        for each point: two numbers with blanks or a comma between. Lines that begin with # are
+        Pairs of plastic strain and flow stress, from strain 0. Or the name of a file with a line
+        per point: two numbers separated by blanks or a comma. Lines that begin with # are
         comments.
 
     Example
@@ -38,10 +38,9 @@ class Tabulated(NamedTuple):
 
     Notes
     -----
-    Beyond the last point the flow stress stays. It may fall, but not so steeply that a point could
-    not follow: by less than 3 G for each unit of plastic strain. With ``strength(steel, tabulated,
-    80e9, curve.txt)`` the points are read from a file. Each step solves for the plastic strain with
-    the flow stress at its end.
+    Beyond the last point the flow stress is constant. It may fall by less than 3 G per unit of
+    plastic strain. With ``strength(steel, tabulated, 80e9, curve.txt)`` the points are read from a
+    file. Each step solves for the plastic strain with the flow stress at its end.
 
     See Also
     --------
@@ -57,7 +56,7 @@ class Tabulated(NamedTuple):
 
     @classmethod
     def given(cls, G: Annotated[float, Positive], *curve: float | TableFile):
-        """The law from the points of its curve."""
+        """Make the law from the points of its curve."""
         points = _points(curve)
         _check_curve(points, G)
         strain, stress = map(tuple, points.T.tolist())
@@ -128,14 +127,14 @@ DEPTH = 8  # of the stack, a tuple
 class FlowFormula:
     """For signatures: a formula of plastic strain, its rate and temperature, as numbers.
 
-    Two for each instruction: the operation, and the constant or the place of the seed.
+    Two per instruction: the operation, and the constant or the index of the input.
     """
 
     script_kind: ClassVar[str] = "a formula of ep, epdot and T"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Numbers:
-        """The program that `argument` stands for."""
+        """Compile `argument` to instructions."""
         value = argument.value_with(SEEDS)
         if isinstance(value, str):
             raise ScriptError(f"'{value}' is text", place=argument.place)
@@ -159,7 +158,7 @@ class FlowFormula:
 
 
 class FlowStress(NamedTuple):
-    """Flow stress by a formula of plastic strain, its rate, and temperature.
+    """Flow stress from a formula of plastic strain, its rate and temperature.
 
     Parameters
     ----------
@@ -167,9 +166,9 @@ class FlowStress(NamedTuple):
         Shear modulus.
     Y
         The flow stress: a formula of ep, the equivalent plastic strain, epdot, its rate in the
-        step, and T, the temperature. Here these names stand for nothing else.
+        step, and T, the temperature. These names have no other meaning here.
     T
-        Temperature where neither the material nor its solid has one.
+        Temperature, if neither the material nor its solid has one.
 
     Example
     -------
@@ -179,8 +178,8 @@ class FlowStress(NamedTuple):
     Notes
     -----
     Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
-    with a slope from differences. Y may fall with plastic strain, but by less than 3 G per unit. A
-    negative Y counts as 0. A formula is interpreted. It needs no compilation, and ten times the
+    with finite-difference slopes. Y may fall with plastic strain, but by less than 3 G per unit. A
+    negative Y counts as 0. A formula is interpreted: it needs no compilation, but ten times the
     time of a compiled law.
 
     See Also
@@ -201,14 +200,14 @@ class FlowStress(NamedTuple):
         *,
         T: Annotated[float, NonNegative] = 293.0,
     ):
-        """The law from its formula."""
+        """Make the law from its formula."""
         law = cls(G, Y, len(Y) // 2, T)
         _check_formula(law)
         return law
 
 
 def _check_formula(law: FlowStress) -> None:
-    """Refuse a formula that has no value where plastic flow begins, or further on."""
+    """Refuse a formula without a value at the onset of plastic flow, or further on."""
     for ep in (0.0, 1e-3, 0.1, 1.0):
         for epdot in (0.0, 1.0, 1e4):
             Y = value(law, ep, epdot, law.initial_temperature)
@@ -225,7 +224,7 @@ def _check_formula(law: FlowStress) -> None:
 
 
 def value(strength, ep, epdot, T):
-    """The formula at a plastic strain, a rate and a temperature, in double precision."""
+    """The formula at a plastic strain, rate and temperature, in double precision."""
     stack = (0.0,) * DEPTH  # the top first
     for k in range(int(strength.count)):
         op = int(strength.program[2 * k])
@@ -258,5 +257,5 @@ def _flow_stress_flow_stress(strength, memory, known, increment, heat, dt):
     beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)
     flow = max(real(there, increment), 0)
     slope = real((beyond - there) / near, increment)
-    # A slope of -3 G is where there is no solution any more.
+    # With a slope of -3 G or less there is no solution.
     return flow, max(slope, -2 * strength.G)

@@ -1,4 +1,4 @@
-"""strength drucker-prager: cohesion and friction by a cone."""
+"""strength drucker-prager: cohesion and friction as a cone."""
 
 from math import cos, inf, radians, sin, sqrt, tan
 from typing import Annotated, Literal, NamedTuple
@@ -29,7 +29,7 @@ def cone(fit: str, c: float, phi: float, psi: float) -> tuple[float, float]:
 
 
 class DruckerPrager(NamedTuple):
-    """Strength of soil by cohesion and friction: a cone around the axis of pressure.
+    """Soil strength from cohesion and friction: a cone around the pressure axis.
 
     Parameters
     ----------
@@ -40,17 +40,16 @@ class DruckerPrager(NamedTuple):
     phi
         Angle of internal friction in degrees, below 90.
     psi
-        Angle of dilatancy in degrees, from 0 (no plastic change of volume by shear) to phi.
+        Angle of dilatancy in degrees, from 0 (no plastic volume change in shear) to phi.
     fit
-        Where the cone meets the surface of mohr-coulomb: ``compression`` and ``extension``, the
-        triaxial tests, or ``plane-strain``, the limit load of plane strain.
+        How the cone matches the surface of mohr-coulomb: ``compression`` and ``extension``, in the
+        triaxial tests, or ``plane-strain``, at the limit load in plane strain.
     tension
-        Largest mean stress in tension; that of the apex of the cone when left out.
+        Largest mean stress in tension; default: at the apex of the cone.
     residual_cohesion, residual_phi
-        What cohesion and friction angle fall to; they stay as they are when left out.
+        Residual cohesion and friction angle; default: no softening.
     softening
-        Equivalent plastic strain over which they fall, in a straight line of the factors of the
-        cone.
+        Equivalent plastic strain over which they fall, linearly in the coefficients of the cone.
 
     Example
     -------
@@ -64,11 +63,11 @@ class DruckerPrager(NamedTuple):
     With compression xi = 6 cos(phi)/(sqrt(3) (3 - sin(phi))) and eta = 6 sin(phi)/(sqrt(3) (3 -
     sin(phi))). With extension 3 + sin(phi) replaces 3 - sin(phi). With plane-strain xi = cos(phi)/b
     and eta = sin(phi)/b, where b = sqrt(1 - d^2/3) + d sin(phi)/3 and d = 3 tan(psi)/sqrt(9 + 12
-    tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so that mohr-coulomb's limit in the plane
-    is met for any psi. Dilatancy has the factor d, of the other fits eta of psi. Tension beyond -p
-    = tension, or the apex, is cut off. The plastic change of volume is kept, and pressure follows
-    from the elastic part of J. While strength falls, a step uses that of its beginning. Where it
-    falls, results depend on the size of the cells.
+    tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so the limit in plane strain equals
+    mohr-coulomb's for any psi. The dilatancy coefficient is d, and for the other fits eta of psi.
+    Tension beyond -p = tension, or the apex, is cut off. The plastic volume change is stored, and
+    pressure follows from the elastic part of J. A step uses the strength at its beginning. With
+    softening, results depend on the cell size.
 
     See Also
     --------
@@ -86,7 +85,7 @@ class DruckerPrager(NamedTuple):
     tension: float
     residual_cohesion: float  # at the end of softening
     residual_friction: float
-    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
+    softening: float  # fraction of the way to the residual per unit of plastic strain, or 0
 
     @classmethod
     def given(
@@ -102,7 +101,7 @@ class DruckerPrager(NamedTuple):
         residual_phi: Annotated[float, NonNegative] | None = None,
         softening: Annotated[float, Positive] | None = None,
     ):
-        """The cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
+        """Make the cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
         of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
         peak, left = peak_and_residual(lambda c, phi: cone(fit, c, phi, radians(psi)), *of_soil)
         return cls(G, *peak, inf if tension is None else tension, *left)
@@ -118,8 +117,8 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # In plastic flow of plane strain s_zz = -2/3 dilation sqrt(J2), so that half the difference of
-    # the principal stresses in the plane is sqrt(J2) times:
+    # In plastic flow of plane strain s_zz = -2/3 dilation sqrt(J2), so half the difference of the
+    # in-plane principal stresses is sqrt(J2) times:
     share = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * share / max(1 - friction * dilation / 3, 1e-6), dilation / share
 
@@ -136,7 +135,7 @@ def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # Beyond the end of the cone: the trial pressure counts again, see below.
+            # Beyond the apex of the cone: the trial pressure counts again, see below.
             p -= K * dilation * x
     if p < lowest:
         p = lowest

@@ -1,13 +1,13 @@
-"""Base of strengths that depend on pressure: cohesion and friction, perhaps softening; memory.
+"""Base of pressure-dependent strengths: cohesion and friction, optional softening; memory.
 
-The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and Js, that of
-separation.
+The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and the volume ratio Js
+of separation.
 
-Beyond the largest tension that the strength bears, points come apart: the volume that they gain is
-not bulk, and is given back before they bear pressure again (Dunatunga & Kamrin 2015, "Continuum
-modelling and simulation of granular flows through their many phases", J. Fluid Mech. 779, section
-3.3; Tampubolon et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM
-Trans. Graph. 36(4), section 4.3.4). What plastic flow by shear gains (dilatancy) stays.
+Beyond the largest sustainable tension, points separate: the volume that they gain is not bulk, and
+is closed before they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and
+simulation of granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon
+et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4),
+section 4.3.4). The volume gained by plastic shear (dilatancy) remains.
 """
 
 from math import asin, ceil, degrees, inf, log, radians, sqrt
@@ -31,7 +31,7 @@ from karamelo_py.script.errors import ScriptError
 def surface(strength, strain):
     """Cohesion, friction and dilation of the yield surface after a plastic strain.
 
-    They go from the peak to the residual in a straight line; a step uses those of its beginning.
+    They change linearly from the peak to the residual; a step uses the values at its beginning.
     """
     share = min(strain * strength.softening, 1)
     kept = 1 - share
@@ -41,21 +41,22 @@ def surface(strength, strain):
 
 
 def lowest_pressure(strength, strain):
-    """The pressure below which nothing is borne, -cohesion / friction or a bound of its own."""
+    """The pressure below which nothing is sustained, -cohesion / friction or a given bound."""
     cohesion, friction, _ = surface(strength, strain)
     return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
 
 @point_function(otherwise=True)
 def tension_bound(strength, lowest):
-    """The lowest pressure, of a strength whose yield surface ends at `lowest`."""
+    """The lowest pressure, for a strength whose yield surface ends at `lowest`."""
     return lowest
 
 
 def share_of_average(strength, memory):
-    """Find the share b of the averaged pressure that the yield surface takes, with F-bar.
+    """Return the fraction b of the averaged pressure that the yield surface uses, with F-bar.
 
-    Strains and forces of a wave that averaging passes with the share a (1 for long waves, 0.1 to
+    Averaging multiplies waves by the factor a (1 for long waves, 0.1 to 0.5 for waves of two or
+    three cells). Their stiffness in plastic flow is
     0.5 for waves of two or three cells) have in plastic flow the stiffness
 
         (a - f (1 - b + b a)) (a - d) times a positive number,
@@ -81,12 +82,12 @@ def sines(strength, friction, dilation):
 
 
 def elastic_part(strength, memory, j):
-    """Find the part of the volume ratio j that is elastic."""
+    """Return the elastic part of the volume ratio j."""
     return j / (memory.Jp * memory.Js)
 
 
 def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
-    """Return an elastic trial to the yield surface, and give the change of volume to the memory."""
+    """Return an elastic trial to the yield surface, and store the plastic volume change."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, s, strain)
     elastic = elastic_part(strength, memory, j)
@@ -94,7 +95,7 @@ def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
     p = pressure(law.eos, elastic, memories.energy, heat) + warm
     beside = share_beside(strength, memory) * beside
     if memory.Js > 1 and p + beside > 0:
-        # What had come apart closes before it bears pressure.
+        # Separation closes before the point sustains pressure.
         closed = ratio_at_pressure(law.eos, -warm - beside, heat)
         apart = max(1, j / (memory.Jp * closed))
         memory = memory._replace(Js=apart)
@@ -109,7 +110,7 @@ def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
     memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
     work = inner(new, plastic)
     if reached != p:
-        # The volume that bears the new pressure is elastic; the rest is plastic.
+        # The volume that carries the new pressure is elastic; the rest is plastic.
         after = ratio_at_pressure(law.eos, own + (reached - p) - warm, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=j / (memory.Jp * after))
@@ -120,7 +121,7 @@ def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
 
 
 def frictional(strength: type) -> None:
-    """Give `strength` (with a field ``G`` and those of `surface`) memory, and response."""
+    """Give `strength` (with a field ``G`` and the fields of `surface`) memory and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
     respond.on(strength)(respond_by_friction)
@@ -176,15 +177,15 @@ FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
 
 
 def _little_dilatancy(strength):
-    """Return the sine of friction in plane strain, or 0 with dilatancy enough."""
+    """Return the sine of friction in plane strain, or 0 if there is enough dilatancy."""
     f, d = sines_after(strength, 0.0)
     return f if d < ENOUGH * f * (1 - 1e-9) else 0.0
 
 
 def _vibrates(strength, scene):
-    """Tell whether a cycle of strain of a point at its limit gives more work than it takes.
+    """Return True if a strain cycle of a point at its limit releases more work than it takes.
 
-    Without dilatancy it gives (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
+    Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
     f = _little_dilatancy(strength)
     averaged = scene.hub.update.anti_locking
@@ -216,20 +217,20 @@ def _averages_splines(strength, scene):
 
 
 def _angle(f):
-    """Find an angle of dilatancy that is enough, in degrees, rounded up."""
+    """Return a sufficient angle of dilatancy, in degrees, rounded up."""
     return ceil(degrees(asin(min(ENOUGH * f, 1))))
 
 
 def _poisson(share):
-    """Find Poisson's ratio from K / G."""
+    """Return Poisson's ratio from K / G."""
     return (3 * share - 2) / (2 * (3 * share + 1))
 
 
 def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over):
-    """Cohesion, friction and dilation at the peak; cohesion, friction at the end, and softening.
+    """Cohesion, friction and dilation at the peak; residual cohesion and friction; softening.
 
     `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the angle
-    of friction (in radians) of a soil. What is None stays as it is.
+    of friction (in radians) of a soil. None leaves a value unchanged.
     """
     if not 0 <= phi < 90:
         raise ScriptError(

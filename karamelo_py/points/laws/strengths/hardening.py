@@ -1,4 +1,4 @@
-"""strength plastic, and the base of strengths of von Mises with any hardening."""
+"""strength plastic, and the base of von Mises strengths with any hardening."""
 
 from math import sqrt
 from typing import Annotated, NamedTuple
@@ -19,8 +19,8 @@ from karamelo_py.points.laws.strengths import remembers, shear_response
 
 
 def elastic_trial(G, s, strain):
-    """Deviatoric stress after a strain increment, were it all elastic."""
-    # The deviator of the sum: rounding errors of many steps would give s a trace otherwise.
+    """Deviatoric stress after a strain increment that is assumed to be elastic."""
+    # The deviator of the sum: otherwise s would collect a trace from rounding over many steps.
     return dev(s + 2 * G * strain)
 
 
@@ -32,9 +32,9 @@ class LinearHardening(NamedTuple):
     G
         Shear modulus.
     yield_stress
-        Yield stress in uniaxial tension; in pure shear it yields at 1/sqrt(3) of it.
+        Yield stress in uniaxial tension; the yield stress in pure shear is 1/sqrt(3) of it.
     H
-        Hardening modulus: by how much the yield stress rises for each unit of plastic strain.
+        Hardening modulus: rise of the yield stress per unit of plastic strain.
 
     Example
     -------
@@ -60,12 +60,12 @@ class LinearHardening(NamedTuple):
     H: Annotated[float, NonNegative] = 0.0
 
     def checked(self):
-        """The law; that without hardening where there is none."""
+        """Return the law, or the one without hardening if H is 0."""
         return self if self.H > 0 else Plastic(self.G, self.yield_stress)
 
 
 class Plastic(NamedTuple):
-    """The same with a yield stress that stays."""
+    """Von Mises strength with a constant yield stress."""
 
     style = "plastic"
     in_lanes = True
@@ -92,21 +92,21 @@ def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt)
 
 @point_function()
 def flow_stress(strength, memory, known, increment, heat, dt):
-    """Find flow stress and its slope by `increment`, the part of the plastic strain of a step dt.
+    """Return flow stress and slope for `increment`, the part of the plastic strain of a step dt.
 
-    `memory` is that before the step, `known` what is `precompute`d from it.
+    `memory` is the memory before the step, `known` the result of `precompute` for it.
     """
 
 
 @point_function(otherwise=True)
 def precompute(strength, memory, heat):
-    """Find what the flow stress of a step takes from its beginning, whatever the increment is."""
+    """Return the part of the flow stress that does not depend on the increment of a step."""
     return ()
 
 
 @point_function(otherwise=True)
 def first_guess(strength, memory, known, q, slope):
-    """Guess plastic strain, 0 for q below the flow stress; and how Newton's changes fall.
+    """Guess the plastic strain, 0 for q below the flow stress; and the decay of Newton's changes.
 
     `slope` is 3 G. A change c is followed by about k c^2, or less the further the flow stress has
     hardened: k is the second number.
@@ -116,21 +116,21 @@ def first_guess(strength, memory, known, q, slope):
 
 @point_function(otherwise=True)
 def updated_memory(strength, memory, increment, dt):
-    """Find the memory after a step, which may be without plastic strain."""
+    """Return the memory after a step, which may have no plastic strain."""
     return memory._replace(ep=memory.ep + increment)
 
 
 def onto_yield_surface(trial, q, flow, x):
-    """Shrink the deviatoric stress `trial` from q to `flow` where the plastic strain `x` grows."""
+    """Reduce the deviatoric stress `trial` from q to `flow` if the plastic strain `x` grows."""
     yields = x > 0
     return where(yields, flow / where(yields, q, 1), 1) * trial
 
 
 def radial_return(strength, kin, s, strain, memory, heat, dt):
-    """Respond with a deviatoric stress that shrinks to flow/q of itself (Wilkins 1964).
+    """Radial return: scale the trial deviatoric stress by flow/q (Wilkins 1964).
 
-    The `shear_response` of strengths with a field ``G`` and a `flow_stress` that remember the
-    plastic strain ``ep``; q is the von Mises stress of the elastic trial.
+    The `shear_response` of strengths with a field ``G``, a `flow_stress` and the plastic strain
+    ``ep`` in the memory; q is the von Mises stress of the elastic trial.
     """
     trial = elastic_trial(strength.G, s, strain)
     q = von_mises(trial)
@@ -140,19 +140,19 @@ def radial_return(strength, kin, s, strain, memory, heat, dt):
     return onto_yield_surface(trial, q, flow, x), after, flow * x
 
 
-# Newton's method takes one to three; bisection, where it has to step in, one for each bit.
+# Newton's method takes one to three; bisection, if it has to step in, one per bit.
 _MOST_ITERATIONS = 80
 
 
 @shared
 def plastic_increment(strength, q, memory, heat, dt):
-    """The plastic strain x of a step that solves q - 3 G x = flow stress, or 0 for q below that.
+    """Return the plastic strain x of a step that solves q - 3 G x = flow stress; 0 for smaller q.
 
     The left side falls with x and the flow stress does not: there is one solution, whatever the
-    size of the step. Newton's method from a first guess, kept within bounds by bisection.
+    step size. Newton's method from a first guess, kept within bounds by bisection.
     """
     slope = 3 * strength.G
-    enough = 4 * round_off(q) * q  # what the three terms are rounded to
+    enough = 4 * round_off(q) * q  # rounding of the three terms
     small = sqrt(round_off(q)) * q
     low, high = 0.0, q / slope
     active = q > 0
@@ -167,17 +167,17 @@ def plastic_increment(strength, q, memory, heat, dt):
         high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
-        # Changes go like their squares, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next one round-off?
-        # Beside a kink of the curve they do not: there the excess has to be small, too.
+        # Quadratic convergence, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next change round-off?
+        # Not next to a kink of the curve: there the excess has to be small, too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
         middle = 0.5 * (low + high)
-        # What is rounded may lie below 0: plastic strain only grows.
+        # Rounding may give less than 0: plastic strain only grows.
         x = where(active, max(where(done | within, new, middle), 0), x)
         last = change
-        # Lanes that have finished wait for the others.
+        # Finished lanes wait for the rest.
         active = active & (not (done | (middle <= low) | (middle >= high)))
         if not any_lane(active):
             break

@@ -1,4 +1,4 @@
-"""Strengths linear and fluid: elastic shear, and viscous shear, without limit."""
+"""Strengths linear and fluid: unlimited elastic shear, and viscous shear."""
 
 from typing import Annotated, NamedTuple
 
@@ -23,8 +23,8 @@ class Elastic(NamedTuple):
 
     Notes
     -----
-    The deviatoric stress turns with the point (Jaumann rate) and grows by 2 G dev(d), d the strain
-    increment.
+    The deviatoric stress rotates with the point (Jaumann rate) and grows by 2 G dev(d), d the
+    strain increment.
 
     See Also
     --------
@@ -56,9 +56,9 @@ class Viscous(NamedTuple):
 
     Notes
     -----
-    s = 2 mu dev(D), D the rate of strain. The time step takes account of the viscosity, which
-    matters where 4/3 mu/(rho h) is not small against the speed of sound. Equivalent plastic strain
-    and elastic shear are 0; viscous work counts as dissipated energy.
+    s = 2 mu dev(D), D the strain rate. The stable time step includes the viscosity, which matters
+    unless 4/3 mu/(rho h) is small compared with the speed of sound. Equivalent plastic strain and
+    elastic shear are 0; viscous work counts as dissipated energy.
 
     See Also
     --------
@@ -73,7 +73,7 @@ class Viscous(NamedTuple):
 
     @classmethod
     def given(cls, mu: Annotated[float, NonNegative]):
-        """The law from the viscosity."""
+        """Make the law from the viscosity."""
         return cls(mu, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""Strengths johnson_cook, swift and zerilli-armstrong: metals that harden by powers of strain."""
+"""Strengths johnson_cook, swift and zerilli-armstrong: power-law hardening of metals."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -19,26 +19,26 @@ from karamelo_py.points.laws.temperatures import homologous, temperature_or
 
 
 class JohnsonCook(NamedTuple):
-    """Flow stress of metals that depends on plastic strain, its rate, and temperature.
+    """Flow stress of metals that depends on plastic strain, strain rate and temperature.
 
     Parameters
     ----------
     G
         Shear modulus.
     A
-        Flow stress at first, at the reference rate and temperature.
+        Initial flow stress, at the reference rate and temperature.
     B, n
         Hardening: the flow stress rises by B ep^n with the plastic strain ep.
     epsdot0
-        Reference rate of plastic strain; may be 0 where C is.
+        Reference plastic strain rate; may be 0 if C is.
     C
-        Coefficient of the rate; 0 for none.
+        Rate coefficient; 0 for none.
     m
         Exponent of thermal softening; 0 for none.
     Tr
         Reference temperature, up to which there is no softening.
     Tm
-        Melting temperature, from which on there is no strength.
+        Melting temperature, from which there is no strength.
 
     Example
     -------
@@ -48,8 +48,9 @@ class JohnsonCook(NamedTuple):
     -----
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
     1983). At and below the reference rate the second factor is 1; without a temperature the third
-    one is. Each step solves for the plastic strain with the flow stress at its end and the rate of
-    the step. There is one solution for any step size. The temperature is that of its beginning.
+    factor is 1. Each step solves for the plastic strain with the flow stress at its end and the
+    rate of the step, which has one solution for any step size. The temperature is taken at its
+    beginning.
 
     See Also
     --------
@@ -78,7 +79,7 @@ class JohnsonCook(NamedTuple):
         Tr: float,
         Tm: float,
     ):
-        """The law with the factors that are not 1 anyway: others cost no logarithm and no power."""
+        """Make the law without the factors that are 1, which would cost a logarithm or a power."""
         check_temperatures(Tr, Tm)
         epsdot0 = reference_rate(epsdot0, C, "C")
         rate = RateFactor(epsdot0, C) if C > 0 else Absent()
@@ -116,7 +117,7 @@ remembers(JohnsonCook, ep=0.0)
 shear_response.on(JohnsonCook)(radial_return)
 
 
-# Increments of strain up to this share of it are a series of so many terms.
+# Strain increments up to this fraction of the strain use a series with this number of terms.
 _NEAR, _TERMS = 1 / 32, 9
 
 
@@ -127,9 +128,9 @@ def power_of_strain(factor, exponent, strain):
 
 
 def power_law(factor, exponent, strain, value, increment):
-    """factor (strain + increment)^exponent and its slope; at no strain the slope is left out.
+    """factor (strain + increment)^exponent and its slope, which is omitted at zero strain.
 
-    `value` is that without the increment: (1 + x)^n times as much is a short series for small x.
+    `value` is the power without the increment, times (1 + x)^n as a short series for small x.
     """
     near = max(exponent, 1) * increment <= _NEAR * strain
     x = increment / where(strain > 0, strain, 1)
@@ -146,7 +147,7 @@ def power_law(factor, exponent, strain, value, increment):
 def power_law_guess(exponent, strain, hard, excess, slope):
     """A `first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
 
-    `excess` is how far the stress lies above the flow stress; it falls by `slope` with the strain.
+    `excess` is the stress minus the flow stress; it falls by `slope` with the strain.
     """
     some = strain > round_off(strain)
     inverse = where(some, 1 / where(some, strain, 1), 0)
@@ -168,7 +169,7 @@ def _precompute_johnson_cook(strength, memory, heat):
 @first_guess.on(JohnsonCook)
 def _first_guess_johnson_cook(strength, memory, known, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # the rate rises with the strain: what is known is for none
+        return real(0, q), real(0, q)  # the rate depends on the strain: `known` holds for zero strain only
     hard, soft = known
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, memory.ep, hard * soft, excess, slope)
@@ -189,7 +190,7 @@ def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
 
 
 class Swift(NamedTuple):
-    """Hardening by a power of plastic strain, after a plateau.
+    """Power-law hardening after a plateau.
 
     Parameters
     ----------
@@ -200,8 +201,8 @@ class Swift(NamedTuple):
     B, n
         Hardening.
     C
-        Plastic strain at the end of the plateau. A negative one is a strain that the material has
-        been given before.
+        Plastic strain at the end of the plateau. A negative value is a previous plastic strain of
+        the material.
 
     Example
     -------
@@ -209,8 +210,8 @@ class Swift(NamedTuple):
 
     Notes
     -----
-    Y = A + B (ep - C)^n where the plastic strain ep is above C, else A (after Swift 1952). Each
-    step solves for the plastic strain with the flow stress at its end.
+    Y = A + B (ep - C)^n for plastic strains ep above C, else A (after Swift 1952). Each step solves
+    for the plastic strain with the flow stress at its end.
 
     See Also
     --------
@@ -248,28 +249,28 @@ def _flow_stress_swift(strength, memory, before, increment, heat, dt):
 
 
 class ZerilliArmstrong(NamedTuple):
-    """Flow stress of metals by the motion of dislocations: strain, rate and temperature.
+    """Flow stress of metals from dislocation motion: strain, strain rate and temperature.
 
     Parameters
     ----------
     G
         Shear modulus.
     C0
-        Part of the flow stress that depends on nothing (impurities, size of the grains).
+        Athermal, constant part of the flow stress (impurities, grain size).
     C1
-        Factor of the thermal part: that of bcc metals.
+        Coefficient of the thermal term (bcc metals).
     C2
-        The same of its part that grows with the root of plastic strain: that of fcc metals.
+        Coefficient of the thermal term proportional to sqrt(plastic strain) (fcc metals).
     C3
-        How fast the thermal part falls with temperature, per kelvin.
+        Thermal softening of the thermal terms, 1/K.
     C4
-        How much less so for each e-fold of the rate, per kelvin.
+        Rate sensitivity: reduction of C3 per unit of ln(rate), 1/K.
     C5, n
-        Hardening C5 ep^n that depends on strain alone: that of bcc metals.
+        Hardening C5 ep^n that depends on strain alone (bcc metals).
     epsdot0
-        Rate of plastic strain that rates are counted in: 1/s in the units of the script.
+        Unit of the plastic strain rate: 1/s in the units of the script.
     T
-        Absolute temperature where neither the material nor its solid has one.
+        Absolute temperature, if neither the material nor its solid has one.
 
     Example
     -------
@@ -279,9 +280,9 @@ class ZerilliArmstrong(NamedTuple):
     Notes
     -----
     Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n (Zerilli & Armstrong
-    1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. Without rate the thermal part is
-    nothing, so that the strength of a body at rest is C0 + C5 ep^n. Each step solves for the
-    plastic strain with the flow stress at its end and the rate of the step.
+    1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. At zero rate the thermal part
+    vanishes, so the strength of a body at rest is C0 + C5 ep^n. Each step solves for the plastic
+    strain with the flow stress at its end and the rate of the step.
 
     See Also
     --------
@@ -316,7 +317,7 @@ class ZerilliArmstrong(NamedTuple):
         epsdot0: Annotated[float, Positive] = 1.0,
         T: Annotated[float, NonNegative] = 293.0,
     ):
-        """The law from its constants."""
+        """Make the law from its constants."""
         return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
 
 

@@ -11,7 +11,7 @@ from karamelo_py.points.laws.strengths.frictional import frictional, peak_and_re
 
 
 class MohrCoulomb(NamedTuple):
-    """Strength of soil by cohesion and friction, with dilatancy and perhaps softening.
+    """Soil strength from cohesion and friction, with dilatancy and optional softening.
 
     Parameters
     ----------
@@ -22,12 +22,11 @@ class MohrCoulomb(NamedTuple):
     phi
         Angle of internal friction in degrees, below 90.
     psi
-        Angle of dilatancy in degrees, from 0 (no plastic change of volume by shear) to phi.
+        Angle of dilatancy in degrees, from 0 (no plastic volume change in shear) to phi.
     residual_cohesion, residual_phi
-        What cohesion and friction angle fall to; they stay as they are when left out.
+        Residual cohesion and friction angle; default: no softening.
     softening
-        Equivalent plastic strain over which they fall, in a straight line of c cos(phi) and
-        sin(phi).
+        Equivalent plastic strain over which they fall, linearly in c cos(phi) and sin(phi).
 
     Example
     -------
@@ -41,9 +40,9 @@ class MohrCoulomb(NamedTuple):
     stress (tension positive). A stress beyond the surface returns in principal stresses: to a
     plane, an edge (two equal principal stresses) or, in tension, the apex p = -c cot(phi) (Simpson
     2017, Practical Finite Element Modeling in Earth Science using Matlab, section 11.4; de Souza
-    Neto et al. 2008, section 8.2). The plastic change of volume is kept, and pressure follows from
-    the elastic part of J. While strength falls, a step uses that of its beginning. Where it falls,
-    results depend on the size of the cells.
+    Neto et al. 2008, section 8.2). The plastic volume change is stored, and pressure follows from
+    the elastic part of J. A step uses the strength at its beginning. With softening, results depend
+    on the cell size.
 
     See Also
     --------
@@ -60,7 +59,7 @@ class MohrCoulomb(NamedTuple):
     dilation: float  # sin(psi)
     residual_cohesion: float  # at the end of softening
     residual_friction: float
-    softening: float  # share of the way to the residual for each unit of plastic strain, or 0
+    softening: float  # fraction of the way to the residual per unit of plastic strain, or 0
 
     @classmethod
     def given(
@@ -74,7 +73,7 @@ class MohrCoulomb(NamedTuple):
         residual_phi: Annotated[float, NonNegative] | None = None,
         softening: Annotated[float, Positive] | None = None,
     ):
-        """The yield surface from cohesion and angles."""
+        """Make the yield surface from cohesion and angles."""
         of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
         peak, left = peak_and_residual(lambda c, angle: (c * cos(angle), sin(angle)), *of_soil)
         return cls(G, *peak, *left)
@@ -86,8 +85,8 @@ frictional(MohrCoulomb)
 def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
     """Principal stresses s1 >= s2 >= s3 on the surface, from those of an elastic trial above it.
 
-    To a plane of the surface; where that changes their order, to an edge of two planes; where it
-    still does, to the apex (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4).
+    To a plane of the surface; if that changes their order, to an edge of two planes; if it still
+    does, to the apex (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4).
     """
     lam = K - 2 / 3 * G
     # n and m, normals of yield function and plastic potential, are (1 + sin, 0, sin - 1).
@@ -117,7 +116,7 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
     if s2 > s1:
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
-        # Equal by construction, but for rounding: on both planes.
+        # Equal by construction, except for rounding: on both planes.
         t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3
@@ -133,13 +132,13 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
 @pressure_response.on(MohrCoulomb)
 def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
     k, sin_phi, sin_psi = surface(strength, strain)
-    # Above this bound of the yield function principal stresses are needed to know it.
+    # Only above this bound of the yield function are principal stresses needed.
     root = sqrt(0.5 * inner(s, s))
     bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:
         return s, p
     (a, b, c), directions = principal(s)
-    # Places in the order from the largest; equal values keep theirs.
+    # Ranks from the largest; equal values retain their order.
     at_a = (1 if b > a else 0) + (1 if c > a else 0)
     at_b = (1 if a >= b else 0) + (1 if c > b else 0)
     at_c = (1 if a >= c else 0) + (1 if b >= c else 0)

@@ -1,4 +1,4 @@
-"""strength mu-i: dense granular flow, whose friction grows with the rate of shear."""
+"""strength mu-i: dense granular flow, with rate-dependent friction."""
 
 from math import sqrt
 from typing import Annotated, NamedTuple
@@ -16,22 +16,22 @@ from karamelo_py.script.errors import ScriptError
 
 
 class MuI(NamedTuple):
-    """Friction of grains that flow: it grows with the rate of shear, mu(I).
+    """Dense granular flow with rate-dependent friction, mu(I).
 
     Parameters
     ----------
     G
-        Shear modulus of the grains while they hold together.
+        Shear modulus of the grains while they are in contact.
     mu_s
-        Friction of slow flow, the tangent of the angle of repose.
+        Friction coefficient of slow flow, the tangent of the angle of repose.
     mu_2
-        Friction of fast flow, above mu_s.
+        Friction coefficient of fast flow, above mu_s.
     I0
         Inertial number at which friction is half way between.
     d
-        Diameter of a grain.
+        Grain diameter.
     rho_s
-        Density of a grain.
+        Grain density.
 
     Example
     -------
@@ -44,8 +44,9 @@ class MuI(NamedTuple):
     sqrt(s:s/2) = mu(I) p in flow, with mu = mu_s + (mu_2 - mu_s)/(I0/I + 1) (Jop, Forterre &
     Pouliquen 2006). I = gamma' d sqrt(rho_s/p), with the plastic shear rate gamma'. Below mu_s p
     the response is elastic. Steps of any size solve a quadratic equation for the shear stress at
-    their end (Dunatunga & Kamrin 2015). Grains below the initial density are apart. They bear
-    nothing until the density is back. Flow keeps the volume. The column ``inertial`` of dumps is I.
+    their end (Dunatunga & Kamrin 2015). Below the initial density the grains are separated and
+    sustain no stress until the density is restored. Flow conserves the volume. The dump column
+    ``inertial`` is I.
 
     See Also
     --------
@@ -64,7 +65,7 @@ class MuI(NamedTuple):
     rho_s: Annotated[float, Positive]
 
     def checked(self):
-        """The law, unless friction falls with the rate: such flow is not stable."""
+        """Return the law, unless friction decreases with the rate: such flow is unstable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below that of slow flow",
@@ -91,14 +92,14 @@ known_failure(
 )
 
 
-PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities that come from the grid
-SLOW = 0.05  # of the viscosity of the grains, from where the flow is told to be slow
+PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities interpolated from the grid
+SLOW = 0.05  # of the viscosity of the grains, above which a warning is given
 
 
 def _slows(strength, scene):
-    """Compare the viscosity of PIC's share with that of the grains, mu p/(rho gamma').
+    """Compare the viscosity of the PIC fraction with the grain viscosity, mu p/(rho gamma').
 
-    The pressure is that of half of the height of a body, the inertial number half of I0.
+    The pressure is at half the height of a body, the inertial number is half of I0.
     """
     if not scene.moves or scene.moments or scene.kept >= 1 or scene.simulation.implicit:
         return None
@@ -135,12 +136,12 @@ remembers(MuI, ep=0.0, inertial=0.0)
 
 @elastic_ratio.on(MuI)
 def _elastic_ratio_mu_i(strength, memory, j):
-    return min(j, 1)  # grains that are apart are not stretched
+    return min(j, 1)  # separated grains are not stretched
 
 
 @share_beside.on(MuI)
 def _share_beside_mu_i(strength, memory):
-    return 1  # flow keeps the volume
+    return 1  # flow conserves the volume
 
 
 @respond.on(MuI)
@@ -156,7 +157,7 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt, beside):
     flows = together & (shear > strength.mu_s * p)
     p = where(together, p, 1)
     slow, fast = strength.mu_s * p, strength.mu_2 * p
-    # (shear - tau)/(G dt) is the shear rate that tau = mu(I) p asks for: a quadratic equation.
+    # (shear - tau)/(G dt) is the shear rate required by tau = mu(I) p: a quadratic equation.
     grain = strength.d * sqrt(strength.rho_s / p)
     viscous = strength.I0 * strength.G * dt / grain
     b = fast + shear + viscous
