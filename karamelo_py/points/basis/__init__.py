@@ -1,15 +1,15 @@
-"""Bases: which nodes a point sees, with what weights and gradients. One file each.
+"""Bases: the nodes that a point sees, with weights and gradients. One file each.
 
-A basis is a NamedTuple of its own numbers, often empty (its class is the tag), with the point
-functions declared here. What they work on:
+A basis is a NamedTuple of its parameters, often empty (its class is the tag), with the point
+functions declared here. Their arguments:
 
 grid
-    the :class:`~karamelo_py.points.grid.Grid` under the point;
+    the :class:`~karamelo_py.points.grid.Grid` of the point;
 place
-    a flat tuple: the position of the point, then what the basis keeps of the shape of its domain
-    (nothing, half sizes, corners ...);
+    a flat tuple: the position of the point, then the stored shape of its domain (nothing, half
+    sizes, corners ...);
 stencil
-    whatever `locate` returned.
+    the result of `locate`.
 
 A basis that is a product of one function per direction gives only `along` and calls
 :func:`karamelo_py.points.basis.product.register`. This also sets the defaults of these attributes:
@@ -17,31 +17,37 @@ A basis that is a product of one function per direction gives only `along` and c
 cells
     number of cells that the nodes of all points of a cell span (1: the corners of the cell only);
 nodes_per_cell
-    1, or 2 where there are nodes between the corners of cells;
+    1, or 2 if there are nodes between the corners of cells;
 least_nodes
     smallest number of nodes of the grid per direction;
 steady_moment
     whether D of the affine transfers stays away from zero everywhere;
 gradient_jumps
-    whether gradients jump at the faces of cells (default: no). Points that cross cells then add
-    energy to a body. A smaller step adds less;
+    whether gradients jump at cell faces (default: no). Points that cross cells then add energy to a
+    body, less with a smaller step;
 courant_still, courant_total
-    the stable step over h/c while points stay at their places, in the updated frame, and in the
+    the stable step over h/c while points stay at their positions, in the updated frame, and in the
     total frame (default: 1);
 courant_strained_first
-    bound of `courant_still` where the strain comes before the forces, as in usf (default: none);
+    bound of `courant_still` if the strain comes before the forces, as in usf (default: none);
 lone
     stiffness of a point with no other point at its nodes, for functions with smooth gradients: h^2
     / D and the largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls;
 bears_drift
-    whether drifting bodies keep their energy with the step of bodies at rest, also with musl and
-    usf (default: no);
+    whether drifting bodies conserve energy with the step of bodies at rest, also with musl and usf
+    (default: no);
 borne
-    how far bodies may drift and turn and keep their energy (`noise.Borne`; default: that of similar
+    how far bodies may drift and rotate and conserve energy (`noise.Borne`; default: as for similar
     functions);
 steep_edge
     whether |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes. usl then limits
     the effect of light nodes on the strain.
+
+A basis with point domains lists their stored parts, and thus the initial arrays:
+
+shape
+    names of the parts, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
+    ``deformation`` (F in 2D or in 3D) and ``corners`` (of its `element`, an
 
 A basis whose points have domains lists what a place keeps of them, and thus the initial arrays:
 
@@ -68,8 +74,8 @@ def support(basis, kin):
 def entry(basis, kin, grid, stencil, k):
     """(node number, weight N, gradient of N) of the k-th node of a stencil.
 
-    The gradient is a vector; axisymmetric with N / r behind (`Gradient` of the kinematics). A node
-    may come more than once: its parts add up.
+    The gradient is a vector; in axisymmetry with N / r after it (`Gradient` of the kinematics). A
+    node may occur more than once: its parts are summed.
     """
 
 
@@ -85,27 +91,27 @@ def affine_weight(basis, kin, grid, stencil, k):
 
 @point_function(otherwise=True)
 def walled(basis, faces):
-    """The same basis, modified at walls inside the grid (see `splines.AtWalls`), too."""
+    """The same basis, also modified at walls inside the grid (see `splines.AtWalls`)."""
     return basis
 
 
 @point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
-    """The part of a point's moment of velocity that MUSL maps to the nodes the second time."""
+    """The part of a point's affine moment that MUSL maps to the nodes the second time."""
     return moment
 
 
 def leave_moment_out(basis, grid, moment):
-    """Map no moment again: B D^-1 grows without bound where D vanishes.
+    """Map no moment the second time: B D^-1 is unbounded where D vanishes.
 
-    The velocity that deforms the points leaves it out; they keep B, so that nothing is lost.
+    The velocity that deforms the points omits it; the points retain B, so nothing is lost.
     """
     return (grid.h - grid.h) * moment
 
 
 @point_function(otherwise=True)
 def first_node(basis, like):
-    """Return the offset of a position in cells after which its whole part is its first node."""
+    """Return the offset to a position in cells, whose integer part is then its first node."""
     return 0
 
 
@@ -113,7 +119,7 @@ def first_node(basis, like):
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Count the numbers that a place has behind the position, in `d` dimensions."""
+    """Count the numbers of a place after the position, in `d` dimensions."""
     shape = getattr(basis, "shape", ())
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
@@ -133,9 +139,9 @@ def deformed(basis, kin, place, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """Return the reach of the corners of the point's domain, in cells; 0 where none are kept.
+    """Return the reach of the corners of the point's domain, in cells; 0 without corners.
 
-    Or how far the nodes lie that they may give to, if that is further.
+    Or the distance of the nodes that they may scatter to, if that is larger.
     """
     return grid.h - grid.h
 
@@ -148,7 +154,7 @@ def carried(basis, kin):
 
 @point_function(otherwise=True)
 def placed(basis, kin):
-    """Count the corners that a place keeps by their positions, right behind the point's own."""
+    """Count the corners stored by position, directly after the point's position."""
     return 0
 
 
@@ -160,5 +166,5 @@ def carrier(basis, kin, grid, stencil, corner):
 
 @point_function(otherwise=True)
 def carry(basis, kin, place, old, corner, displacement):
-    """`place` with the displacement of one corner of the domain; `old` is the place before all."""
+    """`place` with one corner of the domain displaced; `old` is the place before any change."""
     return place

@@ -1,4 +1,4 @@
-"""Quadratic Bernstein polynomials: nodes every h/2, the three of the own cell in each direction."""
+"""Quadratic Bernstein polynomials: nodes every h/2, three per cell in each direction."""
 
 from typing import NamedTuple
 
@@ -11,8 +11,8 @@ from karamelo_py.points.grid import cells_along, in_cells
 class BernsteinQuadratic(NamedTuple):
     """Quadratic Bernstein polynomials (de Vaucorbeil, Nguyen & Hutchinson 2020).
 
-    Nodes every h/2, so four times as many in 2D; a point sees those of its own cell. No weight is
-    negative, but gradients jump at cell faces, as with linear functions. Meant for method tlmpm,
+    Nodes every h/2, so four times as many in 2D; a point sees only those of its cell. Weights are
+    not negative, but gradients jump at cell faces, as with a linear basis. Meant for method tlmpm,
     where no point crosses a face.
 
     Example

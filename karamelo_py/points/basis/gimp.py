@@ -1,4 +1,4 @@
-"""GIMP: hat functions averaged over the box that a point stands for, which may deform with it."""
+"""GIMP: hat functions averaged over the box of a point, which may deform with it."""
 
 from types import MappingProxyType
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from karamelo_py.points.basis.product import Along, along, node_number, register
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 
-# Half sizes that weights are made with, in cells.
+# Range of half sizes for weights, in cells.
 LEAST = 1e-3
 MOST = 1.0
 
@@ -28,12 +28,11 @@ class _Box(NamedTuple):
 
 
 class UGIMP(_Box):
-    """Uniform GIMP: a point stands for a box of constant size (Bardenhagen & Kober 2004).
+    """Uniform GIMP: each point has a box of constant size (Bardenhagen & Kober 2004).
 
-    Weights are the averages of the linear functions over [x - l, x + l] in each direction. l is the
-    initial half size of the point. Where the material stretches much, gaps open between the boxes.
-    cpgimp lets the boxes grow. A wall cuts the box, and the point then acts from the centre of what
-    is left.
+    Weights are the averages of the linear basis over [x - l, x + l] in each direction. l is the
+    initial half size of the point. At large stretch, gaps open between the boxes; cpgimp lets the
+    boxes grow. A wall cuts the box, and the point then acts from the centre of the rest.
 
     Example
     -------
@@ -48,9 +47,9 @@ class _Following(_Box):
 
 
 class CPGIMPDet(_Following):
-    """Boxes that keep their shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
+    """Boxes of constant shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
 
-    Turns leave them as they are; a stretch in one direction goes into all alike.
+    Rotation does not change them; a stretch in one direction is distributed to all equally.
 
     Example
     -------
@@ -62,9 +61,9 @@ class CPGIMPDet(_Following):
 
 
 class CPGIMPDiagonal(_Following):
-    """Boxes with the half sizes l0 |F_ii|, for bodies that do not turn.
+    """Boxes with the half sizes l0 |F_ii|, for bodies that do not rotate.
 
-    A turn by 90 degrees makes the boxes vanish: the functions are then those of `linear`.
+    A rotation by 90 degrees makes the boxes vanish, which gives the basis `linear`.
 
     Example
     -------
@@ -72,8 +71,8 @@ class CPGIMPDiagonal(_Following):
     """
 
     __slots__ = ()
-    steady_moment = False  # D of the affine transfers all but vanishes with the box
-    shape = ("half_size", "half_size", "deformation")  # half sizes now and at the start, F
+    steady_moment = False  # D of the affine transfers nearly vanishes with the box
+    shape = ("half_size", "half_size", "deformation")  # present and initial half sizes, F
 
 
 known_failure(
@@ -89,7 +88,7 @@ known_failure(
 class CPGIMPStretch(_Following):
     """Boxes with the half sizes l0 U_ii, with the right stretch U = sqrt(F^T F).
 
-    A turn leaves them as they are (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit
+    Rotation does not change them (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit
     generalised interpolation material point method for large deformations").
 
     Example
@@ -98,11 +97,11 @@ class CPGIMPStretch(_Following):
     """
 
     __slots__ = ()
-    shape = ("half_size", "half_size", "deformation")  # half sizes now and at the start, F
+    shape = ("half_size", "half_size", "deformation")  # present and initial half sizes, F
 
 
 class CPGIMPCorners(_Following):
-    """Boxes as wide as their corners, moved by the grid, lie apart on average.
+    """Boxes as wide as the mean distance of their corners, which the grid moves.
 
     l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c. s_ci = -1 or
     1 is the side of the corner in direction i (after Coombs et al. 2020, "On Lagrangian mechanics
@@ -119,21 +118,21 @@ class CPGIMPCorners(_Following):
 
 
 class CPGIMP(_Box):
-    """Contiguous-particle GIMP: a point stands for a box that deforms with it.
+    """Contiguous-particle GIMP: each point has a box that deforms with it.
 
     Like ugimp, but the box follows the deformation (Bardenhagen & Kober 2004): ``det`` (its
-    volume), ``diagonal`` (F_ii; a turn by 90 degrees makes the box vanish), ``stretch`` (U_ii of
-    the right stretch, the default) or ``corners`` (its corners move with the grid). Boxes stay
+    volume), ``diagonal`` (F_ii; a rotation by 90 degrees makes the box vanish), ``stretch`` (U_ii
+    of the right stretch, the default) or ``corners`` (its corners move with the grid). Boxes stay
     aligned with the axes. For large shear, the cpdi methods have parallelograms and quadrilaterals.
 
-    Weights use half sizes between 0.001 and 1 cell. Beyond one cell, points lie so far apart that
-    the body breaks numerically anyway. In total Lagrangian methods no box deforms, and cpgimp is
-    ugimp.
+    Weights use half sizes between 0.001 and 1 cell. Beyond one cell, points are so far apart that
+    the body fractures numerically anyway. In total Lagrangian methods no box deforms, and cpgimp
+    equals ugimp.
 
     Parameters
     ----------
     variant
-        How the box follows.
+        How the box follows the deformation.
 
     Example
     -------
@@ -153,7 +152,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, place, direction, least, most):
-    """Centre and both ends of a domain along one direction, in cells, before walls cut it."""
+    """Centre and both ends of a domain along one direction, in cells, before cutting at walls."""
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
     half = min(max(half, least), most)
@@ -163,7 +162,7 @@ def box(grid, kin, place, direction, least, most):
 def in_cell(lo, hi, j):
     """Integrate over the part of [lo, hi] in the cell between nodes j and j + 1.
 
-    The integrals over the cell of 1 and of the hat function of node j + 1.
+    The integrals of 1 and of the hat function of node j + 1 over the part.
     """
     p = max(lo - j, 0)
     q = min(hi - j, 1)
@@ -172,9 +171,9 @@ def in_cell(lo, hi, j):
 
 
 def averaged_hats(cells, grid, first, lo, hi):
-    """Hats from node `first` on, averaged over [lo, hi].
+    """Hats from node `first`, averaged over [lo, hi].
 
-    The domain lies within so many `cells` from that node; lengths are in cells, counted from it.
+    The domain lies within this number of `cells` from that node; lengths are in cells, from it.
     """
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
@@ -217,21 +216,21 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
 
 
 def _end(at, first, top):
-    """The cell from node `first` on in which an end of a box lies, and how far into it.
+    """The cell from node `first` that contains an end of a box, and the position in it.
 
-    Of an end beyond a wall: the cell at the wall, the `top`-th at most.
+    For an end beyond a wall: the cell at the wall, at most the `top`-th.
     """
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i
 
 
-# As with linear functions, which these become where the box vanishes.
+# As for the linear basis, which is the limit of a vanishing box.
 bases.mapped_again.on(CPGIMPDiagonal)(bases.leave_moment_out)
 
 
 # --- boxes ------------------------------------------------------------------------------------
-# F in the plane is enough for boxes: axisymmetric points need no part around the axis.
+# F in 2D is enough for boxes: axisymmetric points need no part around the axis.
 
 
 @bases.deformed.on(CPGIMPDet)
@@ -252,8 +251,8 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
 
 
 # --- corners ----------------------------------------------------------------------------------
-# Bit k of a corner's number says on which side of the point it lies in direction k; and bit k of
-# the number of a node that carries it, on which side of its cell.
+# Bit k of a corner's number gives its side of the point in direction k; bit k of the number of a
+# carrying node, its side of the cell.
 
 
 @bases.carried.on(CPGIMPCorners)
@@ -262,7 +261,7 @@ def _carried_cpgimp_corners(basis, kin):
 
 
 def _side(line, corner, j):
-    """Node along one direction, and weight, of bit `j` for the end that bit `corner` is."""
+    """Node along one direction, and weight, of bit `j` for the end given by bit `corner`."""
     i, b = line.ends[1] if corner else line.ends[0]
     return (i + 1, b) if j else (i, 1 - b)
 

@@ -7,14 +7,14 @@ from karamelo_py.points.basis import leave_moment_out, mapped_again
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 
-STRETCH = 0.3  # strain beyond which points that lie a cell apart come loose
-SMALL_SHARE = 0.3  # of the stable step, with which impacts keep the energy
-PER_CELL = 0.17  # P falls by exp(-0.17 N) where stressed matter moves through N cells, or so
-TOLD = 0.03  # of the stress: a larger loss is told
+STRETCH = 0.3  # strain beyond which points a cell apart separate
+SMALL_SHARE = 0.3  # of the stable step, with which impacts conserve energy
+PER_CELL = 0.17  # P falls by exp(-0.17 N), about, if stressed material moves through N cells
+TOLD = 0.03  # of the stress: a larger loss gives a warning
 
 
 class Linear(NamedTuple):
-    """Linear hat functions on the grid's nodes: the basis of the first MPM (Sulsky et al. 1994).
+    """Linear hat functions on the nodes: the basis of the original MPM (Sulsky et al. 1994).
 
     The cheapest basis. Its gradient jumps at cell faces. A stressed point that crosses one changes
     the nodal forces by the order of its stress (cell-crossing error).
@@ -41,7 +41,7 @@ known_failure(
 
 
 def _meet_again(basis, scene):
-    """Tell whether bodies have the time to fly through the domain, and meet or bounce again."""
+    """Return True if bodies have time to fly through the domain, and collide or bounce again."""
     domain, share = scene.hub.domain, scene.hub.update.dt_factor
     far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
     small = share is not None and share <= SMALL_SHARE

@@ -1,7 +1,7 @@
 """Bases that are a product of one function per direction: hats, splines, uniform GIMP.
 
-The one-dimensional part is the point function `along`; everything else is the same product for any
-number of directions.
+The one-dimensional part is the point function `along`; the rest is the same product for any number
+of directions.
 """
 
 from typing import Any, NamedTuple
@@ -21,11 +21,11 @@ class Along(NamedTuple):
     weights: tuple[float, ...]  # N of each
     gradients: tuple[float, ...]  # dN/dx of each
     affine: tuple[float, ...]  # N D^-1 (X_I - x) of each, D the mean of (X_I - x)^2 under N
-    ends: tuple[tuple[int, float], ...] = ()  # cell from `first` on and place in it, of box ends
+    ends: tuple[tuple[int, float], ...] = ()  # box ends: cell from `first`, and position in it
 
 
 class Stencil(NamedTuple):
-    """The nodes that a point sees, however these are numbered."""
+    """The nodes that a point sees, in any numbering."""
 
     lines: tuple[Along, ...]  # along each direction
     inv_r: float  # 1 / r of an axisymmetric point
@@ -40,7 +40,7 @@ def sees_same_nodes(stencil):
 
 
 def with_one_node(stencil):
-    """The stencil of points that see the same nodes: their numbers have no lanes."""
+    """The stencil of points with the same nodes: their numbers have no lanes."""
     lines = tuple(type(line)(first_lane(line.first), *line[1:]) for line in stencil.lines)
     return Stencil(lines, stencil.inv_r)
 
@@ -52,7 +52,7 @@ def along(basis, kin, grid, place, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """N D^-1 (X_I - x) of each node of a line, where `along` leaves it to those who need it."""
+    """N D^-1 (X_I - x) of each node of a line, if `along` does not compute it."""
     return line.affine
 
 
@@ -64,7 +64,7 @@ def spacing(basis):
 
 @point_function(otherwise=True)
 def inverse_spread(basis, grid):
-    """(D^-1,) of functions for which it is the same away from walls (`evenly`); else nothing."""
+    """(D^-1,) if it is constant away from walls (`evenly`); otherwise ()."""
     return ()
 
 
@@ -75,7 +75,7 @@ def evenly(basis, grid, stencil):
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """The gradient of a weight, axisymmetric with N / r behind, or its limit on the axis, dN/dr."""
+    """The gradient of a weight; in axisymmetry with N / r after it, on the axis dN/dr."""
     if isinstance(kin, Axisymmetric):
         slopes = (*slopes, where(inv_r > 0, weight * inv_r, slopes[0]))
     return gradient(kin, slopes)
@@ -87,7 +87,7 @@ def inverse_radius(r):
 
 
 def radius(basis, grid, line):
-    """Radius that the weights reproduce: the point's, but for domains cut at a wall."""
+    """Radius that the weights reproduce: the point's, except for domains cut at a wall."""
     r = line.r - line.r
     for k in range(len(line.weights)):
         node = real(line.first + k, r) * spacing(basis)
@@ -96,7 +96,7 @@ def radius(basis, grid, line):
 
 
 def node_number(grid, first, steps):
-    """Number of the node that is so many steps along each direction from node `first`."""
+    """Number of the node `steps` along each direction from node `first`."""
     *others, last = steps
     for step, far in zip(others, (grid.step_x, grid.step_y), strict=False):
         first = first + step * far
@@ -104,7 +104,7 @@ def node_number(grid, first, steps):
 
 
 def cell_number(kin, grid, place):
-    """Number of the cell that a point is in, among those of all grids."""
+    """Number of the cell of a point, among the cells of all grids."""
     number = 0
     for k in range(kin.dimension):
         count = cells_along(grid, k)
@@ -122,23 +122,23 @@ def digits(k, base, d):
 
 
 def item(values, k):
-    """Take values[k], where only a run may know k."""
+    """Return values[k], for a k known only at run time."""
     return values[k]
 
 
 def each_for_its_own(weights, others):
-    """Multiply weights; for each direction with one of `others` in the place of its own."""
+    """Products of weights; for each direction, one factor is replaced by that of `others`."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
 
 
 def places_of(stencil, k):
-    """Find which node of each line the k-th node of a stencil is."""
+    """Return the node indices on each line of the k-th node of a stencil."""
     return digits(k, len(stencil.lines[0].weights), len(stencil.lines))
 
 
 def weights_of(stencil, at):
-    """Find the weights along each direction."""
+    """Return the weights along each direction."""
     return [item(line.weights, n) for line, n in zip(stencil.lines, at, strict=True)]
 
 
@@ -179,7 +179,7 @@ def _affine_weight_product(basis, kin, grid, stencil, k):
 def register(basis: type, width: int) -> None:
     """Give `basis` (a class with `along`, `width` nodes per direction) every point function.
 
-    And the attributes of its kind that it does not have itself.
+    Also sets default attributes.
     """
     cells = 1 if width == 2 else 3
     usual = {"cells": cells, "nodes_per_cell": 1, "least_nodes": width, "steady_moment": True}
@@ -194,7 +194,7 @@ def register(basis: type, width: int) -> None:
 
 
 def wide(basis: type) -> None:
-    """Let functions of four nodes per direction be judged where no point crosses cells."""
+    """Register the warning for four-node bases when no point crosses cells."""
     suggestion(
         basis,
         when=_seen,

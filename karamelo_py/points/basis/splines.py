@@ -1,7 +1,7 @@
 """B-splines, modified at the walls of the grid: three or four nodes per direction.
 
-Where nodes inside the grid are held, they make walls, too (:class:`AtWalls`). Then there is a class
-of its own with the same functions, so that scenes without such walls ask for none.
+Held nodes inside the grid also make walls (:class:`AtWalls`). A separate class with the same
+functions handles them, so that scenes without such walls pay nothing.
 """
 
 from typing import NamedTuple
@@ -17,9 +17,9 @@ BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls of a cell in a direction
 
 
 class AtWalls(NamedTuple):
-    """Base of splines that are modified at walls inside the grid, too."""
+    """Base of splines that are also modified at walls inside the grid."""
 
-    faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN; 0 where is no wall
+    faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN; 0 without a wall
 
     steep_edge = False
     in_lanes = True
@@ -27,7 +27,7 @@ class AtWalls(NamedTuple):
 
 @point_function(otherwise=True)
 def walls_beside(basis, kin, grid, place, direction):
-    """(whether the lower face of the point's cell is a wall, whether the upper is), or nothing."""
+    """(whether the lower face of the point's cell is a wall, whether the upper is), or ()."""
     return ()
 
 
@@ -37,7 +37,7 @@ def _walls_beside_at_walls(basis, kin, grid, place, direction):
 
 
 def hats(grid, a, cell, first, count):
-    """The hat functions of a cell, of `count` nodes from the `first` on."""
+    """The hat functions of a cell, for `count` nodes from the `first`."""
     t, number = a - cell, cell - first
     weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
     slope = grid.inv_h
@@ -48,9 +48,9 @@ def hats(grid, a, cell, first, count):
 class QuadraticSpline(NamedTuple):
     """Quadratic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    Gradients are continuous: no cell-crossing error, and in 2D a bit more than twice as many nodes
-    as linear functions have. At a wall, the node beyond it is taken to go on linearly from the two
-    inside: phi(-1) = 2 phi(0) - phi(1). Within half a cell of a wall that leaves the linear hats.
+    Gradients are continuous, so there is no cell-crossing error. In 2D they have a bit more than
+    twice as many nodes as a linear basis. At a wall, values are extrapolated linearly to the node
+    beyond: phi(-1) = 2 phi(0) - phi(1). Within half a cell of a wall this gives linear hats.
 
     Example
     -------
@@ -60,9 +60,9 @@ class QuadraticSpline(NamedTuple):
     steep_edge = False
     in_lanes = True
     lone = (4.0, 6.0)
-    # Of the stable step while points are where they were. By the highest frequency of a free block:
-    # up to 1.8 to 2.6 h/c in 1D, 1.58 to 2.5 in the plane, 1.4 to 2.4 in space, over places,
-    # distances, walls and Poisson's ratios up to 0.49.
+    # Of the stable step while points stay at their positions. From the highest frequency of a free
+    # block: up to 1.8 to 2.6 h/c in 1D, 1.58 to 2.5 in 2D, 1.4 to 2.4 in 3D, over positions,
+    # spacings, walls and Poisson's ratios up to 0.49.
     courant_still = 1.25
 
 
@@ -90,7 +90,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
 
 
 def in_bulk(basis, grid, line, direction):
-    """Check that these are the splines, and not the functions at a wall."""
+    """Return True if these are the splines, and not the functions at a wall."""
     if isinstance(basis, AtWalls):
         return line.weights[0] * line.weights[2] > 0
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
@@ -122,11 +122,11 @@ product.register(QuadraticSpline, 3)
 
 
 class QuadraticSplineAtWalls(AtWalls):
-    """Quadratic B-splines where there are walls inside the grid."""
+    """Quadratic B-splines with walls inside the grid."""
 
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
-    """Give a basis `of` with walls inside the grid the functions of that without."""
+    """Give a basis `of` with walls inside the grid the functions of the one without."""
     walled.on(basis)(lambda basis, faces: of(faces))
     walls_beside.on(of)(_walls_beside_at_walls)
     for function in functions:
@@ -156,18 +156,17 @@ class CubicSpline(NamedTuple):
     steep_edge = False
     in_lanes = True
     lone = (3.0, 3.14)
-    # Of the stable step where points stay in their cells. The shortest waves are all but averaged
+    # Of the stable step if points stay in their cells. The shortest waves are nearly averaged
     # away: a shaken block is stable up to 2.1 to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to
-    # 2.4 in the plane and 1.4 to 2.3 in space (Poisson's ratio 0.45 and 0).
+    # 2.4 in 2D and 1.4 to 2.3 in 3D (Poisson's ratio 0.45 and 0).
     courant_total = 1.25
-    # The same in the updated frame, while points are where they were, by the highest frequency of
-    # a free block: 1.9 to 2.7, 1.84 to 2.6 and 1.46 to 2.7, over places, distances, walls, ratios
-    # up to 0.49.
+    # The same in the updated frame, while points stay at their positions, from the highest
+    # frequency of a free block: 1.9 to 2.7, 1.84 to 2.6 and 1.46 to 2.7, over positions, spacings,
+    # walls, ratios up to 0.49.
     courant_still = 1.4
-    # With usf a ball of 3 cells radius gained 46 % in 200/c by the longer step, 1 % by 0.9 h/c: no
-    # matter of stability (in 800/c 32 % at 0.1 of the speed of waves, 4 % at 0.03, none at
-    # 0.001), but of strains that lacked (dt grad v)^2. They have it since; the bound was not
-    # measured again.
+    # With usf a ball of 3 cells radius gained 46 % in 200/c with the longer step, 1 % with 0.9 h/c.
+    # This is not instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at 0.03, none at 0.001):
+    # strains lacked (dt grad v)^2. They have it since; the bound was not measured again.
     courant_strained_first = 1.0
     bears_drift = True
     borne = CUBIC
@@ -213,12 +212,12 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
 
 
 def at_wall(grid, a, cell, last, below, above, inside):
-    """The modified functions of a cell at a wall; nodes that make up the four have no weight.
+    """The modified functions of a cell at a wall; unused nodes of the four have no weight.
 
-    Without walls `inside` the grid only its one cell is between two.
+    Without walls `inside` the grid, only a grid of one cell is between two.
     """
     first = max(min(cell - 1, last - 3), 0)
-    between = hats(grid, a, cell, first, 4)  # what is left of both walls at once
+    between = hats(grid, a, cell, first, 4)  # the functions between two walls
     between = between._replace(affine=between.gradients)
     if last == 1:
         return between
@@ -227,7 +226,7 @@ def at_wall(grid, a, cell, last, below, above, inside):
     n = where(below, n, (n[2], n[1], n[0]))
     g = where(below, g, (-g[2], -g[1], -g[0]))
     c = where(below, c, (-c[2], -c[1], -c[0]))
-    behind = where(below, cell, cell - 1) > first  # they are the last three of the four
+    behind = where(below, cell, cell - 1) > first  # the last three of the four
     n, g, c = [
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)
@@ -237,9 +236,9 @@ def at_wall(grid, a, cell, last, below, above, inside):
 
 
 def beside_wall(grid, t):
-    """N, dN/dx and N D^-1 (X - x) of the three nodes from a wall on, `t` cells away from it.
+    """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall, at `t` cells from it.
 
-    The ghost node takes D to h^2 t (1 - t + t^2/3), which vanishes at the wall, but t cancels out
+    The ghost node changes D to h^2 t (1 - t + t^2/3), which vanishes at the wall, but t cancels out
     of N D^-1 (X - x).
     """
     tt = t * t
@@ -255,7 +254,7 @@ product.wide(CubicSpline)
 
 
 class CubicSplineAtWalls(AtWalls):
-    """Cubic B-splines where there are walls inside the grid."""
+    """Cubic B-splines with walls inside the grid."""
 
 
 of_splines(CubicSpline, CubicSplineAtWalls, (product.along,))

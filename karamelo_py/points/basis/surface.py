@@ -8,17 +8,17 @@ from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import Line
 
-CELLS = 16  # of the line on which functions are looked at
+CELLS = 16  # of the line for sampling the functions
 ENTRIES = 256  # of a table, over a cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places, in cells from a node, and the weights that it gives to a point there.
+    """Positions, in cells from a node, and the weights of the node there.
 
     Parameters
     ----------
     basis
-        The basis; of those whose points have domains the hat functions are averaged over a domain.
+        The basis; for bases with point domains the hat functions are averaged over a domain.
     half
         Half the size of a point, in cells.
     """
@@ -41,12 +41,12 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Distance of a plane surface from a node, by the mean place of the body's points that it sees.
+    """Distance of a plane surface from a node, from the mean position of the body's points there.
 
-    Points of equal mass stand in layers below the surface, the first half of their size from it;
-    both distances are in cells, along the outward normal. Row k belongs to a mean of
-    k / ENTRIES - 3 (after Nairn 2013, "Modeling imperfect interfaces in the material point method
-    using multimaterial methods", CMES 92(3), section 4, who takes a power law).
+    Points of equal mass lie in layers below the surface, the first half of their size from it; both
+    distances are in cells, along the outward normal. Row k belongs to a mean of k / ENTRIES - 3
+    (after Nairn 2013, "Modeling imperfect interfaces in the material point method using
+    multimaterial methods", CMES 92(3), section 4, who uses a power law).
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if type(basis).nodes_per_cell > 1:
-        # The functions of the nodes differ: no gap is known, and fields touch as they meet.
+        # The basis functions differ between nodes: the gap is unknown, and fields touch on contact.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)
@@ -65,6 +65,6 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     known = seen.sum(axis=1) > 0
     mean = (seen * places).sum(axis=1)[known] / seen.sum(axis=1)[known]
     mean = np.maximum.accumulate(mean)
-    # Once a body fills the reach of a node its mean stays: the first surface at which it does.
+    # Once a body fills the reach of a node its mean is constant: the first such surface.
     mean, first = np.unique(np.round(mean, 9), return_index=True)
     return np.interp(means, mean, surfaces[known][first])

@@ -1,8 +1,8 @@
-"""Transfers: how velocity travels from points to nodes and back. One file for each family.
+"""Transfers: mapping of velocity from points to nodes and back. One file for each family.
 
-A transfer is a NamedTuple of its parameters (its class is the tag). It says what a point keeps
-beside its velocity (`keeps`: nothing, or a tensor such as the moment of velocity B) and how the
-velocity follows from the nodes:
+A transfer is a NamedTuple of its parameters (its class is the tag). It defines the data that a
+point stores in addition to its velocity (`keeps`: nothing, or a tensor such as the affine moment B)
+and the velocity update from the nodes:
 
 v_pic
     sum_I N_I v*_I, the updated nodal velocity at the point
@@ -12,11 +12,11 @@ dv
 Every class has these attributes:
 
 point_fields
-    the fields that points have for it (:mod:`karamelo_py.compiler.fields`), such as `Moment`;
+    the fields of points that it needs (:mod:`karamelo_py.compiler.fields`), such as `Moment`;
 inverts_spread
-    whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which some bases let vanish.
+    whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which vanishes for some bases.
 
-What else is not defined for a class is that of PIC: nothing is kept, v alone is mapped.
+The default for undefined functions is PIC: nothing is stored, only v is mapped.
 """
 
 from karamelo_py.compiler.compile import point_function
@@ -26,7 +26,7 @@ from karamelo_py.points import noise
 
 
 class Moment(Field):
-    """The tensor that points keep beside their velocity: its moment B or its gradient L."""
+    """The tensor that points store in addition to velocity: its moment B or its gradient L."""
 
     shape = planar
 
@@ -38,76 +38,76 @@ def updated_velocity(transfer, v, v_pic, dv):
 
 @point_function(otherwise=True)
 def in_step(transfer, kept):
-    """The transfer with its numbers for the present step, of which points keep a share."""
+    """The transfer with its coefficients for the present step, with the fraction `kept`."""
     return transfer
 
 
 @point_function()
 def lost_shares(transfer, like):
-    """Return the lost shares of the kinetic energy that mapping to the nodes, and back, takes.
+    """Return the lost fractions of the kinetic energy that mapping to the nodes and back removes.
 
-    Two numbers. What is not lost comes back with what the points keep. Left out where nobody knows:
-    the energy then goes without trace.
+    Two numbers. The rest returns with the data stored by points. Undefined if unknown: the energy
+    is then lost without a record.
     """
 
 
 @point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
-    """The velocity that moves the point; `v` is its own after the step, `j` its `known_volume`."""
+    """The velocity that moves the point; `v` is its velocity after the step, `j` `known_volume`."""
     return v_pic
 
 
 @point_function(otherwise=True)
 def known_volume(transfer, law, kin, state):
-    """det F of a point for transfers that ask for it; else nothing."""
+    """det F of a point for transfers that need it; otherwise ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def nodal_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment):
-    """Find the momentum that a point gives to the k-th node of its stencil."""
+    """Return the momentum that a point gives to the k-th node of its stencil."""
     return weight * mass * v
 
 
 @point_function(otherwise=True)
 def affine_velocity(transfer, moment, inverse_d):
-    """C, where the velocity that a point gives to node X with its weight is v + C (X - x).
+    """C, if the velocity that a point gives to node X with its weight is v + C (X - x).
 
-    `inverse_d` is (D^-1,), or () where D is not the same everywhere. Returns () where nobody knows.
+    `inverse_d` is (D^-1,), or () if D is not constant. Returns () if C is unknown.
     """
     return ()
 
 
 @point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
-    """Return the moment of a point at rest, as a tuple: empty for transfers that keep nothing."""
+    """Return the moment of a point at rest, as a tuple: empty for transfers that store none."""
     return ()
 
 
 @point_function(otherwise=True)
 def add_moment(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
-    """moment + the part of the k-th node in it."""
+    """Add the contribution of the k-th node to the moment."""
     return moment
 
 
 @point_function(otherwise=True)
 def by_arms(transfer, inverse_d):
-    """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T; else ().
+    """(a,), if the stored tensor is a sum_I N_I v*_I (X_I - x)^T; otherwise ().
 
-    `inverse_d` is (D^-1,), or () where D is not the same everywhere.
+    `inverse_d` is (D^-1,), or () if D is not constant.
     """
     return ()
 
 
 @point_function(otherwise=True)
 def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
-    """Return the weight of the k-th node in strains and forces: here its `gradient`."""
+    """Return the weight of the k-th node in strains and forces: by default its `gradient`."""
     return gradient
 
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Check that N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
+    """Return True if N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
     return False
 
 
@@ -115,14 +115,14 @@ def forces_by_arms(transfer, kin):
 def straining(transfer, kin, gradient):
     """Return the strain's term in a gather of velocity and gradient: `gradient`.
 
-    Or nothing, where what the point keeps is the gradient of velocity.
+    Or (), if the point stores the velocity gradient.
     """
     return gradient
 
 
 @point_function(otherwise=True)
 def terms(transfer):
-    """Number of terms of the series that XPIC sums on the nodes; 1 is none beyond the first."""
+    """Number of terms of the series that XPIC sums on the nodes; 1: only the first."""
     return 1
 
 
@@ -138,7 +138,7 @@ def _left_out(moment, scene):
 
 
 WITH = "{scene.transfer_name} with {scene.basis_name} functions"
-TURNS = 1.5  # from where on a body gains a share of energy that counts
+TURNS = 1.5  # revolutions from which a body gains a relevant fraction of energy
 SMOOTH = "quadratic-spline in the place of the basis, or method tlmpm"
 known_failure(
     Moment,

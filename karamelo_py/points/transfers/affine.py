@@ -1,10 +1,9 @@
-"""Affine transfers: the point keeps the moment of velocity B beside its velocity.
+"""Affine transfers: the point stores the moment of velocity B with its velocity.
 
 B_p = sum_I N_I v*_I (X_I - x_p)^T, and the point gives the node
-m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Keeping B rather than C = B D^-1 conserves angular
-momentum to round-off for functions whose D changes with the place in the cell, too
-(Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell method",
-eqs. 15 to 18).
+m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Storing B instead of C = B D^-1 conserves angular momentum
+to round-off, also if D depends on the position in the cell (Jiang, Schroeder & Teran 2017, "An
+angular momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
 """
 
 from typing import Annotated, NamedTuple
@@ -19,17 +18,17 @@ from karamelo_py.points.laws import jacobian
 from karamelo_py.points.transfers import Moment
 from karamelo_py.points.transfers.flip import Share, blend, swings, take_nodal_velocity
 
-COMPRESSED = 1e-3  # share of its volume that a point has to lose to go with the grid
-SEPARATE = 0.1  # strength of separation that elastic bodies bear
+COMPRESSED = 1e-3  # volume fraction that a point has to lose to move with the grid
+SEPARATE = 0.1  # strength of separation that elastic bodies tolerate
 
 
 class APIC(NamedTuple):
-    """v_p = v_pic, and B_p = sum N_I v*_I (X_I - x_p)^T travels with the point.
+    """v_p = v_pic, and the point stores B_p = sum N_I v*_I (X_I - x_p)^T.
 
-    Conserves linear and angular momentum to round-off, and damps what lies below a cell (Jiang et
-    al. 2015).
+    Conserves linear and angular momentum to round-off, and damps motion below the cell size (Jiang
+    et al. 2015).
 
-    With functions whose D vanishes at nodes (linear, Bernstein-quadratic) in the updated frame, the
+    With bases whose D vanishes at nodes (linear, Bernstein-quadratic) in the updated frame, the
     velocity that deforms the points omits the moments. This needs musl. usl and usf are refused.
 
     Example
@@ -43,7 +42,7 @@ class APIC(NamedTuple):
 
 
 class AFLIP(NamedTuple):
-    """FLIP's mean velocity, and the moment of velocity of APIC.
+    """FLIP's mean velocity, with the moment of velocity of APIC.
 
     Less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021, "Revisiting
     integration in the material point method", section 4).
@@ -51,7 +50,7 @@ class AFLIP(NamedTuple):
     Parameters
     ----------
     alpha
-        Share of FLIP.
+        FLIP coefficient.
 
     Example
     -------
@@ -66,19 +65,19 @@ class AFLIP(NamedTuple):
 
 
 class ASFLIP(NamedTuple):
-    """AFLIP whose points move with velocities of their own where they come apart.
+    """AFLIP with point velocities that differ from the grid where the material separates.
 
     For granular flow and splashes: points that the grid holds together separate sooner (Fei et al.
-    2021, section 5). Where the material is compressed by more than a thousandth of its volume,
-    points move with the grid and keep their order.
+    2021, section 5). If the material is compressed by more than 0.1 % of its volume, points move
+    with the grid and retain their order.
 
     Parameters
     ----------
     alpha
-        Share of FLIP.
+        FLIP coefficient.
     beta
-        Strength of separation: the share of a point's velocity relative to the grid that also moves
-        it, where the material is not compressed. 0 is AFLIP.
+        Strength of separation: the fraction of a point's velocity relative to the grid that also
+        moves it, if the material is not compressed. 0 is AFLIP.
 
     Example
     -------
@@ -87,9 +86,9 @@ class ASFLIP(NamedTuple):
 
     Notes
     -----
-    The points of a solid under tension lose their order, although it does not come apart. Two
-    elastic rings that meet at 30 m/s rebound at 22.5 m/s with AFLIP. With a share of 0.97 they
-    rebound at 22.2 (beta = 0.1), 18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 m/s (1).
+    In a solid under tension the points lose their order, although it does not separate. Two elastic
+    rings that collide at 30 m/s rebound at 22.5 m/s with AFLIP. With a FLIP coefficient of 0.97
+    they rebound at 22.2 (beta = 0.1), 18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 m/s (1).
     """
 
     alpha: Annotated[float, Share]

@@ -1,4 +1,4 @@
-"""PIC and FLIP: the point takes the velocity of the nodes, or its change."""
+"""PIC and FLIP: the point takes the nodal velocity, or its change."""
 
 from math import exp, pi
 from types import MappingProxyType
@@ -11,10 +11,10 @@ from karamelo_py.points import noise
 from karamelo_py.points.transfers import in_step, lost_shares, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
-SWING = 0.05  # strain of vibrations that bodies do not bear for long
+SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
 LAG = 0.03  # of the angular velocity of a free body
 BRAKED = 0.05  # of the energy of its rotation
-TURNS = 1.5  # of a free body, from where on FLIP has taken a share that counts
+TURNS = 1.5  # revolutions of a free body, from which FLIP has taken a relevant fraction
 
 
 class PIC(NamedTuple):
@@ -35,15 +35,15 @@ class PIC(NamedTuple):
 class FLIP(NamedTuple):
     """v_p = (1 - alpha) v_pic + alpha (v_p + dv): alpha = 1 is pure FLIP, alpha = 0 is PIC.
 
-    Keeps energy well; keeps noise in the null space of the grid too, which a little PIC
+    Conserves energy well, but retains noise in the null space of the grid, which a little PIC
     (alpha = 0.99) damps (Brackbill & Ruppel 1986).
 
     Parameters
     ----------
     alpha
-        Share of FLIP.
+        FLIP coefficient.
     variant
-        Maps the gradient of velocity, too: TFLIP.
+        Also map the velocity gradient: TFLIP.
 
     Example
     -------
@@ -58,15 +58,15 @@ class FLIP(NamedTuple):
 
 
 class FLIPPerTime(NamedTuple):
-    """FLIP whose damping goes with time: alpha is the share of a stable step.
+    """FLIP with damping per time: alpha applies to a stable step.
 
-    A shorter step keeps alpha^(dt / stable dt). FLIP takes the share 1 - alpha in each step of any
-    size. Half the step then damps vibrations twice as much in the same time.
+    A shorter step uses alpha^(dt / stable dt). Plain FLIP removes the fraction 1 - alpha in each
+    step of any size, so half the step damps vibrations twice as much in the same time.
 
     Parameters
     ----------
     alpha
-        Share of FLIP in a stable step.
+        FLIP coefficient for a stable step.
 
     Example
     -------
@@ -81,7 +81,7 @@ class FLIPPerTime(NamedTuple):
 
     inverts_spread = False
     in_lanes = True
-    per_time = True  # alpha is the share of a stable step, not of each; others may leave it out
+    per_time = True  # alpha is for a stable step, not for each; optional elsewhere
 
 
 @in_step.on(FLIPPerTime)
@@ -90,13 +90,13 @@ def _in_step_flip_per_time(transfer, kept):
 
 
 def take_nodal_velocity(transfer: type) -> None:
-    """Let the points of `transfer` take the velocity of the nodes after the step, as PIC's do."""
+    """Let the points of `transfer` take the nodal velocity after the step, as in PIC."""
     lost_shares.on(transfer)(lambda transfer, like: (1.0, 1.0))
     updated_velocity.on(transfer)(lambda transfer, v, v_pic, dv: v_pic)
 
 
 def blend(transfer: type) -> None:
-    """Let the velocity of points follow from `transfer` as that of FLIP does, by its `alpha`."""
+    """Update the velocity of points with `transfer` as in FLIP, by its `alpha`."""
 
     @updated_velocity.on(transfer)
     def _updated_velocity_transfer(transfer, v, v_pic, dv):
@@ -111,7 +111,7 @@ def blend(transfer: type) -> None:
 
 
 def swings(transfer: type) -> None:
-    """Let large vibrations with `transfer` be judged: nothing lasts there but usl, which damps."""
+    """Register the warning for large vibrations with `transfer`: only usl, which damps, is safe."""
     known_failure(
         transfer,
         "large vibrations",
@@ -131,16 +131,16 @@ def swings(transfer: type) -> None:
 
 
 def _turns_away(transfer, scene):
-    """Tell whether a free body turns so often that what each turn takes adds up."""
+    """Return True if a free body rotates so often that the loss per revolution adds up."""
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
 def slows(transfer: type) -> None:
-    """Let bodies that turn many times with `transfer` be judged.
+    """Register the warning for bodies that rotate many times with `transfer`.
 
-    Points move with the velocity of the grid, u, and have their own, v: each step changes the
-    angular momentum by the sum of m u x v dt, whatever the step (disks in the plane, E 100 times
-    the energy of the turn, 4 and 8 cells across the radius; R4, splines and linear functions).
+    Points move with the grid velocity u, and store v: each step changes the angular momentum by the
+    sum of m u x v dt, for any step (disks in 2D, E 100 times the rotational energy, 4 and 8 cells
+    across the radius; R4, splines and linear basis).
     """
     known_failure(
         transfer,
@@ -162,13 +162,13 @@ def slows(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """Tell whether points follow a free rotation too slowly, by 3 % or more of a radian or more."""
+    """Return True if points lag a free rotation by 3 % or more, over a radian or more."""
     lag = scene.lag
     return lag.share > LAG and 2 * pi * lag.turns > 1
 
 
 def _brakes(transfer, scene):
-    """Find the energy that a free rotation loses: (1 - alpha) of the lag in each step, twice."""
+    """Return the energy loss of a free rotation: (1 - alpha) of the lag in each step, twice."""
     lag, simulation = scene.lag, scene.simulation
     if not lag.share > 0:
         return None
@@ -178,10 +178,10 @@ def _brakes(transfer, scene):
 
 
 def lags(transfer: type) -> None:
-    """Let free rotations with `transfer` in the total frame be judged.
+    """Register the warning for free rotations with `transfer` in the total frame.
 
-    Points move with the velocity of the grid, and have their own: a square of n cells turns too
-    slowly by 2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
+    Points move with the grid velocity, and store another: a square of n cells rotates too slowly by
+    2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
     """
     known_failure(
         transfer,

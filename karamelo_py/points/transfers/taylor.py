@@ -1,9 +1,9 @@
-"""Taylor transfers: the point keeps the gradient of velocity L beside its velocity.
+"""Taylor transfers: the point stores the velocity gradient L with its velocity.
 
 The point gives the node m_p N_I (v_p + L_p (X_I - x_p)), with L_p = sum_I v*_I (x) grad N_I: no D
-is inverted, so that every basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,
-Bernstein-quadratic) this is APIC in another form, and angular momentum is conserved as far as D
-stays the same; for splines as far as velocity is linear over their support.
+is inverted, so any basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,
+Bernstein-quadratic) this is APIC in another form. Angular momentum is then conserved as far as D is
+constant; with splines, as far as velocity is linear over their support.
 """
 
 from typing import Annotated, NamedTuple
@@ -18,12 +18,12 @@ from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 
 
 class TPIC(NamedTuple):
-    """v_p = v_pic, and the gradient of velocity L_p travels with the point.
+    """v_p = v_pic, and the point stores the velocity gradient L_p.
 
     A Taylor expansion of the velocity around the point. It damps less than PIC and inverts no D
     (Nakamura, Matsumura & Mizutani 2023, "Taylor particle-in-cell transfer and kernel correction
-    for material point method"). With functions whose D vanishes at nodes (linear,
-    Bernstein-quadratic), a drifting body in the updated frame gains energy without bounds.
+    for material point method"). With bases whose D vanishes at nodes (linear, Bernstein-quadratic),
+    a drifting body in the updated frame gains energy without bounds.
 
     Example
     -------
@@ -38,12 +38,12 @@ class TPIC(NamedTuple):
 class TFLIP(NamedTuple):
     """FLIP's velocity, mapped to the nodes as N_I (v_p + L_p (X_I - x_p)): Karamelo's projection.
 
-    ``method(kind, FLIP, basis, alpha, gradient-enhanced)`` is the same thing.
+    ``method(kind, FLIP, basis, alpha, gradient-enhanced)`` is equivalent.
 
     Parameters
     ----------
     alpha
-        Share of FLIP.
+        FLIP coefficient.
 
     Example
     -------
@@ -58,11 +58,11 @@ class TFLIP(NamedTuple):
 
 
 class MLS(NamedTuple):
-    """APIC; N_I D^-1 (X_I - x), a moving least squares fit, stands for the gradient everywhere.
+    """APIC with N_I D^-1 (X_I - x), a moving least squares fit, instead of the gradient.
 
-    The point keeps the velocity gradient C = B D^-1. Its force on a node is -V sigma N_I D^-1 (X_I
+    The point stores the velocity gradient C = B D^-1. Its force on a node is -V sigma N_I D^-1 (X_I
     - x) (Hu et al. 2018, "A moving least squares material point method", eqs. 16 to 18). Angular
-    momentum is conserved to round-off where D is constant: with splines, more than a cell away from
+    momentum is conserved to round-off if D is constant: with splines, more than a cell away from
     the walls.
 
     Example
@@ -101,7 +101,7 @@ take_nodal_velocity(MLS)
 
 @transfers.gradient_weight.on(MLS)
 def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
-    # The hoop part N / r of an axisymmetric one stays.
+    # The hoop part N / r in axisymmetry is unchanged.
     moved = affine_weight(basis, kin, grid, stencil, k)
     return as_gradient(kin, [*moved, *gradient[len(moved) :]])
 
@@ -109,8 +109,8 @@ def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
 transfers.by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)
 
 
-# The velocity gradient is what the point keeps: gathered once where both come from v*.
-# Axisymmetric, the hoop part is missing in it.
+# The point stores the velocity gradient: gathered once if both come from v*.
+# In axisymmetry it lacks the hoop part.
 
 
 @transfers.forces_by_arms.on(MLS)

@@ -1,4 +1,4 @@
-"""XPIC: PIC of higher order, damping only what the grid cannot see (Hammerquist & Nairn 2017)."""
+"""XPIC: PIC of higher order, which damps only null-space noise (Hammerquist & Nairn 2017)."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -16,7 +16,7 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass that XPIC has taken of a point so far; velocity not in the series yet."""
+    """Energy per mass that XPIC has removed from a point so far; velocity not in the series yet."""
 
     @staticmethod
     def shape(kin: Any) -> int:
@@ -25,12 +25,12 @@ class Reflected(StepField):
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """Check that points of a law take the transfer's loss of energy as heat."""
+        """Return True if points of a law take the transfer's energy loss as heat."""
         return can(law, taken_heat)
 
 
 class Series(SummedField):
-    """Term of the series at a node, and the sum for the next."""
+    """Term of the series at a node, and the sum for the next term."""
 
     @staticmethod
     def shape(kin: Any) -> int:
@@ -39,13 +39,13 @@ class Series(SummedField):
 
 
 class XPIC(NamedTuple):
-    """v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I): m = 1 is PIC, m without end is FLIP.
+    """v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I): m = 1 is PIC, infinite m is FLIP.
 
-    S maps nodes to points and S+ points to nodes by mass. A few steps remove noise in the null
-    space. The motion that the grid sees stays (Hammerquist & Nairn 2017, "A new method for material
-    point method particle updates that reduces noise and enhances stability", eq. 24). The terms w_0
-    = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Every order beyond the first
-    visits the points once more per step.
+    S maps nodes to points and S+ points to nodes by mass. A low order removes noise in the null
+    space and retains the motion that the grid resolves (Hammerquist & Nairn 2017, "A new method for
+    material point method particle updates that reduces noise and enhances stability", eq. 24). The
+    terms w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Each order beyond the
+    first costs one extra pass over the points per step.
 
     Parameters
     ----------
@@ -65,6 +65,6 @@ class XPIC(NamedTuple):
     in_lanes = True
 
 
-# kernels.table.sum_series has put the sum of the series, with the change, in the place of dv.
+# kernels.table.sum_series has replaced dv by the sum of the series, with the change.
 updated_velocity.on(XPIC)(lambda transfer, v, v_pic, dv: dv)
 terms.on(XPIC)(lambda transfer: transfer.order)

@@ -1,15 +1,15 @@
-"""Convected particle domain interpolation: a point sees the nodes around the corners of its domain.
+"""Convected particle domain interpolation: a point sees the nodes around its domain's corners.
 
 Over the domain of a point, each basis function is replaced by a simple function through its values
 at the corners x_c (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
 
     N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
 
-with the means w_c and g_c, over the domain, of the function of corner c and of its gradient. The
-domains tile the body however far it stretches, so that it does not break between points.
+with w_c and g_c, the means over the domain of the function of corner c and of its gradient. The
+domains tile the body however far it stretches, so it does not fracture numerically.
 
-A family of domains derives from `ConvectedDomain` and gives only :func:`domain`. Domains with
-stored corners that move with the grid derive from `CarriedDomain`, and give `upright`, too.
+A family of domains derives from `ConvectedDomain` and defines only :func:`domain`. Domains with
+stored corners that move with the grid derive from `CarriedDomain`, and also define `upright`.
 """
 
 from math import inf
@@ -25,26 +25,27 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 
 
 class Element(NamedTuple):
-    """The kind of element whose corners a family of domains keeps."""
+    """The kind of element whose corners a family of domains stores."""
 
-    kind: str  # what meshes call it
+    kind: str  # its name in meshes
     corners: int
     edges: tuple[tuple[int, int], ...]  # between corners; their determinant must be positive
-    mirrored: tuple[int, ...]  # the order of corners for elements of which it is negative
-    box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, where it is one
+    mirrored: tuple[int, ...]  # the order of corners for elements with a negative determinant
+    box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, if it is one
 
 
 class ConvectedDomain(NamedTuple):
-    """Base of these bases, of 2^d corners; they add `dimension` and `shape`.
+    """Base of these bases, with 2^d corners; they add `dimension` and `shape`.
 
-    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. The centre is not
-    the point if corners lie beyond the grid, or in quadrilaterals and hexahedra that are no
-    parallelograms. Linear momentum stays exact, and angular momentum belongs to the centres. That
-    of the points then varies by a thousandth of its variation with FLIP (a spinning square, Q4).
+    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. The centre differs
+    from the point if corners lie beyond the grid, or in quadrilaterals and hexahedra that are not
+    parallelograms. Linear momentum stays exact, and angular momentum belongs to the centres. The
+    angular momentum of the points then varies by 0.1 % of its variation with FLIP (a spinning
+    square, Q4).
     """
 
     cells = 3
-    line_nodes = 2  # that a corner sees
+    line_nodes = 2  # per corner
     nodes_per_cell = 1
     least_nodes = 2
     steady_moment = True
@@ -54,13 +55,13 @@ class ConvectedDomain(NamedTuple):
 
 
 class CarriedDomain(ConvectedDomain):
-    """Base of domains whose corners a place keeps, and the grid moves; they add `element`."""
+    """Base of domains with stored corners that the grid moves; they add `element`."""
 
     __slots__ = ()
     shape = ("corners",)
 
 
-BENT, SMALL = 0.2, 0.15  # a strain; a share of the stable step
+BENT, SMALL = 0.2, 0.15  # a strain; a fraction of the stable step
 
 
 def _torn_by_bending(basis, scene):
@@ -81,8 +82,8 @@ known_failure(
     cure="dt_factor(0.1), which keeps the energy of such a beam to 0.1 % (R4), or method tlmpm",
 )
 
-# By dimension, the cells that domains count as reaching at least: in the plane points give to the
-# nodes next to them at once.
+# By dimension, the minimum reach of domains in cells: in 2D points scatter to the nodes next to
+# them at once.
 LEAST = (0.0, 0.0, 0.5, 0.0)
 # Corners in the order of a mesh: around the square; around the lower face of the cube and the upper
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -96,7 +97,7 @@ def domain(basis, kin, place):
 
 @point_function()
 def upright(basis, kin, place):
-    """Check that the domain is nowhere folded over: the Jacobian is positive at every corner."""
+    """Return True if the domain is not folded: the Jacobian is positive at every corner."""
 
 
 class Corner(NamedTuple):
@@ -108,7 +109,7 @@ class Corner(NamedTuple):
 
 
 class CornerStencil(NamedTuple):
-    """Corners of a domain, from which its nodes follow. Fields that nobody reads cost nothing."""
+    """Corners of a domain, from which its nodes follow. Unused fields cost nothing."""
 
     corners: tuple[Corner, ...]
     weights: tuple[float, ...]  # of the corners, and their gradients
@@ -120,9 +121,9 @@ class CornerStencil(NamedTuple):
 
 
 class AtCorners(NamedTuple):
-    """In the place of a basis: the point sees the corners of its domain as it else sees nodes.
+    """Tag instead of a basis: the corners of a point's domain take the role of nodes.
 
-    A node number is then a :class:`~karamelo_py.compiler.compile.Weighted`. Serves what takes the
+    A node number is then a :class:`~karamelo_py.compiler.compile.Weighted`. For code that uses the
     weight or the gradient of a node once, as a factor.
     """
 
@@ -133,13 +134,13 @@ class AtCorners(NamedTuple):
 
 
 def along_cell(grid, direction, x):
-    """The cell of a corner in one direction, how far the corner lies in it (0 to 1), and both.
+    """Cell of a corner in one direction, position in it (0 to 1), and both together.
 
-    A corner beyond the grid counts as lying on its face: weights go on adding up to one.
+    A corner beyond the grid is moved to its face, so weights still sum to one.
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # so written, NaN becomes 0
+    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
     i = min(int(a), cells - 1)
     return i, a - i, a
 
@@ -151,13 +152,13 @@ def corner_at(kin, grid, x):
 
 
 def hat(corner, j):
-    """Linear function of the j-th node of a corner's cell."""
+    """Linear basis function of the j-th node of a corner's cell."""
     sides = zip(digits(j, 2, len(corner.cell)), corner.fractions, strict=True)
     return product([where(far > 0, r, 1 - r) for far, r in sides])
 
 
 def node_around(grid, corner, j):
-    """Number of the j-th node of a corner's cell, and that of the first."""
+    """Number of the j-th node of a corner's cell, and number of the first node."""
     first = node_number(grid, grid.first, corner.cell)
     return first, node_number(grid, 0, digits(j, 2, len(corner.cell)))
 
@@ -170,7 +171,7 @@ def around(grid, corner):
 
 
 def arm(grid, first, far, centre):
-    """From the weighted centre to the node that is `far` from the `first` along a direction."""
+    """Vector from the weighted centre to the node `far` from the `first` along a direction."""
     return (real(first + far, centre) - centre) * grid.h
 
 
@@ -183,7 +184,7 @@ def pairs_of_spread(kin):
 
 
 def spread_of(kin, grid, weight, corner, centre):
-    """The part of one corner in D, that is w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    """Contribution of one corner to D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):
@@ -226,7 +227,7 @@ def seen_at_corner(kin, stencil, c):
 
 
 def of_corner(stencil, c):
-    """The stencil with one of its corners alone, the c-th, which a run knows."""
+    """The stencil with only its c-th corner, chosen at run time."""
     parts = list(zip(stencil.corners, stencil.weights, stencil.gradients, strict=True))
     numbers = flat(parts[0])
     for k, part in enumerate(parts):
@@ -268,7 +269,7 @@ def _support_corners(basis, kin):
 bases.first_node.on(ConvectedDomain)(lambda basis, like: 0.5)
 
 
-# --- corners that go with the grid ------------------------------------------------------------
+# --- corners that move with the grid ----------------------------------------------------------
 
 
 @bases.support.on(CarriedDomain)
@@ -304,7 +305,7 @@ def _extent_corners(basis, kin, grid, place):
     return where(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
 
 
-# --- corners in the place of nodes ------------------------------------------------------------
+# --- corners instead of nodes -----------------------------------------------------------------
 
 
 @bases.support.on(AtCorners)

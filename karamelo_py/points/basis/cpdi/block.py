@@ -1,8 +1,8 @@
-"""The nodes around a domain in the plane, each once: three by three.
+"""The nodes around a domain in 2D, each once: three by three.
 
-Corners of one domain mostly lie in two neighbouring cells along each direction, and most of the
-nodes of these are seen from several corners. What points give to nodes is summed over the corners
-before it gets there. In space that takes more than it saves: 27 nodes, eight corners.
+Corners of one domain mostly lie in two neighbouring cells along each direction, and most nodes of
+these cells are seen from several corners. Contributions of points are summed over the corners
+before they are added to the nodes. In 3D this costs more than it saves: 27 nodes, eight corners.
 """
 
 from collections.abc import Iterable
@@ -19,28 +19,28 @@ WIDTH = 3  # nodes along each direction
 
 
 class NodeBlock(NamedTuple):
-    """The nodes next to a point, and what it sees of them. Nobody computes what nobody reads."""
+    """The nodes next to a point, with weights and gradients. Unused fields cost nothing."""
 
     first: tuple[int, ...]  # number of the first of them, along each direction
     weights: tuple[float, ...]
-    gradients: tuple[Any, ...]  # from those of the corners, without N / r
-    holds: bool  # whether the corners lie between them, and no node is missing at a wall
+    gradients: tuple[Any, ...]  # from the gradients of the corners, without N / r
+    holds: bool  # whether it contains the corners, and no node is missing at a wall
     seen: CornerStencil
 
 
 class InBlock(NamedTuple):
-    """In the place of a basis: the point sees a :class:`NodeBlock`."""
+    """Tag instead of a basis: the point sees a :class:`NodeBlock`."""
 
     basis: NamedTuple
 
 
 def _hats(a):
-    """The linear functions of three nodes, `a` cells from the first."""
+    """The linear basis functions of three nodes, `a` cells from the first."""
     return max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)
 
 
 def block_of(kin, grid, stencil):
-    """The block of a point; () in space."""
+    """The block of a point; () in 3D."""
     if kin.dimension > 2:
         return ()
     first, ahead, holds = [], [], True
@@ -74,7 +74,7 @@ def is_one_block(block):
 
 @shared
 def of_one(block):
-    """The block of points that see the same nodes: their numbers have no lanes."""
+    """The block of points with the same nodes: their numbers have no lanes."""
     return NodeBlock(tuple([first_lane(number) for number in block.first]), *block[1:])
 
 

@@ -1,4 +1,4 @@
-"""Domains: parallelograms that deform with the point; elements whose corners go with the grid."""
+"""Domains: parallelograms that deform with the point; elements whose corners move with the grid."""
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.points import basis as bases
@@ -7,17 +7,17 @@ from karamelo_py.points.kinematics import Space, cofactor, determinant, dot, tot
 
 
 class _Parallel(cpdi.ConvectedDomain):
-    """Base of domains by their half edges."""
+    """Base of domains given by half edges."""
 
     __slots__ = ()
     shape = ("half_edges",)
 
 
 class R4(_Parallel):
-    """Parallelograms: x and two half edges r, which turn and stretch with the point.
+    """Parallelograms: x and two half edges r, which rotate and stretch with the point.
 
-    Neighbouring domains may overlap or part a little where the strain is not uniform
-    (Sadeghirad, Brannon & Burghardt 2011).
+    Neighbouring domains may overlap or separate slightly if the strain is not uniform (Sadeghirad,
+    Brannon & Burghardt 2011).
 
     Example
     -------
@@ -29,7 +29,7 @@ class R4(_Parallel):
 
 
 class R8(_Parallel):
-    """Parallelepipeds: x and three half edges r, which turn and stretch with the point.
+    """Parallelepipeds: x and three half edges r, which rotate and stretch with the point.
 
     Example
     -------
@@ -41,7 +41,7 @@ class R8(_Parallel):
 
 
 def half_edges(kin, place):
-    """The half edges of a place, vectors."""
+    """The half edges of a domain, vectors."""
     d = kin.dimension
     return [vector(kin, place[d * e : d * e + d]) for e in range(1, d + 1)]
 
@@ -67,7 +67,7 @@ def _domain_parallel(basis, kin, place):
     corners: list = []
     gradients: list = []
     # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
-    # In space, nine products with k before the sums are fewer than twelve after them.
+    # In 3D, nine products with k before the sums are fewer than twelve after them.
     A = reciprocals(kin, edges, k if d == 3 else 1)
     for signs in cpdi.SQUARE if d == 2 else cpdi.CUBE:
         corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
@@ -92,7 +92,7 @@ def _deformed_parallel(basis, kin, place, dl):
 def _extent_parallel(basis, kin, grid, place):
     away = [total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, place), strict=True)]
     far = away[0]
-    for other in away[1:]:  # so written, NaN comes through
+    for other in away[1:]:  # in this form, NaN is passed on
         far = far + max(other - far, 0)
     return max(far * grid.inv_h, cpdi.LEAST[kin.dimension])
 
@@ -104,7 +104,7 @@ class _Simplex(cpdi.CarriedDomain):
 
 
 class T3(_Simplex):
-    """Triangles of a mesh: three corners, each with a third of the weight.
+    """Triangles of a mesh: three corners, each with a weight of 1/3.
 
     Example
     -------
@@ -117,9 +117,9 @@ class T3(_Simplex):
 
 
 class Tet4(_Simplex):
-    """Tetrahedra of a mesh: four corners, each with a quarter of the weight.
+    """Tetrahedra of a mesh: four corners, each with a weight of 1/4.
 
-    The choice of Sinaie et al. 2017 for the cantilever.
+    Used by Sinaie et al. 2017 for the cantilever.
 
     Example
     -------
@@ -132,7 +132,7 @@ class Tet4(_Simplex):
 
 
 def corners_and_edges(kin, place):
-    """The corners, vectors, and components of the edges from the first to the others."""
+    """The corners, vectors, and components of the edges from the first to the rest."""
     d = kin.dimension
     corners = [vector(kin, place[d * c : d * c + d]) for c in range(1, d + 2)]
     edges = [corner - corners[0] for corner in corners[1:]]
@@ -144,7 +144,7 @@ def _domain_simplex(basis, kin, place):
     d = kin.dimension
     corners, edges = corners_and_edges(kin, place)
     k = 1 / determinant(edges, d)
-    # Reciprocal vectors of the edges; the gradients add up to nothing.
+    # Reciprocal vectors of the edges; the gradients sum to zero.
     others = [vector(kin, [k * cofactor(edges, d, e, i) for i in range(d)]) for e in range(d)]
     first = -others[0]
     for other in others[1:]:
@@ -159,10 +159,10 @@ def _upright_simplex(basis, kin, place):
 
 
 class Q4(cpdi.CarriedDomain):
-    """Quadrilaterals of four corners, which neighbouring points move alike.
+    """Quadrilaterals whose four corners move with those of neighbouring points.
 
-    Domains go on tiling the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear
-    they tangle, which ends the run; the parallelograms of R4 cannot.
+    Domains always tile the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear
+    they tangle, which ends the run; R4 parallelograms cannot.
 
     Example
     -------
@@ -200,23 +200,23 @@ def _upright_q4(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
     ax, ay, bx, by = x2 - x1, y2 - y1, x3 - x2, y3 - y2
     cx, cy, dx, dy = x4 - x3, y4 - y3, x1 - x4, y1 - y4
-    # Jacobians at the corners, from the edges that meet there.
+    # Jacobians at the corners, from the two edges at each.
     least = min(
         min(ax * by - bx * ay, bx * cy - cx * by), min(cx * dy - dx * cy, dx * ay - ax * dy)
     )
     return least > 0
 
 
-# Weights of the ends of an edge at the nearer and the farther of its two Gauss points.
+# Weights of the ends of an edge at its nearer and farther Gauss point.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 # Of two directions, in the order of `_at_gauss`.
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
 class H8(cpdi.CarriedDomain):
-    """Trilinear hexahedra of eight corners, which neighbouring points move alike.
+    """Trilinear hexahedra whose eight corners move with those of neighbouring points.
 
-    Weights and gradients are the exact means over the hexahedron. 2 x 2 x 2 Gauss points integrate
+    Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
     cubic functions along each direction. N det J is cubic, grad N det J of lower order.
 
     Example
@@ -238,7 +238,7 @@ def _cross(a, b):
 def _at_gauss(a, b, c, d):
     """Interpolate values at (-,-), (+,-), (-,+), (+,+) to the Gauss points, bilinearly.
 
-    Also, since the weights are symmetric, what values at the Gauss points give to the corners.
+    Since the weights are symmetric, also distributes values at the Gauss points to the corners.
     """
     e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
     g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
@@ -259,13 +259,13 @@ def _add(a, b):
 
 
 def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
-    """Signs of a corner: `s` in direction e, `a` and `b` in the others."""
+    """Signs of a corner: `s` in direction e, `a` and `b` in the other directions."""
     others = (a, b)
     return (*others[:e], s, *others[e:])
 
 
 def _edges(place):
-    """Half of the edges along each direction; the other two directions go as in `_at_gauss`."""
+    """Half of the edges along each direction; the other two directions as in `_at_gauss`."""
     at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
 
     def half(e, a, b):
@@ -296,7 +296,7 @@ def _at(a: int, b: int) -> int:
 
 
 def _means(place, d, p, q, r):
-    """Corners, weights and gradients, from what det J and its cofactors give to the corners."""
+    """Corners, weights and gradients, from the contributions of det J and its cofactors."""
     sums = [(d[0][n] + d[1][n]) + (d[2][n] + d[3][n]) for n in range(2)]
     k = 1 / (sums[0] + sums[1])
     near, far, half = k * NEAR, k * FAR, k * 0.5
@@ -315,7 +315,7 @@ def _means(place, d, p, q, r):
 
 @cpdi.upright.on(H8)
 def _upright_h8(basis, kin, place):
-    # The least of the corners' Jacobians, from the half edges that meet there.
+    # The smallest Jacobian of the corners, from the half edges at each.
     u, v, w = _edges(place)
     met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in cpdi.CUBE]
     return min(*[dot(a, _cross(b, c)) for a, b, c in met]) > 0

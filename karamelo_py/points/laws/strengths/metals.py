@@ -169,7 +169,7 @@ def _precompute_johnson_cook(strength, memory, heat):
 @first_guess.on(JohnsonCook)
 def _first_guess_johnson_cook(strength, memory, known, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # the rate depends on the strain: `known` holds for zero strain only
+        return real(0, q), real(0, q)  # `known` is without the rate
     hard, soft = known
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, memory.ep, hard * soft, excess, slope)
