@@ -4,6 +4,7 @@ import ast
 import re
 from textwrap import dedent
 
+import numpy as np
 import pytest
 from conftest import INPUTS
 from scenes import block
@@ -685,6 +686,93 @@ def test_a_pressed_body_that_drifts_is_told(run_interpreted):
     for method, v in (("ulmpm, FLIP, linear, 0.99", 0), ("ulmpm, FLIP, cpgimp, 0.99", 0.1)):
         text = PRESSED.format(method=method, v=v, run="run_time(20)")
         assert CROSSING not in run_interpreted(text, command="check", folder=f"{v}").err
+
+
+GEL = """
+    method({method})
+    dimension(2, 0, 0.2, 0, 0.7, {h})
+    material(gel, neo-hookean, 1000, {E}, 0.3)
+    material(steel, neo-hookean, 7800, 2.1e9, 0.3)
+    region(gel, block, 0, 0.2, 0, 0.4)
+    region(plate, block, 0, 0.2, 0.4, 0.5)
+    solid(gel, region, gel, 2, gel, {h})
+    solid(plate, region, plate, 2, {plate}, {h})
+    region(floor, block, -INF, INF, -INF, 0)
+    group(floor, nodes, region, floor, all)
+    fix(floor, velocity_nodes, floor, {floor})
+    region(sides, block, 0.001, 0.199, -INF, INF, exterior)
+    group(sides, nodes, region, sides, all)
+    fix(sides, velocity_nodes, sides, 0, {sides})
+    fix(g, body_force, all, 0, {g})
+    {more}
+    group(plate, particles, region, plate, solid, plate)
+    place = xcm(plate, y)
+    sink = 0.45 - place
+    log_modify(custom, time, sink)
+    set_output(time(0.1))
+    run_time({time})
+"""
+ON_GEL = {
+    "method": "ulmpm, FLIP, linear, 0.9", "h": 0.05, "E": 1e5, "plate": "steel", "floor": "0, 0",
+    "sides": "NULL", "g": -9.81, "more": "", "time": 2,
+}  # fmt: skip
+WEIGHT = "warning: weight on a soft body: "
+
+
+@pytest.mark.parametrize(
+    ("told", "numbers"),
+    [
+        (True, {}),
+        (True, {"h": 0.1}),  # 0.0304 for 0.027
+        (True, {"g": -60, "plate": "gel"}),
+        (True, {"method": "ulmpm, APIC, linear"}),
+        (False, {"method": "ulmpm, FLIP, cpgimp, 0.9"}),
+        (False, {"method": "ulmpm, FLIP, quadratic-spline, 0.9"}),
+        (False, {"method": "tlmpm, FLIP, linear, 0.9"}),
+        (False, {"more": "scheme(quasi-static)"}),
+        (False, {"E": 1e6}),
+        (False, {"plate": "gel"}),
+        (False, {"g": 0}),
+        (False, {"time": 0.05}),  # less than a period
+        (False, {"floor": "0, NULL", "more": "boundary(delete)"}),  # it falls
+        (False, {"sides": 0}),  # it sticks to the walls
+    ],
+)
+def test_a_weight_that_moves_a_soft_body_through_cells_is_told(run_interpreted, told, numbers):
+    text = GEL.format(**ON_GEL | numbers)
+    said = run_interpreted(text, command="check").err
+    assert (WEIGHT in said) == told
+    if not numbers:  # g L^2/c^2 (1/2 + m_1/m) = 9.81 * 0.4^2 * (0.5 + 1.95) / 134.6, in 0.05
+        assert "compresses solid 'gel' by 0.071 of its length" in said
+        assert "moves by 0.57 cells" in said
+
+
+def settled() -> float:
+    """Shorten a column of neo-Hookean gel under its weight and the plate: sigma(J) = -p - rho g Y.
+
+    sigma = mu (J - 1/J) + lambda ln(J)/J in uniaxial strain.
+    """
+    mu, lam, height, gravity = 1e5 / 2.6, 1e5 * 0.3 / (1.3 * 0.4), 0.4, 9.81
+    depth = height * (np.arange(400) + 0.5) / 400
+    J = np.ones(400)
+    for _ in range(20):
+        excess = mu * (J - 1 / J) + lam * np.log(J) / J + gravity * (780 + 1000 * depth)
+        J -= excess / (mu * (1 + 1 / J**2) + lam * (1 - np.log(J)) / J**2)
+    return height * float(1 - J.mean())
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("method", "low", "high"),
+    [
+        ("ulmpm, FLIP, linear, 0.9", 1.1, 1.4),  # 10 to 40 %, as the warning says
+        ("ulmpm, FLIP, cpgimp, 0.9", 0.94, 1.06),
+        ("ulmpm, FLIP, quadratic-spline, 0.9", 0.94, 1.06),
+    ],
+)
+def test_gel_under_a_plate_sinks_too_far_with_linear_functions(run_script, method, low, high):
+    log = run_script(GEL.format(**ON_GEL | {"method": method, "time": 4})).log
+    assert low < log.sink[-10:].mean() / settled() < high
 
 
 SPIN = """

@@ -72,6 +72,17 @@ known_failure(
 )
 known_failure(
     Linear,
+    "weight on a soft body",
+    when=lambda basis, scene: scene.settling.cells > 0,
+    reason="at rest, weight compresses solid '{scene.settling.name}' by "
+    "{scene.settling.strain:.2g} of its length, and its end moves by {scene.settling.cells:.2g} "
+    "cells; stressed points that cross cells of a linear basis lose stress: the body vibrates "
+    "under the sudden load and comes to rest 10 to 40 % too far",
+    cure="cpgimp or quadratic-spline instead of linear, or tlmpm; or a load that grows with time, "
+    "over several periods",
+)
+known_failure(
+    Linear,
     "hourglasses",
     when=lambda basis, scene: not scene.moves and scene.d > 1 and bool(scene.single),
     reason="one point per cell (solid '{scene.single[0]}') with linear functions that never move "

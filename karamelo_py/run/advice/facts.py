@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
-from karamelo_py.run import timestep
+from karamelo_py.run import settling, timestep
 from karamelo_py.run.body_motion import (
     BodyMotion,
     Lag,
@@ -130,6 +130,11 @@ class SceneFacts:
     def crossing(self) -> Crossing:
         """Estimate how far stressed matter will move through the grid."""
         return expected(self)
+
+    @cached_property
+    def settling(self) -> settling.Settling:
+        """Estimate how far weight presses the softest body that is held at one end."""
+        return settling.expected(self)
 
     @property
     def share(self) -> float:
