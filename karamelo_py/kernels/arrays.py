@@ -1,8 +1,8 @@
-"""The arrays a run works on, as NamedTuples that kernels take.
+"""The arrays of a run, as NamedTuples for kernels.
 
 n is the number of points of a block, d the dimension, N the number of nodes, T the number of tiles.
-Arrays of points have the shape (components, n), those of nodes (N, components). Fields that not
-every scene has are declared by their owners (:mod:`karamelo_py.compiler.fields`).
+Arrays of points have the shape (components, n), arrays of nodes (N, components). Optional fields
+are declared by their owners (:mod:`karamelo_py.compiler.fields`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,7 +21,7 @@ from karamelo_py.points.kinematics import vector
 Tag: TypeAlias = Any
 # A double or single, lanes of these, or a number with slopes.
 Number: TypeAlias = Any
-# A number of a point or node, or of those in lanes.
+# A number of a point or node, or of several in lanes.
 Index: TypeAlias = Any
 
 
@@ -31,13 +31,13 @@ class Nodes(NamedTuple):
     Components are named by the functions below: ``nodes.sums[n, of_force(kin) + k]``.
     """
 
-    sums: np.ndarray  # mass, momentum, force, as the points give them
+    sums: np.ndarray  # mass, momentum, force, as scattered by the points
     update: np.ndarray  # v* after the momentum update, and v* - v
     velocity: np.ndarray  # the velocity whose gradient deforms the points
     fields: tuple  # declared fields, (N, components)
 
 
-# Components of the records; in space a vector takes the place of four, the width of a register.
+# Components of the records; in 3D a vector takes four numbers, the width of a register.
 MASS = 0  # of Nodes.sums
 
 
@@ -52,12 +52,12 @@ def of_force(kin):
 
 
 def of_change(kin):
-    """Return the first component of v* - v in `Nodes.update`; that of v* is 0."""
+    """Return the first component of v* - v in `Nodes.update`; v* begins at 0."""
     return 4 if kin.dimension == 3 else kin.dimension
 
 
 def vector_at(kin, records, i, first, like):
-    """Return the components of a record of a node from the `first` on, as a vector."""
+    """Return the components of a node's record from `first`, as a vector."""
     return vector(kin, row(records, i, first, (*like,)))
 
 
@@ -70,8 +70,8 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 class Points(NamedTuple):
     """Arrays of the points of one constitutive law, in the order of the tiles.
 
-    A place is a position (d numbers), followed by what the basis keeps of the shape of a point's
-    domain where weights follow the motion.
+    A place is a position (d numbers), followed by the stored shape of a point's domain if weights
+    follow the motion.
     """
 
     x: np.ndarray  # (2, w, n): places now and after the move; Clock.now says which
@@ -86,9 +86,9 @@ class Points(NamedTuple):
 
 
 def known_to_laws(points):
-    """Return the points with what every scene has of them, and no more.
+    """Return the points with only the fields that every scene has.
 
-    What asks laws alone is compiled once for each then, not for all methods that go with it.
+    Kernels of laws are then compiled once, and not again for every method.
     """
     return Points(
         points.x, None, points.v, points.mass, points.state, points.material, points.grid,
@@ -106,7 +106,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
-    """Make points of the kind of `points` with such arrays as `arrays_of` has given."""
+    """Make points of the kind of `points` from the results of `arrays_of`."""
     arrays = iter(found)
     own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
     return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
@@ -115,24 +115,24 @@ def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
 class Tiling(NamedTuple):
     """The points of a block by tile."""
 
-    count: np.ndarray  # (3,) int64: number of occupied tiles, of shares of the points, and of those
-    #                    of them that other processes wait for
+    count: np.ndarray  # (3,) int64: number of occupied tiles, of shares of the points, and of
+    #                    shares that other processes wait for
     share: np.ndarray  # (S + 1,) int64: tiles of the k-th share are order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: in which the occupied tiles are visited
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
-    grid: np.ndarray  # (T + 1,) int64: the grid that the k-th occupied tile belongs to
-    number: np.ndarray  # (T + 1,) int64: of the k-th occupied tile among all
+    grid: np.ndarray  # (T + 1,) int64: the grid of the k-th occupied tile
+    number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile among all
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may reach
-    rows: np.ndarray  # (T + 1, r, 2) int16: of each row of the box, in space number i ny + j, the
-    #                   first and last of them, counted from its beginning; the last before the
-    #                   first where there is none, and behind the last row. No rows (r = 0) where
-    #                   boxes are not looked at so closely
+    rows: np.ndarray  # (T + 1, r, 2) int16: of each row of the box, in 3D number i ny + j, the
+    #                   first and last node, counted from its beginning; the last before the first
+    #                   if the row is empty, and after the last row. No rows (r = 0) if boxes are
+    #                   not refined
     buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
     #                     step_x and step_y of the numbers that its nodes have there
     report: np.ndarray  # (T + 1, 14): largest move, largest rate, offending point + 1 of each tile;
-    #                     when its points were looked at, their kinetic and stored energy, the
+    #                     at looks, the kinetic and stored energy of its points, the
     #                     number of their solid (-1: of several), their mass and momentum,
-    #                     their elastic energy and that times velocity
+    #                     their elastic energy, and its product with velocity
 
 
 CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
@@ -142,32 +142,32 @@ class Buffers(NamedTuple):
     """Sums of the tiles of points: a dense box of nodes for each, one after another.
 
     A tile of nodes sums the boxes that reach it, in one order, and leaves zeros in them. Its parts
-    are ranges of nodes in up to three directions: what each box has in common with it; before them
-    all its nodes to be cleared, where the first box has not all that others reach. Columns of a
-    part: numbers of its first node in the grid and in the box; lengths; steps from a number to that
-    of the neighbour, in the grid and in the box, along the first two directions; what is done.
+    are ranges of nodes in up to three directions: its overlap with each box; before them all its
+    nodes to be cleared, if the first box does not cover the rest. Columns of a part: numbers of its
+    first node in the grid and in the box; lengths; strides in the grid and in the box, along the
+    first two directions; the action.
 
     In scenes of few points the buffers are the nodes themselves: these are cleared before a visit,
-    and tile after tile adds.
+    and the tiles add to them in turn.
     """
 
-    nodes: Nodes  # the fields that points give to
+    nodes: Nodes  # the fields that points scatter to
     count: np.ndarray  # (2,) int64: number of shares of the nodes; whether boxes are the nodes
     first: np.ndarray  # (S + 1,) int64: parts of the k-th share are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
-    number: int  # of these among the buffers of a scene
+    number: int  # index among the buffers of a scene
 
 
 class Places(NamedTuple):
     """Places of the points of a block during a sweep: arrays (w, n)."""
 
-    where: np.ndarray  # that the weights of the gather belong to
+    where: np.ndarray  # for the weights of the gather
     x: np.ndarray  # before
     y: np.ndarray  # after
 
 
 class Block(NamedTuple):
-    """Points of one law, its parameters per material, and where each tile's points lie."""
+    """Points of one law, its parameters per material, and the points of each tile."""
 
     points: Points
     laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
@@ -175,7 +175,7 @@ class Block(NamedTuple):
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """Return the block with the points in these rows, in this order; they are to be sorted anew."""
+    """Return the block with the points of these rows, in this order; they must be sorted again."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
@@ -193,10 +193,10 @@ HOOK = np.dtype(
         ("end", np.int64),
         ("slot", np.int64),  # of the published total; -1: none
         ("uses_before", np.int64),  # the value one step earlier
-        ("uses_share", np.int64),  # one over the number of members with mass
+        ("uses_share", np.int64),  # 1 / number of members with mass
         ("holds", np.int64),  # sets the velocity, or bounds it
-        ("uses_place", np.int64),  # whether its formulas differ from place to place
-        ("totals", np.int64),  # that a hook on whole points publishes
+        ("uses_place", np.int64),  # whether its formulas depend on position
+        ("totals", np.int64),  # published by a hook on whole points
     ]
 )
 PROGRAM = np.dtype(
@@ -207,18 +207,18 @@ PROGRAM = np.dtype(
         ("last", np.int64),
     ]
 )
-# Who holds a node in one direction, and with what force.
-HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: nobody
+# The hook that holds a node in one direction, and its force.
+HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: none
 
 
 class Apart(NamedTuple):
-    """Arrays of each of A threads for hooks on nodes."""
+    """Arrays for each of A threads for hooks on nodes."""
 
     chosen: np.ndarray  # (A, BLOCK): see Hooks
     scratch: np.ndarray  # (A, 9 + depth, BLOCK)
     values: np.ndarray  # (A, ...): see Control
     totals: np.ndarray  # (A, rows, LIMBS), zero between two loops
-    clock: np.ndarray  # (A, 1) CLOCK, of which what hooks read and write is used
+    clock: np.ndarray  # (A, 1) CLOCK; only the entries for hooks are used
 
 
 class Hooks(NamedTuple):
@@ -233,16 +233,16 @@ class Hooks(NamedTuple):
     x0: np.ndarray  # (n, d) reference positions of the points, by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
-    held: np.ndarray  # (N, d) HELD, where hooks hold nodes in common; else (0, d)
-    loads: np.ndarray  # (N, d) of this step, where hooks bring forces; else (0, d)
-    told: np.ndarray  # (F,) bool: fields of rigid solids, of F that each have N/F nodes; or (0,)
+    held: np.ndarray  # (N, d) HELD, if several hooks hold the same nodes; else (0, d)
+    loads: np.ndarray  # (N, d) of this step, if hooks apply forces; else (0, d)
+    told: np.ndarray  # (F,) bool: fields of rigid solids, of F with N/F nodes each; or (0,)
     mode: Tag  # one thread, or several
     apart: Apart
     whole: tuple  # tags of the hooks on whole points, made by `vector_hook`
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
-WHOLE = -1  # in the place of an address: one of Hooks.whole
+WHOLE = -1  # instead of an address: one of Hooks.whole
 
 # Stages of a step at which fixes act, in Karamelo's names.
 INITIAL_INTEGRATE = 0
@@ -262,36 +262,36 @@ ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 CLOCK = np.dtype(
     [
         ("fixed_dt", np.float64),  # step of set_dt, or 0
-        ("dt_factor", np.float64),  # share of the stable step of waves
+        ("dt_factor", np.float64),  # fraction of the stable step of waves
         ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.clock
-        ("heat_factor", np.float64),  # of that of conduction
+        ("heat_factor", np.float64),  # fraction of the stable step of conduction
         ("end_time", np.float64),
-        ("last_dt", np.float64),  # of the last step; of the present one before there was any
-        ("kick", np.float64),  # how long the forces act: between the middles of the two steps
-        ("first_kick", np.float64),  # that of the first step, in steps
-        ("contact_dt", np.float64),  # the step that contact is as stiff as: see kernels.clock
-        ("contact_kick", np.float64),  # how long forces would act in such steps
+        ("last_dt", np.float64),  # the last step; the present one at the start
+        ("kick", np.float64),  # time that forces act: between the middles of the two steps
+        ("first_kick", np.float64),  # kick of the first step, in steps
+        ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock
+        ("contact_kick", np.float64),  # time that forces would act in such steps
         ("last_contact_dt", np.float64),
         ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
-        ("common", np.float64, (1, 3)),  # velocity that speeds are measured from
-        ("weight", np.float64),  # of what all drift by in that: 1, with which `common` is 0
-        ("wave", np.float64),  # speed of waves when `common` was measured
-        ("speed", np.float64),  # of the point that goes furthest, in cells
+        ("common", np.float64, (1, 3)),  # reference velocity for speeds
+        ("weight", np.float64),  # weight of the common drift: 1, with which `common` is 0
+        ("wave", np.float64),  # wave speed when `common` was measured
+        ("speed", np.float64),  # of the fastest point, in cells
         ("new_rate", np.float64),  # of the last sweep
-        ("move", np.float64),  # of the point that went furthest in this step, in cells
+        ("move", np.float64),  # largest move of a point in this step, in cells
         ("new_move", np.float64),
-        ("stride", np.float64),  # cells that a point may go in a step
+        ("stride", np.float64),  # cells that a point may move in a step
         ("drift", np.float64),  # since the points were sorted, in cells
         ("drift_limit", np.float64),
-        ("pace", np.float64),  # of the point that went furthest in a step since then
-        ("path", np.float64),  # of the points that went furthest, since the start, in cells
+        ("pace", np.float64),  # largest move in a step since then
+        ("path", np.float64),  # largest path since the start, in cells
         ("spacing", np.float64),  # smallest cell size
         ("courant", np.float64),  # stable step over cell size / rate
         ("courant_moving", np.float64),  # the same once points have moved
-        ("heat_limit", np.float64),  # stable step of conduction, infinite where there is none
+        ("heat_limit", np.float64),  # stable step of conduction, infinite without
         ("heat_reference", np.float64),  # the same in undeformed bodies
-        ("kept", np.float64),  # share of its own velocity that a point keeps (FLIP)
-        ("kept_by_time", np.float64),  # that in a stable step, where it follows from the step; or 0
+        ("kept", np.float64),  # fraction of its velocity that a point retains (FLIP)
+        ("kept_by_time", np.float64),  # for a stable step, if it depends on the step; or 0
         ("first_limit", np.float64),  # stable step at the start
         ("limit", np.float64),  # stable step now
         ("now", np.int64),  # which of the two arrays of places is the present one
@@ -299,14 +299,14 @@ CLOCK = np.dtype(
         ("over_limit", np.int64),  # steps above the stable limit, one after another
         ("watch_limit", np.int64),  # whether to stop because of them
         ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
-        ("level", np.float64),  # share of the present stored energy in the balance
+        ("level", np.float64),  # fraction of the present stored energy in the balance
         ("work", np.float64),  # of the fixes so far
         ("kinetic", np.float64),  # sums over the points
-        ("stored", np.float64),  # with what is dissipated
+        ("stored", np.float64),  # with dissipated energy
         ("born_with", np.float64),  # internal energy of gases before any work
         ("stored_before", np.float64),  # one step earlier
-        ("moving_before", np.float64),  # kinetic less work, then
-        ("stored_at", np.int64),  # the step of that
+        ("moving_before", np.float64),  # kinetic minus work, then
+        ("stored_at", np.int64),  # step of these values
         ("looks", np.int64),  # number of looks at the balance
         ("balance", np.float64),  # kinetic + stored + dissipated - work
         ("first_balance", np.float64),
@@ -318,51 +318,51 @@ CLOCK = np.dtype(
         ("first_mean", np.float64),  # mean of the first window
         ("largest_mean", np.float64),
         ("largest_energy", np.float64),  # of kinetic, stored and work
-        ("largest_own", np.float64),  # the same, without what bodies have that only drift
+        ("largest_own", np.float64),  # the same, without pure drift
         ("of_drift", np.float64),  # kinetic energy of the centres of mass
         ("elastic", np.float64),  # elastic energy at the last look
-        ("carried", np.float64, (1, 3)),  # it times the cells that it has been carried through
-        ("to_and_fro", np.float64),  # time in which waves go through all bodies and back
+        ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
+        ("to_and_fro", np.float64),  # time for waves through all bodies and back
         ("time_of_look", np.float64),
-        ("lost", np.float64),  # energy that it has lost by that, of the unit, at most
-        ("crossed", np.float64),  # cells that stressed matter has moved through, at most
+        ("lost", np.float64),  # energy lost by that, as a fraction of the unit, at most
+        ("crossed", np.float64),  # cells that stressed material has moved through, at most
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
-        ("windows", np.int64),  # in which the balance has grown, one after another
-        ("growth", np.float64),  # in the last window, of the largest energy
+        ("windows", np.int64),  # consecutive windows in which the balance has grown
+        ("growth", np.float64),  # in the last window, relative to the largest energy
         ("grown", np.float64),  # since the first looks or the first window, at most
         ("watch_heat", np.int64),  # whether all sources of heat are known
-        ("coldest", np.float64),  # that initial state, fixes and sources allow
+        ("coldest", np.float64),  # allowed by initial state, fixes and sources
         ("hottest", np.float64),
         ("T_low", np.float64),  # of the points at the last look
         ("T_high", np.float64),
         ("own_heat", np.float64),  # largest rise of a temperature by the work of its point
-        ("set_low", np.float64),  # what fixes have set at nodes
+        ("set_low", np.float64),  # set at nodes by fixes
         ("set_high", np.float64),
-        ("rise", np.float64),  # largest rate that fixes heat points at
+        ("rise", np.float64),  # largest heating rate of points by fixes
         ("fall", np.float64),
     ]
 )
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
-LAST = 2**62  # no id of a point is so large
+LAST = 2**62  # above any id of a point
 
 
 class Control(NamedTuple):
-    """Clock, published values and totals: the arrays of the compiled loop beside the fields."""
+    """Clock, published values and totals: the arrays of the compiled loop besides the fields."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
     totals: np.ndarray  # sums, LIMBS numbers each, see kernels.totals: of the published values,
-    #                     and behind them mass and momentum of each solid, 1 + d, and elastic
-    #                     energy and that times velocity
+    #                     then mass and momentum of each solid, 1 + d, and elastic energy and its
+    #                     product with velocity
     digits: np.ndarray  # (LIMBS,) scratch
-    answer: np.ndarray  # rounded totals, and what processes agree on
+    answer: np.ndarray  # rounded totals, and results agreed between processes
     firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
     ranks: Tag  # whether there are other processes
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """Make a control of these published values, its clock at zero, of solids in `d` dimensions."""
+    """Make a control with these published values and a zero clock, for solids in `d` dimensions."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
     clock[0].weight = clock[0].stride = 1.0
     more = (1 + d) * (len(firsts) + 1)
@@ -373,27 +373,27 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 
 
 class Setup(NamedTuple):
-    """Everything a step needs; its type decides what is compiled."""
+    """All arguments of a step; its type decides what is compiled."""
 
     frame: Tag  # whether weights belong to present or reference positions
     kin: Tag  # kinematics tag
     basis: Tag
     transfer: Tag
-    averaging: Tag  # whether changes of volume are averaged (F-bar)
-    contact: Tag  # how solids with fields of their own touch
-    heat: Tag  # whether heat flows between points, and the nodes it flows through
+    averaging: Tag  # whether volume changes are averaged (F-bar)
+    contact: Tag  # contact between solids with separate fields
+    heat: Tag  # whether heat flows between points, and its nodes
     grids: Grid  # with an array (g,) for each number
     nodes: Nodes
     buffers: Buffers
     blocks: tuple[Block, ...]  # one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
-    ranges: np.ndarray  # (S + rows, 2) int64: which of the rows that follow each share of the nodes
-    #                     has; then the ranges of node numbers in use, share after share
+    ranges: np.ndarray  # (S + rows, 2) int64: for each share of the nodes, its range of the
+    #                     following rows; then the ranges of node numbers in use, by share
     control: Control
 
 
 def with_items_of(values, others):
-    """Put the items of another NamedTuple in the place of those with their names."""
+    """Replace items by those of another NamedTuple with the same names."""
     new = dict(zip(others._fields, others, strict=True))
     items = zip(values._fields, values, strict=True)
     return type(values)(*[new.get(name, item) for name, item in items])
@@ -401,7 +401,7 @@ def with_items_of(values, others):
 
 @noinline
 def first_from(ascending, begin, end, x):
-    """Find the first number that is not below `x`; NumPy's search compiles for 0.4 s."""
+    """Find the first number that is not below `x`; NumPy's search takes 0.4 s to compile."""
     while begin < end:
         middle = (begin + end) // 2
         if ascending[middle] < x:

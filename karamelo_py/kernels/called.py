@@ -1,7 +1,7 @@
-"""Hooks in Python that compiled steps call: the loop does not come back for them.
+"""Python hooks called from compiled steps, without leaving the loop.
 
-A step calls a function of Python by its address before it maps the points to the nodes. That
-function puts forces on points of the arrays that the step works on.
+A step calls a Python function by its address before it maps the points to the nodes. That function
+applies forces to points in the arrays of the step.
 """
 
 from typing import NamedTuple
@@ -21,10 +21,10 @@ _call = caller_of(CALL)
 
 
 class CalledHooks(NamedTuple):
-    """The compiled hooks of a scene, and what else acts at the start of each step."""
+    """The compiled hooks of a scene, and the Python function called at the start of each step."""
 
     compiled: NamedTuple
-    address: int  # of the function ``(stage) -> 1``, or 0 where it has failed
+    address: int  # of the function ``(stage) -> 1``, or 0 if it has failed
 
 
 @kernel

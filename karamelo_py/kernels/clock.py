@@ -1,4 +1,4 @@
-"""The size of steps, and the end of a step."""
+"""Step size, and the end of a step."""
 
 from math import inf
 from typing import Any
@@ -16,15 +16,15 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """Return dt of the present step, in the precision of the run: how long points move."""
+    """Return dt of the present step, in the precision of the run: the time that points move."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the step before, which the velocity at the start of this one belongs to.
+    """Return dt of the previous step, for the velocity at the start of this one.
 
-    Before the first step there was none: the state at the start has its strain already. It takes
-    next to nothing, since rates of strain are asked for.
+    Before the first step there is none: the initial state already includes its strain. A very small
+    value is used, since strain rates are needed.
     """
     share = NEXT_TO_NOTHING if s.control.values[TIMESTEP] == 0 else 1.0
     return real(share * s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
@@ -33,44 +33,44 @@ def last_step_size(s: Setup) -> Number:
 def kick(s: Setup) -> Number:
     """Return the time for which forces act in this step.
 
-    Places belong to the ends of steps, velocities to their middles: forces lead from the middle of
-    one step to that of the next. In the first one they act for a whole step, too: velocities at the
-    start are taken for those of half a step before, unless a script asks for half.
+    Positions belong to the ends of steps, velocities to their middles: forces act from the middle
+    of one step to the middle of the next. In the first step they also act for a whole step: initial
+    velocities belong to half a step earlier, unless a script requests half.
     """
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
 def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
-    """Return the velocity that speeds are measured from, in the number type of `like`."""
+    """Return the reference velocity for speeds, in the number type of `like`."""
     return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step
-ROUNDING = 1e-6  # of a step: what additions of a million steps may be off
+ROUNDING = 1e-6  # of a step: error of a million additions
 
-# Contact is as stiff as a step allows. Where steps fall at once, as by set_dt, the step that it is
-# as stiff as falls by this share of the time: springs under load stiffen over several periods.
+# Contact is as stiff as a step allows. If steps drop suddenly, as by set_dt, the step for its
+# stiffness drops by this fraction of the time: loaded springs stiffen over several periods.
 FOLLOWING = 0.01
 
-# Points that cross cells add energy to a body, by so much per cell, and the more the longer
-# the step. Until they have gone so far, in cells, a scene takes the steps of bodies at rest.
+# Points that cross cells add energy to a body, this much per cell, and more with a longer step.
+# Until they have moved this far, in cells, a scene takes the steps of bodies at rest.
 STILL = 0.25
-# Where a common drift does not count as it is in the step, none moves a point by more cells.
+# Where a common drift is discounted in the step, no point may move by more cells than this.
 STRIDE = 0.65
 
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """Choose dt of the next step, by the rate of the fastest point or as fixed; less at the end.
+    """Choose dt of the next step, from the rate of the fastest point or fixed; less at the end.
 
-    The last two steps are shortened alike. Where velocities are mapped or prescribed, a step takes
-    impulses that do not vanish with its length: in a last step that is a small part of the others,
-    forces (impulses over dt) would be many times what they are before. Contact with a stiffness of
-    m/dt^2 is that of a whole step: springs under load that became stiffer would throw bodies back.
+    The last two steps are shortened equally. If velocities are mapped or prescribed, impulses do
+    not vanish with the step: in a very short last step, forces (impulses over dt) would be many
+    times larger than before. Contact with a stiffness of m/dt^2 uses a whole step: loaded springs
+    that suddenly became stiffer would throw bodies back.
     """
     clock = control.clock[0]
     if clock.weight > 1:
-        # What all drift by may have turned since it was measured, and be taken from their speeds.
+        # The common drift may have rotated since it was measured, so limit it by the speeds.
         clock.rate = max(clock.rate, clock.wave + clock.speed * clock.spacing)
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
@@ -82,8 +82,8 @@ def choose_dt(control: Control) -> None:
     clock.limit = limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
     remaining = clock.end_time - control.values[TIME]
-    # The tolerance swallows the rounding of many additions of dt: no step of 1e-16 at the end, and
-    # none more than there are.
+    # The tolerance covers the rounding of many additions of dt, so there is no final step of 1e-16
+    # and no extra step.
     if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
@@ -104,14 +104,14 @@ def choose_dt(control: Control) -> None:
 
 @kernel
 def finish(control: Control) -> None:
-    """End of a step: the points are where they moved to, time goes on, the next dt is chosen."""
+    """End a step: points take their new positions, time advances, the next dt is chosen."""
     clock = control.clock[0]
     clock.now = 1 - clock.now
     dt = control.values[DT]
     clock.last_dt = dt
     clock.last_contact_dt = clock.contact_dt
     time = control.values[TIME] + dt
-    # Exactly the end, when this step was shortened to reach it.
+    # Exactly the end, if this step was shortened to reach it.
     control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
     control.values[TIMESTEP] += 1
     clock.drift += clock.move
@@ -139,7 +139,7 @@ def _read_reports(tiling, control):
 
 
 def read_reports(s: Setup) -> None:
-    """Gather the reports of all tiles in the clock: largest rate and move, and any wrong point."""
+    """Collect the reports of all tiles in the clock: largest rate and move, and any wrong point."""
     clock = s.control.clock[0]
     clock.new_rate = 0.0
     clock.new_move = 0.0
@@ -149,7 +149,7 @@ def read_reports(s: Setup) -> None:
 
 
 def take_reports(clock: Any) -> None:
-    """Take over the reports of a sweep of a step."""
+    """Accept the reports of a sweep."""
     # Points move in one sweep of a step, and their domains may grow in another.
     clock.move += clock.new_move
     if clock.new_rate > 0:
@@ -157,7 +157,7 @@ def take_reports(clock: Any) -> None:
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Take over the reports of a sweep; return True if no point went wrong."""
+    """Accept the reports of a sweep; return True if no point went wrong."""
     clock = s.control.clock[0]
     read_reports(s)
     take(clock)
@@ -165,7 +165,7 @@ def all_well(s: Setup, take: Any = take_reports) -> bool:
 
 
 def checked_move(frame, kin, grids, points, now, stride, p):
-    """Count the cells that point `p` moves by in a step; tell whether it may go as far."""
+    """Return the move of point `p` in a step, in cells, and whether it is allowed."""
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)
     step = (y - load_vector(kin, points.x[now], p)).largest()
@@ -190,7 +190,7 @@ def _check_points(frame, kin, grids, points, tiling, now, stride, k):
 
 
 def check_moves(s: Setup, mode: Tag) -> bool:
-    """Look at the new positions again, after hooks that may have changed them."""
+    """Check the new positions again, after hooks that may have changed them."""
     clock = s.control.clock[0]
     for block in s.blocks:
         of = block.points, block.tiling, clock.now, clock.stride

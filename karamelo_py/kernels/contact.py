@@ -1,27 +1,27 @@
-"""Contact on the grid between solids that have velocity fields of their own.
+"""Contact on the grid between solids with separate velocity fields.
 
-Where two fields have mass at a node, the part of their relative velocity by which they approach
-each other along their common normal is taken away by an impulse, after Bardenhagen et al. 2001 ("An
+Where two fields have mass at a node, an impulse removes the part of their relative velocity with
+which they approach each other along their common normal, after Bardenhagen et al. 2001 ("An
 improved contact algorithm for the material point method and application to stress propagation in
-granular material", CMES 2(4)); friction adds an impulse along the surface, at most mu times as
-large (Coulomb). What leaves one field enters the other: momentum is kept to round-off.
+granular material", CMES 2(4)). Friction adds a tangential impulse, at most mu times as large
+(Coulomb). The impulses on both fields are opposite: momentum is conserved to round-off.
 
-Where more than two fields meet, all pairs take their impulses from the same velocities, so that it
-does not matter in which order the solids were defined. Each pair takes the share 1 / k of its own,
-where k is the number of pairs of the one of its two bodies that is in more of them: then no body
-gets more than would stop it, and energy does not grow. What remains is taken in the same way again.
+Where more than two fields meet, all pairs compute their impulses from the same velocities, so the
+order of the solids does not matter. Each pair takes the fraction 1 / k of its impulse, where k is
+the larger of its two bodies' numbers of pairs: then no body is more than stopped, and energy does
+not grow. The remainder is removed in the same way again.
 
-Fields meet at nodes up to two cells before the bodies do (the reach of the functions). Therefore
-the gap between the surfaces is measured, from the mean places of the points of each body that a
-node sees (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed, and are
-stopped where it would be less than nothing at the end of the step. Convex bodies are apart if they
-are along one direction: the axes of the grid are tried, too, since normals lean where faces end.
+Fields meet at nodes up to two cells before the bodies do (the reach of the basis functions).
+Therefore the gap between the surfaces is measured, from the mean positions of the points of each
+body around a node (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed
+at the end of the step. Convex bodies are apart if they are apart along one direction: the grid axes
+are tried too, since normals are tilted where faces end.
 
-A mean place says little of the lowest point of a liquid or of grains: each time that it seems to
-leave a gap, points would sink into a wall a little, and for good. So where contact with a body
-whose velocity is prescribed acted in the last step, others may leave it, and not approach. Such a
-wall may be one cell thick, and may have corners that others fill: of its faces those count that
-face the other body, and in a hollow corner none of them may be entered.
+The mean position is not the lowest point of a liquid or of granular material: each time that it
+seems to leave a gap, points would sink a little into a wall, permanently. So where contact with a
+body of prescribed velocity acted in the last step, others may separate but not approach. Such a
+wall may be one cell thick and have corners that other bodies fill: only its faces towards the other
+body count, and in a hollow corner none of them may be entered.
 """
 
 from math import sqrt
@@ -49,52 +49,52 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
 
 # Squared sines of angles about the mean direction out of a body:
-SCATTER = 0.003  # to which that of a plane face is known
+SCATTER = 0.003  # accuracy of the direction of a plane face
 EDGE = 0.03  # beyond which a face ends, or is round
-FACING = 0.3  # cosine of an angle, from which on two faces look at each other
-REPEATS = 16  # at most, where more than two fields meet; what remains falls by a half or more
+FACING = 0.3  # cosine of an angle, from which two faces face each other
+REPEATS = 16  # at most, if more than two fields meet; each halves the remainder or better
 
 
 class SeparateFields(NamedTuple):
-    """Solids touch where their fields meet. F fields of equal grids, S solids."""
+    """Contact where fields meet. F fields on equal grids, S solids."""
 
     node_fields = (Normal, Centre)
-    looks_beyond = 1  # cells beyond nodes that points see, at what others give
+    looks_beyond = 1  # cells beyond the nodes of points, whose sums are read
 
-    stride: int  # from a node to the same place in the next field
-    beside: np.ndarray  # (d, 2) step from a node to the next one along each axis, number of nodes
+    stride: int  # from a node to the same position in the next field
+    beside: np.ndarray  # (d, 2) stride to the next node along each axis, number of nodes
     per_mass: np.ndarray  # (F,) specific volume over h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
-    warmth: np.ndarray  # (F, F) share of the heat of friction that goes to the first of two fields
+    warmth: np.ndarray  # (F, F) fraction of the frictional heat to the first of two fields
     pair: np.ndarray  # (F, F) slot of the published force of a pair on its first field, or -1
     slot: np.ndarray  # (F,) slot of the published force on each field
-    copies: np.ndarray  # (k, 2) slots: from a field to the other solids that share it
-    touched: np.ndarray  # (N, F) int32: the last step (from 1) in which a node touched that of
-    #                      another field, which comes later; minus that where the two stuck
-    prescribed: np.ndarray  # (N, d) 1 + slot of the reaction, where a fix prescribes v, else 0
+    copies: np.ndarray  # (k, 2) slots: from a field to the other solids with that field
+    touched: np.ndarray  # (N, F) int32: the last step (from 1) of contact between a node and the
+    #                      node of another, later field; negative if the two stuck
+    prescribed: np.ndarray  # (N, d) 1 + slot of the reaction, if a fix prescribes v, else 0
     reactions: np.ndarray  # number of slots of such reactions, and these
     forces: np.ndarray  # number of slots of all forces and torques, and these
     rigid: np.ndarray  # (F,) bool: whether contact does not move a field
     torque: np.ndarray  # (F,) slot of the published torque on each field
-    surface: np.ndarray  # (F, k) distance of the surface by the mean place of the points, in cells
-    meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a place
-    partners: np.ndarray  # (F,) int64 scratch: with how many others each of them is in contact
-    change: np.ndarray  # (F, d) scratch: of the velocity of each of them
+    surface: np.ndarray  # (F, k) distance of the surface by the mean position of points, in cells
+    meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a position
+    partners: np.ndarray  # (F,) int64 scratch: number of contacts of each of them
+    change: np.ndarray  # (F, d) scratch: velocity change of each of them
 
 
 class Scratch(NamedTuple):
-    """The last of these, which a thread that shares out places with others has for itself."""
+    """Private scratch of a thread: the last fields of `SeparateFields`."""
 
     meeting: np.ndarray
     partners: np.ndarray
     change: np.ndarray
 
 
-# --- two bodies at a place --------------------------------------------------------------------
+# --- two bodies at a position -----------------------------------------------------------------
 
 
 class Where(NamedTuple):
-    """A place where fields meet, and the step."""
+    """A position where fields meet, and the step."""
 
     x: tuple  # position of the node
     h: float
@@ -103,24 +103,24 @@ class Where(NamedTuple):
 
 
 class Touched(NamedTuple):
-    """In the place of `Where`: pairs of bodies that contact acted between in a step."""
+    """Instead of `Where`: pairs of bodies with contact in a step."""
 
     step: int
 
 
 class NodePair(NamedTuple):
-    """Two bodies at a place: a node of each, and vectors of both."""
+    """Two bodies at a position: a node of each, and vectors of both."""
 
     n: int
     m: int
     per_n: float  # 1 / mass
     per_m: float
     outward: tuple  # common normal, not normalised, from the first body to the second
-    scatter: float  # the lesser of the two directions out of the bodies
-    yielding: tuple  # change of the relative velocity with an impulse along each direction
-    relative: tuple  # velocity of the first body as the second one sees it
-    wall: bool  # whether the velocity of one of them, and no more, is prescribed
-    hollow: bool  # and it has a corner there which the other one fills
+    scatter: float  # the smaller one of the two outward directions
+    yielding: tuple  # change of the relative velocity per impulse along each direction
+    relative: tuple  # velocity of the first body relative to the second
+    wall: bool  # whether exactly one of them has a prescribed velocity
+    hollow: bool  # and it has a corner there that the other one fills
 
 
 @noinline
@@ -135,7 +135,7 @@ def _yielding(contact, n, k, per_mass):
 
 @noinline
 def _led(contact, kin, n):
-    """Return True if the velocity of a body is prescribed: its faces keep their directions."""
+    """Return True if the velocity of a body is prescribed: its faces retain their directions."""
     led = False
     for k in range(kin.dimension):
         led = led or _immovable(contact, n, k)
@@ -150,7 +150,7 @@ def _place(contact, n, k):
 
 @noinline
 def _kept(contact, n, k):
-    """Return 0 at an end of the grid: a body that ends there has no surface for others."""
+    """Return 0 at an end of the grid: a body that ends there has no surface."""
     return 1.0 if 0 < _place(contact, n, k) < contact.beside[k, 1] - 1 else 0.0
 
 
@@ -167,7 +167,7 @@ def _beside(contact, kin, n, which):
 
 @noinline
 def _face(contact, kin, nodes, n):
-    """Return the sum of m grad N of a node, which points out of the body that ends there."""
+    """Return the sum of m grad N of a node, which points out of the body."""
     gradient = vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
     return vector(kin, [_kept(contact, n, k) * of_axis for k, of_axis in enumerate(gradient)])
 
@@ -179,18 +179,18 @@ def _cosine_above(a, b, least):
 
 @noinline
 def _normal(contact, kin, nodes, n, other):
-    """Return the direction out of a body, and the squared sine of the angle by which it scatters.
+    """Return the outward direction of a body, and the squared sine of its scatter angle.
 
-    It is the mean of the sums of m grad N, which point out of a body, of nodes around `n`. Those of
-    one node turn by tens of degrees as points that lean to the grid pass it. With the weights 1/4,
-    1/2, 1/4 along each axis a plane face keeps its direction to two degrees. Those are left out
-    that look the same way as `other`, the direction out of the other body: of a thin wall both
-    faces are near, and one of them faces that body.
+    It is the mean of the sums of m grad N, which point outwards, over the nodes around `n`. The sum
+    of one node rotates by tens of degrees as points in rows inclined to the grid pass it. With the
+    weights 1/4, 1/2, 1/4 along each axis, a plane face is accurate to two degrees. Nodes are
+    omitted if they point the same way as `other`, the outward direction of the other body: both
+    faces of a thin wall are near, and only one of them faces that body.
 
-    Its length is its weight beside the direction out of another body. It grows with the surface
-    that the nodes see, and falls where their directions differ, as at edges and corners. (Lemiale,
-    Nairn & Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of its
-    density both are as large, and that of the block leans by 15 degrees.)
+    The length is its weight relative to the other body's direction. It grows with the surface
+    around the nodes, and falls where their directions differ, as at edges and corners. (Lemiale,
+    Nairn & Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of the
+    same density both are equal, and the block's direction is tilted by 15 degrees.)
     """
     total, lengths = zero_vector(kin, 0.0), 0.0
     for which in range(3**kin.dimension):
@@ -206,16 +206,16 @@ def _normal(contact, kin, nodes, n, other):
     if square > 0:
         scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
         total = square / (scatter * scatter) * total
-    if isinstance(kin, Axisymmetric):  # on the axis bodies push along it
+    if isinstance(kin, Axisymmetric):  # on the axis, contact acts along it
         total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
     return total, scatter
 
 
 @noinline
 def _is_hollow(contact, kin, nodes, n, normal, other):
-    """Return True if faces around a node, of those that face another body, look at each other.
+    """Return True if, of the faces towards another body around a node, two face each other.
 
-    They do where, along the surface, they turn against the way that leads to them.
+    They do if, along the surface, their normals turn towards the connecting vector.
     """
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
@@ -229,9 +229,9 @@ def _is_hollow(contact, kin, nodes, n, normal, other):
 
 @noinline
 def _entering(contact, kin, nodes, n, other, velocity):
-    """Return the part of a velocity by which it enters that face around a node that it enters most.
+    """Return the largest part of a velocity that enters a face around a node.
 
-    Of the faces that face the `other` body.
+    Only faces towards the `other` body count.
     """
     most, part = 0.0, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
@@ -246,7 +246,7 @@ def _entering(contact, kin, nodes, n, other, velocity):
 
 @noinline
 def _entering_corner(contact, kin, nodes, n, other, velocity):
-    """Return the part of a velocity without which it enters no face of a hollow corner."""
+    """Return the part of a velocity to remove so that no face of a hollow corner is entered."""
     left = velocity
     for _ in range(2 * kin.dimension):
         left = left - _entering(contact, kin, nodes, n, other, left)
@@ -257,12 +257,12 @@ def _entering_corner(contact, kin, nodes, n, other, velocity):
 def _pair_of(contact, kin, nodes, records, n, m, known):
     """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`.
 
-    If they are `known`: while they are sought, they say nothing of the faces that they enter.
+    Only if they are `known`, they limit which faces are entered.
     """
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     like = zero_vector(kin, 0.0)
     relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
-    # Opposite faces that end beside each other lean to opposite sides: the difference does not.
+    # Opposite faces that end next to each other tilt to opposite sides: the difference does not.
     of_n, scatter_n = _normal(contact, kin, nodes, n, like)
     of_m, scatter_m = _normal(contact, kin, nodes, m, like)
     led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
@@ -292,14 +292,14 @@ def _pair_of(contact, kin, nodes, records, n, m, known):
 
 
 def _left(pair, push):
-    """Return the relative velocity once the impulse `push` m grad N has been given."""
+    """Return the relative velocity after the impulse `push` m grad N."""
     items = zip(pair.relative, pair.outward, pair.yielding, strict=True)
     return pair.relative._make([v - push * n * yielding for v, n, yielding in items])
 
 
 @noinline
 def _reach(contact, nodes, outward, n, where, side):
-    """Return the distance from node `n` to the surface of its body, along the normal out of it.
+    """Return the distance from node `n` to the surface of its body, along the outward normal.
 
     `side` is 1 for the first body of the pair and -1 for the second.
     """
@@ -322,11 +322,11 @@ def _gap(contact, nodes, outward, n, m, where):
 
 
 def _directions(contact, kin, nodes, pair):
-    """Return directions along which bodies may be apart, beside their normal; zeros for none.
+    """Return further directions along which bodies may be apart; zeros for none.
 
-    Functions are products of those along the axes of the grid: there the gap does not depend on
-    where faces end. Where the faces of both bodies end, the way from the mean place of the one's
-    points to that of the other's leads across the gap. Beside a plane face it does not.
+    Basis functions are products along the grid axes: there the gap does not depend on where faces
+    end. Where the faces of both bodies end, the vector between the mean positions of their points
+    leads across the gap. Next to a plane face it does not.
     """
     centre, like = field(nodes.fields, Centre), zero_vector(kin, 0.0)
     between = pair.per_m * vector_at(kin, centre, pair.m, 0, like)
@@ -341,7 +341,7 @@ def _directions(contact, kin, nodes, pair):
 def _excess_of(contact, kin, nodes, pair, where):
     """Return the excess of the approach velocity over the one that closes the gap in a step.
 
-    It is 0 for bodies that stay apart along any other direction.
+    It is 0 for bodies that are apart along any other direction.
     """
     size = sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
@@ -364,7 +364,7 @@ def _excess_of(contact, kin, nodes, pair, where):
 
 @noinline
 def _friction_of(pair, friction, push, slide, share):
-    """Find the impulse along the surface over the speed of sliding, and whether that stops all."""
+    """Return the tangential impulse per sliding speed, and whether it stops all sliding."""
     compliance = dot(slide, slide, pair.yielding)
     if not compliance > 0:
         return 0.0, False
@@ -373,14 +373,14 @@ def _friction_of(pair, friction, push, slide, share):
     return min(stop, friction * push) / slip, stop <= friction * push
 
 
-# --- all bodies at a place --------------------------------------------------------------------
+# --- all bodies at a position -----------------------------------------------------------------
 
 
 @noinline
 def _meet(contact, nodes, n):
-    """Put the fields that have mass at the place of node `n` into `meeting`; their number.
+    """Write the fields with mass at the position of node `n` to `meeting`; return their number.
 
-    It is 0 where a field that comes before that of `n` is among them: a place is visited once.
+    It is 0 if an earlier field than that of `n` is among them: a position is visited once.
     """
     if not nodes.sums[n, MASS] > 0:
         return 0
@@ -398,15 +398,15 @@ def _meet(contact, nodes, n):
 
 @noinline
 def _node(contact, place, i):
-    """Return the node at a place of the `i`-th of the fields that meet there."""
+    """Return the node at a position of the `i`-th of the fields that meet there."""
     return place + contact.meeting[i] * contact.stride
 
 
 @noinline
 def _count_partners(which, contact, kin, nodes, place, count):
-    """Note in how many pairs each of the fields that meet is; whether any is.
+    """Count the pairs of each field that meets; return whether there are any.
 
-    Those count that approach each other further than they may, or that have `Touched`.
+    Pairs count that approach faster than allowed, or that have `Touched`.
     """
     found = False
     contact.partners[:count] = 0
@@ -436,7 +436,7 @@ def _share(contact, i, j):
 
 @noinline
 def _take(contact, control, a, i, n, k, impulse, per_mass, x):
-    """Give a node a component of an impulse; a fix that prescribes its velocity takes it over."""
+    """Apply a component of an impulse to a node, or to the fix that prescribes its velocity."""
     slot = contact.prescribed[n, k]
     if not _immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
@@ -444,7 +444,7 @@ def _take(contact, control, a, i, n, k, impulse, per_mass, x):
         return
     force = impulse / control.clock[0].kick
     add_to(control.totals, contact.slot[a] + k, force)
-    # A force along k turns about the two other axes.
+    # A force along k has a torque about the two other axes.
     add_to(control.totals, contact.torque[a] + (k + 1) % 3, x[(k + 2) % 3] * force)
     add_to(control.totals, contact.torque[a] + (k + 2) % 3, -x[(k + 1) % 3] * force)
     if slot:
@@ -458,7 +458,7 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
-    """Give `share` of the impulse between the `i`-th and the `j`-th of the fields that meet."""
+    """Apply `share` of the impulse between the `i`-th and `j`-th of the fields that meet."""
     a, b = contact.meeting[i], contact.meeting[j]
     n, m = _node(contact, place, i), _node(contact, place, j)
     pair = _pair_of(contact, kin, nodes, nodes.update, n, m, True)
@@ -469,10 +469,10 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     normal = pair.outward._make([outward / size for outward in pair.outward])
     compliance = dot(normal, normal, pair.yielding)
     if not compliance > 0:
-        return  # the fixes move both
+        return  # both are moved by fixes
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction does not act on the rest of the approach: bodies that are apart come together freely.
+    # Friction does not act on the remaining approach: separate bodies come together freely.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
@@ -480,15 +480,15 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # The energy that friction dissipates: impulse times the mean of the sliding speeds at the
-        # beginning and the end of the step. What forces within the bodies do in between they undo.
+        # The energy dissipated by friction: impulse times the mean of the sliding speeds at the
+        # beginning and the end of the step. Forces within the bodies undo their change in between.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    work = -heat  # that is left of what rigid bodies do
+    work = -heat  # remaining work of rigid bodies
     for k in range(kin.dimension):
         impulse = push * pair.outward[k] / size
         if rub > 0:
@@ -509,7 +509,7 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
 @noinline
 def _touch_place(contact, kin, nodes, control, place, count, where):
     """Resolve contact where `count` fields meet."""
-    contact.partners[:count] = 1  # whether a single pair approaches, it looks itself
+    contact.partners[:count] = 1  # a single pair checks its approach itself
     for _ in range(REPEATS if count > 2 else 1):
         if count > 2 and not _count_partners(where, contact, kin, nodes, place, count):
             return
@@ -527,7 +527,7 @@ def _touch_place(contact, kin, nodes, control, place, count, where):
 
 @noinline
 def touch_node(contact, kin, grids, nodes, control, n):
-    """Resolve contact at the place of node `n`, if its field is the first of those that meet."""
+    """Resolve contact at the position of node `n`, if its field is the first one there."""
     count = _meet(contact, nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
@@ -538,7 +538,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
 
 @noinline
 def _keep_rigid(contact, kin, nodes, n):
-    """Keep the velocity of rigid bodies, whatever acts on the nodes."""
+    """Restore the velocity of rigid bodies, whatever acts on the nodes."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
             v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
@@ -566,7 +566,7 @@ def _publish_forces(s):
             control.values[contact.copies[c, 1] + k] = control.values[contact.copies[c, 0] + k]
 
 
-# Contact acts in v* and the change of velocity of this step.
+# Contact acts on v* and the velocity change of this step.
 SeparateFields.rows = (  # type: ignore[attr-defined]
     Once(_begin_forces),
     each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
@@ -579,8 +579,8 @@ SeparateFields.rows = (  # type: ignore[attr-defined]
 def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
     """List the pairs of nodes where two fields meet; return their number.
 
-    Of each pair `pairs` (n, 2) gets the nodes, `normals` (n, d) the unit normal from the first to
-    the second body, and `gaps` the distance that is left between them.
+    For each pair, `pairs` (n, 2) gets the nodes, `normals` (n, d) the unit normal from the first to
+    the second body, and `gaps` the remaining distance.
     """
     found = 0
     for s in range(1, 1 + spans[0, 0]):
@@ -612,9 +612,9 @@ def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
 
 @noinline
 def _stay_pair(contact, kin, nodes, i, j, pair, share, sticks):
-    """Take `share` of the relative velocity across the surface, or of all where the pair sticks.
+    """Remove `share` of the relative velocity across the surface, or of all if the pair sticks.
 
-    In a hollow corner, of all but what v* has left free: along one face, or along none.
+    In a hollow corner, of all components that v* does not leave free: along one face, or none.
     """
     taken = pair.relative
     if pair.hollow:
@@ -660,24 +660,24 @@ def _stay_place(contact, kin, nodes, place, count, step):
 
 @noinline
 def stay_node(contact, kin, nodes, step, n):
-    """Do as `_stay` says at the place of node `n`, where contact acted in `step`."""
+    """Apply `_stay` at the position of node `n`, if contact acted there in `step`."""
     count = _meet(contact, nodes, n)
     if count > 1:
         _stay_place(contact, kin, nodes, n % contact.stride, count, step)
 
 
 def _stay(steps):
-    """Keep the velocity that deforms from opening or closing contact that acted in a step.
+    """Prevent the deforming velocity from opening or closing active contacts.
 
-    Where that velocity is mapped apart from v*, the surfaces would seem to move in it although they
-    are pressed together, and stress would do work on nothing: a collision of bars then quadruples
-    their energy, or doubles it when only approach is taken away. `steps` is 1 when v* of this step
-    is known, and 0 before: what touched in the last step counts.
+    If that velocity is mapped separately from v*, the surfaces seem to move although they are
+    pressed together, and stress does spurious work: a collision of bars then quadruples their
+    energy, or doubles it if only approach is removed. `steps` is 1 if v* of this step is known, and
+    0 before: then the contacts of the last step count.
     """
 
     def stay(s, n):
         step = int(s.control.values[TIMESTEP]) + steps
-        if step > 0:  # something may have touched yet
+        if step > 0:  # contact is possible from the first step
             stay_node(s.contact, s.kin, s.nodes, step, n)
 
     return (each_node(stay),)

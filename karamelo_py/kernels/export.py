@@ -31,7 +31,7 @@ def export_state(kin, points, laws, out):
 
 @kernel
 def export(what, times_volume, kin, points, laws, out):
-    """Fill ``out`` (n,) with a number of each point that laws declare (`columns_of`).
+    """Fill ``out`` (n,) with a column of `columns_of` for each point.
 
     ``times_volume`` multiplies it by the reference volume: energies from their densities.
     """
@@ -46,7 +46,7 @@ def export(what, times_volume, kin, points, laws, out):
 
 @kernel
 def impose_stress(kin, points, laws, chosen, given, stress):
-    """Set the Cauchy stress of the chosen points, where ``given`` (6,) says so.
+    """Set the components ``given`` (6,) of the Cauchy stress of the chosen points.
 
     ``stress`` (n, 6) is in the order of the points and of the components of `kin`.
     """
@@ -76,8 +76,8 @@ def impose_temperature(kin, points, laws, rows, temperature):
 def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
     """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
 
-    The first column takes whole units, the second what is left in units 2^36 times smaller: sums of
-    both are exact for up to 2^17 points at a node, in whatever order points come.
+    The first column takes whole units, the second the remainder in units 2^36 times smaller: sums
+    of both are exact for up to 2^17 points at a node, in any order of the points.
     """
     grids = at_hand(grids)
     whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit
@@ -94,9 +94,9 @@ def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
 
 @kernel
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
-    """Fill ``out`` (d d, n) with the moments sum N v (X - x) of velocities of these gradients.
+    """Fill ``out`` (d d, n) with the moments sum N v (X - x) of velocities with these gradients.
 
-    ``where`` (w, n) are the places that the weights belong to, on the grids ``grid_of`` (n,).
+    ``where`` (w, n) are the places for the weights, on the grids ``grid_of`` (n,).
     """
     grids = at_hand(grids)
     flat = planar(kin)
@@ -115,9 +115,9 @@ def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
 
 @kernel
 def move_moments(frame, kin, points, laws, moments):
-    """Turn moments (d d, n) of velocity about reference places into those about present places.
+    """Convert moments (d d, n) of velocity from reference to present positions.
 
-    An arm becomes F times what it was before the first step, so that a moment M becomes M F^T.
+    An arm becomes F times its initial value, so a moment M becomes M F^T.
     """
     points, laws = at_hand(points), at_hand(laws)
     flat = planar(kin)
