@@ -1,4 +1,4 @@
-"""Points by their ids and nodes by their numbers: all of a scene, or so many at a time."""
+"""Points by id and nodes by number: all of a scene, or a limited number at a time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from karamelo_py.run.mpi.partition import joined
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 
-LAST = 2**62  # behind all numbers of points
+LAST = 2**62  # above all numbers of points
 
 
 class PointsById:
@@ -54,7 +54,7 @@ class PointsById:
         return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: Any = None) -> float:
-        """Sum a quantity of `SUMMED` over all points, or those of a group; without rounding."""
+        """Sum a quantity of `SUMMED` over all points, or over a group; without rounding."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -65,7 +65,7 @@ class PointsById:
         return rounded(self.comm.allreduce(limbs)[0])
 
     def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
-        """Yield the points of a group at hand, so many at a time: a block, and rows of it."""
+        """Yield the local points of a group in pieces: a block, and rows of it."""
         for block in self.setup.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
@@ -76,7 +76,7 @@ class PointsById:
                     yield block, rows
 
     def some(self, group: Any) -> Iterator[PointTable]:
-        """Yield the points of a group that are at hand, so many at a time, and at last none."""
+        """Yield the local points of a group in pieces, and finally an empty table."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
         yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
@@ -86,10 +86,10 @@ class PointsById:
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, part: Any, name: str, *arguments: Any) -> np.ndarray:
-        """Sum, over the points of a part's group, what its method `name` says; no rounding.
+        """Sum the terms of a part's method `name` over the points of its group; no rounding.
 
         Called with tables of some of the points, and the `arguments`, it returns rows of terms
-        (k, n), or the number of sums, to which of them (n,) a term goes, and terms.
+        (k, n), or the number of sums, the sum (n,) of each term, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(part.group):
@@ -103,11 +103,11 @@ class PointsById:
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        there = totals.any(axis=1)  # of the thousands of a quantile few
+        there = totals.any(axis=1)  # few of the thousands for a quantile
         return np.array([rounded(t) if one else 0.0 for t, one in zip(totals, there, strict=True)])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
-        """Sum terms (n,) or (n, k) of what is at hand over all, rounded once."""
+        """Sum local terms (n,) or (n, k) over all processes, rounded once."""
         columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
         limbs = np.zeros((len(columns), LIMBS), np.int64)
         for k, column in enumerate(columns):
@@ -116,17 +116,17 @@ class PointsById:
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
-        """Collect the answers of a part's method for some points of its group after others."""
+        """Collect the results of a part's method for its group, piece by piece."""
         found = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
         own = [one for one in found if one is not None]
         return [one for of_rank in self.comm.allgather(own) for one in of_rank]
 
     def seen(self, say: Callable, *arguments: Any) -> list:
-        """Gather a function's answer for the points of each process."""
+        """Collect a function's result for the points of each process."""
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Find the largest number that a function says of points, and the first with it."""
+        """Return the largest value of a function of points, and the first point with it."""
 
         def own() -> tuple[float, int]:
             found = -inf, 0
@@ -141,7 +141,7 @@ class PointsById:
         return value, -number
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """Yield all points, so many at a time; `to_first`, to the first of several processes."""
+        """Yield all points in pieces; `to_first`: only to the first of several processes."""
         s = self.setup
         orders = [np.argsort(block.points.id) for block in s.blocks]
         known = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
@@ -167,7 +167,7 @@ class PointsById:
 
 
 def _ranges(count: int) -> Iterator[tuple[int, int]]:
-    """Yield the numbers of pieces of so many, from and to before, one after another."""
+    """Yield the begin and end of consecutive pieces of `count` items."""
     return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
 
 
@@ -178,7 +178,7 @@ class NodesByNumber:
         self.points, self.simulation = points, points.simulation
 
     def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeRows]:
-        """Yield all nodes, so many at a time, with these sums over points; see `pieces`."""
+        """Yield all nodes in pieces, with these sums over points; see `pieces`."""
         simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
         simulation.show_on_nodes()
         s = simulation.setup
@@ -212,19 +212,19 @@ class NodesByNumber:
         return own
 
     def counted(self) -> np.ndarray:
-        """Give the numbers of the nodes in use, of each at one process."""
+        """Return the numbers of the nodes in use, each on one process only."""
         simulation = self.simulation
         if simulation.subdomain is not None:
             return simulation.subdomain.counted()
         return numbers(simulation.setup.spans)
 
     def with_mass(self) -> np.ndarray:
-        """Give the numbers of those of them that have mass."""
+        """Return the numbers of those nodes that have mass."""
         nodes = self.counted()
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
     def mass_of(self, group: Any) -> np.ndarray:
-        """Sum the mass of the nodes of a group, and this times x, y and z (4,); rounded once."""
+        """Sum the nodal mass of a group, and its moments about 0 (4,); rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
         nodes = np.intersect1d(self.with_mass(), hub.groups[group.id].members, assume_unique=True)
@@ -233,7 +233,7 @@ class NodesByNumber:
         return self.points.summed(mass[:, None] * places)
 
     def occupied(self) -> tuple[int, int]:
-        """Count the nodes that have mass, and find the last of them."""
+        """Return the number of nodes with mass, and the last of them."""
         self.simulation.show_on_nodes()
         there, comm = self.with_mass(), self.points.comm
         count = comm.allreduce(np.array([len(there)]))

@@ -1,7 +1,7 @@
-"""Positions and motion of the solids of a scene, and how much of it feeds noise.
+"""Positions and motion of the solids of a scene, and the noise that it causes.
 
-Motions are sums over points, without the points. What the grid does not see of velocities grows
-where bodies move through it.
+Motions are sums over points, without the points. Velocities in the null space of the grid grow if
+bodies move through it.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ class BodyMotion(NamedTuple):
     centre: np.ndarray  # (d,) of mass
     velocity: np.ndarray  # (d,) of the centre
     spread: np.ndarray  # (d, d) sum m X X, with X from the centre
-    shear: np.ndarray  # (d, d) sum m X V, with X and V from those of the centre
+    shear: np.ndarray  # (d, d) sum m X V, with X and V relative to the centre
     low: np.ndarray  # (d,) least and largest coordinates of points
     high: np.ndarray
     slow: np.ndarray  # (d,) least and largest velocities
@@ -39,12 +39,12 @@ class BodyMotion(NamedTuple):
         return float((self.high - self.low).max()) / 2
 
     def drift(self, axisymmetric: bool) -> np.ndarray:
-        """Find the velocity (d,) of the body as a whole: along the radius it has none."""
+        """Return the velocity (d,) of the body as a whole; the radial component is 0."""
         return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
 
     @property
     def turning(self) -> np.ndarray:
-        """Find the angular velocity (3,), I^-1 L: none about an axis without extent across it."""
+        """Return the angular velocity (3,), I^-1 L: none about an axis without extent across it."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear
@@ -72,7 +72,7 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: Any) -> list[BodyMotion]:
-    """Measure how all solids with points move; all processes know it; sums are without rounding."""
+    """Measure the motion of all solids with points, on all processes; sums without rounding."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
     ends = np.full((count, 4 * d), -np.inf)
@@ -109,23 +109,23 @@ def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarr
             yield k, *(a.astype(float) for a in (points.mass[here], x, v))
 
 
-SLOW = 0.01  # of the speed of waves, up to where nothing is fed in any time that was tried
-TORN = 9.0, 14.0  # angle, in radian, that a body bears with one point per cell: FLIP, moments
+SLOW = 0.01  # of the wave speed, below which no energy gain was found for any duration
+TORN = 9.0, 14.0  # angle, in radians, that a body tolerates with one point per cell: FLIP, moments
 
 
 class Noise(NamedTuple):
-    """The motion that feeds most."""
+    """The motion with the largest energy gain."""
 
-    share: float  # of what is borne
-    speed: float  # of the body, or of its rim, over the speed of waves
-    cells: float  # that the body, or its rim, goes through
-    angle: float = 0.0  # of a turn, in radian
+    share: float  # of the tolerable amount
+    speed: float  # of the body, or of its rim, over the wave speed
+    cells: float  # that the body, or its rim, moves through
+    angle: float = 0.0  # of rotation, in radians
     noisy: bool = True  # whether noise grows
-    torn: bool = False  # whether the rim comes loose
+    torn: bool = False  # whether the rim separates
 
 
 def rings(law: Any) -> bool:
-    """Tell whether a body of this law vibrates: not fluids, nor what flows like one."""
+    """Return True if a body of this law vibrates: not fluids and flowing materials."""
     if getattr(law, "rebounds", False):
         return True
     strength = getattr(law, "strength", None)
@@ -134,19 +134,19 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    """Tell whether it stops where it hits something: its impact is spent on plastic flow."""
+    """Return True if an impact is dissipated by plastic flow."""
     return not any(getattr(kind, "rebounds", False) for kind in law_kind(law))
 
 
 def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
-    """List the solids that may vibrate, and how they move."""
+    """List the solids that may vibrate, with their motions."""
     solids = list(s.hub.solids.values())
     bodies = [(one, solids[one.number].material.law) for one in s.motions if s.waves > 0]
     return [(one, law) for one, law in bodies if rings(law)]
 
 
 def drift_of(s: Any) -> Noise | None:
-    """Measure what the drift in the scene `s` (SceneFacts) feeds, also where that is borne."""
+    """Estimate the energy gain by drift in the scene `s` (SceneFacts), also if tolerable."""
     if not (s.scheme.traits.keeping and s.moves and s.kept > 0.9) or _thrown(s):
         return None
     known, spacing = borne(s.basis), float(s.simulation.control.clock[0].spacing)
@@ -168,7 +168,7 @@ def drift_of(s: Any) -> Noise | None:
 
 
 def _thrown(s: Any) -> bool:
-    """Tell whether nothing strains the only body: it has one velocity, weight, and no stress."""
+    """Return True if nothing strains the only body: uniform velocity, weight, and no stress."""
     return (
         len(s.motions) == 1
         and bool((s.motions[0].fast == s.motions[0].slow).all())
@@ -186,7 +186,7 @@ def _is_constant(formula: Any) -> bool:
 
 
 def turn_of(s: Any) -> Noise | None:
-    """Measure what the turn in the scene `s` feeds, also where that is borne."""
+    """Estimate the energy gain by rotation in the scene `s`, also if tolerable."""
     turns = s.moments or (s.moves and s.kept > 0.9)
     if not (s.scheme.traits.keeping and turns and s.d > 1) or s.hub.domain.axisymmetric:
         return None
@@ -207,8 +207,8 @@ def turn_of(s: Any) -> Noise | None:
     return most
 
 
-# Squared distance over h^2 of a point from the nodes it sees, their mean by weights, per direction:
-# two points per cell of linear functions, and functions of second order.
+# Squared distance over h^2 of a point from its nodes, weighted mean per direction: two points per
+# cell with a linear basis, and second-order basis functions.
 SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
 
@@ -224,9 +224,9 @@ class Lag(NamedTuple):
 
 
 def lag_of(s: Any) -> Lag:
-    """Estimate how much a free body lags behind its rotation in the total frame.
+    """Estimate the lag of a free rotation in the total frame.
 
-    The grid has the angular momentum of the places of points. It lacks the part within their
+    The grid has the angular momentum of the point positions. It lacks the part within their
     surroundings, sum m tr D, of sum m r^2.
     """
     most = Lag()
@@ -245,7 +245,7 @@ def lag_of(s: Any) -> Lag:
 
 
 def held(s: Any, one: BodyMotion) -> np.ndarray:
-    """Find the directions (d,) in which fixes hold nodes at a body: it goes nowhere."""
+    """Return the directions (d,) in which fixes hold nodes at a body, which then cannot drift."""
     found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices
     lattice = lattices[s.method.lattice_of(s.hub, list(s.hub.solids.values())[one.number])]
     for fix in s.hub.fixes.values():
@@ -260,9 +260,9 @@ def held(s: Any, one: BodyMotion) -> np.ndarray:
 
 
 def pressed_evenly(s: Any, one: BodyMotion) -> bool:
-    """Tell whether fixes hold a body by smooth plates on all sides but one: it deforms evenly.
+    """Return True if fixes hold a body by smooth plates on all sides but one: it deforms evenly.
 
-    It fills a box then. Each plate holds all nodes of one side in the direction across it.
+    It then fills a box. Each plate holds all nodes of one side in the direction across it.
     """
     lattices, solid = s.hub.lattices, list(s.hub.solids.values())[one.number]
     lattice = lattices[s.method.lattice_of(s.hub, solid)]
@@ -293,7 +293,7 @@ def pressed_evenly(s: Any, one: BodyMotion) -> bool:
 
 
 def _free_time(s: Any, one: BodyMotion) -> float:
-    """Find the time of flight of a body until it meets another, or the edge of the domain."""
+    """Return the time of flight of a body until it meets another, or the edge of the domain."""
     d, domain = s.d, s.hub.domain
     ways = zip(one.velocity, one.low, one.high, domain.lo[:d], domain.hi[:d], strict=True)
     first = min(
@@ -307,7 +307,7 @@ def _free_time(s: Any, one: BodyMotion) -> float:
 
 
 def _meeting(one: BodyMotion, other: BodyMotion) -> float:
-    """Find the time at which the boxes around two bodies meet; infinite if they never do."""
+    """Return the time at which the boxes around two bodies meet; infinite if never."""
     begin, end = 0.0, inf
     for v, gap, over in zip(
         one.velocity - other.velocity, other.low - one.high, other.high - one.low, strict=True

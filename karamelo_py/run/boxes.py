@@ -1,4 +1,4 @@
-"""Boxes of nodes, ranges of their numbers, and the buffers that hold what points give to them."""
+"""Boxes of nodes, ranges of their numbers, and buffers for the contributions of points."""
 
 from typing import NamedTuple
 
@@ -33,7 +33,7 @@ class Reached(NamedTuple):
 
 
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """List first nodes of the rows of boxes of nodes (see `Buffers`), and those behind the last."""
+    """List first nodes of the rows of boxes of nodes (see `Buffers`), and the ends of the rows."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
     own = boxes[row]
     begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
@@ -53,7 +53,7 @@ def joined_spans(boxes: np.ndarray) -> np.ndarray:
 
 
 def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
-    """Make `Setup.ranges`: rows (k, 2) of `count` owners, joined where one ends at another."""
+    """Make `Setup.ranges`: rows (k, 2) of `count` owners, joined where two of one owner meet."""
     order = np.lexsort((rows[:, 0], owner))
     rows, owner = rows[order], owner[order]
     apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
@@ -65,7 +65,7 @@ def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndar
 
 
 def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Find the least and largest of the rows from each start to the next."""
+    """Return the minimum and maximum of the rows from each start to the next."""
     if not len(starts):
         return begin, end
     return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
@@ -77,7 +77,7 @@ def used(spans: np.ndarray) -> np.ndarray:
 
 
 def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Find what of spans (k, 2) is in none of the others; neither of them overlap."""
+    """Return the parts of spans (k, 2) outside all the others; neither of them overlap."""
     edges = np.concatenate([spans.T.ravel(), others.T.ravel()])
     steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
     order = np.argsort(edges, kind="stable")
@@ -92,35 +92,35 @@ def numbers(spans: np.ndarray) -> np.ndarray:
 
 
 def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """List all whole numbers from each begin to before its end."""
+    """List all integers from each begin to before its end."""
     of, left = ragged(end - begin)
     return begin[of] + left
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find, for each of so many items of each of k lists, its list and its number in that."""
+    """Return, for each item of k lists of these lengths, its list and its index there."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
 
 def numbered(shapes: np.ndarray) -> np.ndarray:
-    """Find where numbers of what is in boxes of shapes (k, d) begin, and the end: (k + 1,)."""
+    """Return the first numbers of items in boxes of shapes (k, d), and the end: (k + 1,)."""
     return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
 
 
 def steps_of(shapes: np.ndarray) -> np.ndarray:
-    """Find steps (k, d) from a number to that of the neighbour in boxes of these shapes (k, d)."""
+    """Return strides (k, d) between neighbours in boxes of these shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
 
 
 def unique(numbers: np.ndarray) -> np.ndarray:
-    """Do as ``np.unique(numbers)``, which imports numpy.ma unless asked for more: some 0.03 s."""
+    """As ``np.unique(numbers)``, but without its import of numpy.ma: some 0.03 s."""
     return np.unique(numbers, return_counts=True)[0]
 
 
 def no_nodes() -> dict[str, np.ndarray]:
-    """Make room for the nodes in use of a setup, where none are yet."""
+    """Make empty arrays for the nodes in use of a setup."""
     return {name: np.zeros((1, 2), np.int64) for name in ("spans", "ranges")}
 
 
@@ -129,32 +129,32 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """List the arrays that points give to, of the kinds in `what` (kernels.p2g.arrays_given)."""
+    """List the arrays that points scatter to, of the kinds in `what` (p2g.arrays_given)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
 
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
-    """List the arrays that points give to."""
+    """List the arrays that points scatter to."""
     own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
     return [nodes.sums, nodes.velocity, *own]
 
 
 def room_of(rows: int, like: np.ndarray) -> np.ndarray:
-    """Make so many rows like those of the array, zero; with none it can grow."""
+    """Make `rows` zero rows like those of the array; with none it can grow."""
     width, kind = like.shape[1], like.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 
 
 def give_up(array: np.ndarray) -> None:
-    """Let an array, which is of no use any more, have no memory."""
+    """Release the memory of an unused array."""
     if array.flags.owndata:
         forget(array)
         array.resize((0,) * array.ndim, refcheck=False)
 
 
 def grow(array: np.ndarray, rows: int) -> None:
-    """See that an array has so many rows; in place, since setups hold it."""
+    """Give an array at least `rows` rows, in place, since setups hold it."""
     if len(array) < rows:
         forget(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

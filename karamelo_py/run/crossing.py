@@ -1,8 +1,8 @@
-"""Stress that linear basis functions lose where stressed matter moves through the grid.
+"""Stress that a linear basis loses when stressed material moves through the grid.
 
-The gradient of linear functions jumps at cell faces. Points that cross them change the strain
-rates of cells, and the volumes of points drift away from the room that they have: in the updated
-frame pressure falls by 10 to 35 % in each cell that stressed matter moves through, at any speed and
+The gradient of a linear basis jumps at cell faces. Points that cross them change the strain rates
+of cells, and the volumes of points drift away from the available space: in the updated frame,
+pressure falls by 10 to 35 % in each cell that stressed material moves through, at any speed and
 strain. GIMP and splines lose 0 to 0.3 %.
 """
 
@@ -16,13 +16,13 @@ from karamelo_py.points.laws import can, constrained_velocity, law_kind, specifi
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion
 
-STRESSED = 0.1  # of the energy at first: less is no stress that a body begins with
-OF_ENERGY = 0.1  # of the energy besides drifts: a smaller loss is not told
-LOADED = 0.5  # of the energy: where loads bring more they hold the stress
+STRESSED = 0.1  # of the initial energy: less does not count as initial stress
+OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
+LOADED = 0.5  # of the energy: if loads supply more, they maintain the stress
 
 
 class Crossing(NamedTuple):
-    """The way of stressed matter through the grid."""
+    """The path of stressed material through the grid."""
 
     cells: float
     speed: float
@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(scene: Any) -> bool:
-    """Tell whether stress is lost in the scene: not that of gases and liquids, which have rules."""
+    """Return True if stress is lost in the scene; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in scene.hub.solids.values()]
     flows = (any(getattr(kind, "any_speed", False) for kind in law_kind(law)) for law in laws)
     explicit = not scene.scheme.traits.implicit
@@ -46,7 +46,7 @@ def loses(scene: Any) -> bool:
 
 
 def expected(scene: Any) -> Crossing:
-    """Estimate the way of what is struck, or has a stress at first, from here to the end."""
+    """Estimate the remaining path of material under impact or initial stress."""
     most = Crossing(0.0, 0.0)
     if not (scene.waves > 0 and loses(scene)):
         return most
@@ -57,7 +57,7 @@ def expected(scene: Any) -> Crossing:
 
 
 def _stressed(scene: Any) -> Any:
-    """Yield speed and duration of a motion that begins with a stress."""
+    """Yield speed and duration of motions with an initial stress."""
     points, step = scene.simulation.points, scene.simulation.step
     stored = points.total("stored")
     if step or not stored > 0:
@@ -69,10 +69,10 @@ def _stressed(scene: Any) -> Any:
 
 
 def _struck(scene: Any) -> Any:
-    """Yield speed and duration of the matter between two solids that meet while it is stressed.
+    """Yield speed and duration of the material between two colliding solids while it is stressed.
 
-    By acoustic impedances (z = rho c) it moves at (z1 v1 + z2 v2)/(z1 + z2), until waves have gone
-    through the thinner of the two and come back.
+    From acoustic impedances (z = rho c) it moves at (z1 v1 + z2 v2)/(z1 + z2), until waves have
+    gone through the thinner solid and returned.
     """
     solids = list(scene.hub.solids.values())
     bodies = [one for one in scene.motions if _is_solid(solids[one.number].material.law)]
@@ -98,12 +98,12 @@ def _is_solid(law: Any) -> bool:
 
 
 def _side(one: BodyMotion, k: int, solids: list) -> float:
-    """Find the length of a body in direction k: points lie inside it."""
+    """Return the length of a body in direction k: points lie inside it."""
     return float(one.high[k] - one.low[k]) + 2 * float(solids[one.number].half_size[:, k].max())
 
 
 def _meeting(a: BodyMotion, b: BodyMotion, k: int, h: float) -> float:
-    """Find when body a, behind b in direction k, meets it; infinite where it does not."""
+    """Return when body a meets body b ahead of it in direction k; infinite if never."""
     faster, gap = a.velocity[k] - b.velocity[k], b.low[k] - a.high[k] - h
     if not faster > 0 or b.centre[k] <= a.centre[k]:
         return np.inf
@@ -116,9 +116,9 @@ def _meeting(a: BodyMotion, b: BodyMotion, k: int, h: float) -> float:
 
 
 def measured(scene: Any) -> Crossing:
-    """Return the way that the watch has seen so far, as a mean over the stressed matter.
+    """Return the path measured by the watch so far, as a mean over the stressed material.
 
-    Where loads do most of the work they hold the stress, and what is lost comes back.
+    If loads do most of the work they maintain the stress, and losses are restored.
     """
     clock = scene.simulation.control.clock[0]
     matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(scene)
@@ -127,7 +127,7 @@ def measured(scene: Any) -> Crossing:
 
 
 def words_at_end(scene: Any) -> dict[str, str]:
-    """Describe the stress that was lost, for the end of a run; warn of it where nobody has."""
+    """Describe the lost stress at the end of a run, and warn of it unless already done."""
     found, hub = measured(scene), scene.hub
     if found.lost <= TOLD:
         return {}

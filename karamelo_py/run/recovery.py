@@ -1,4 +1,4 @@
-"""Recovery of a run where a step went wrong, or energy has grown: half the step, or an end."""
+"""Recovery of a run after a failed step or an energy gain: halve the step, or end the run."""
 
 import os
 from collections.abc import Iterator
@@ -17,15 +17,15 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, render_message
 
 HALVINGS = 5  # at most, in a run
-RETURNS = 2  # at most, to one state from where energy grows: what two halves do not mend stays
+RETURNS = 2  # at most, to one state before an energy gain: two halvings without effect are enough
 
 
 LAST_GOOD = "last_good.*.h5"
 GOES_ON = "karamelo-py SCRIPT {} goes on from there, with {}: as it is, it would end here again"
 SMALLER_STEP = "a smaller step (set_dt, dt_factor)"
-# Of implicit schemes; more of them is what a run may change.
+# For implicit schemes; a run may raise the number of corrections.
 OTHER_LOAD_STEPS = "smaller steps (set_dt), or another tolerance, iterations or solver"
-FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
+FAR = 100  # steps; more are not repeated for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
@@ -33,11 +33,11 @@ class Stopped(ScriptError):
 
 
 class OthersWait(Exception):
-    """This process cannot write a file, and others go on to give it what belongs there."""
+    """This process cannot write a file, while other processes continue to send data for it."""
 
 
 class RollBack:
-    """The last good state of a run, and the way back to it: to `halve` the step, or to end."""
+    """The last good state of a run, and the return to it, to `halve` the step or to end."""
 
     def __init__(self, hub: Hub, *, halve: bool):
         self.hub, self.halve, self.place = hub, halve, hub.place
@@ -45,17 +45,17 @@ class RollBack:
         self.halvings = self.returns = 0
 
     def begin(self, simulation: Any, first_step: int, *, ruined: bool, looks_always: bool) -> None:
-        """Begin with the present state, or with the good one of the file that a run goes on from.
+        """Begin with the present state, or with the good one of the resumed file.
 
         A step above the limit may have spoilt the present state (`ruined`); values of parts may be
-        looked at between any two steps (`looks_always`).
+        read between any two steps (`looks_always`).
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks_always
         too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
-        # Said of the first state: a later one is ruined, and its limit with it.
+        # For the first state only: a later one is ruined, and its limit too.
         self.smaller = "a smaller step" if ruined else own_step_instead(self.hub)
         self.smaller *= too_large
-        # Points that are deleted would not come back.
+        # Deleted points would not come back.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
         self.begun_at = -1 if lost else simulation.step
@@ -64,13 +64,13 @@ class RollBack:
             self._keep()
 
     def before(self) -> None:
-        """Keep the present state where it is due and good; else note what parts remember."""
+        """Store the present state if it is due and good; else note the memory of parts."""
         watched = self.simulation.control.clock[0].watch_limit or self.simulation.implicit
         if self.point.step == self.begun_at and not watched:
-            return  # the first state alone is good, whose rows are not gone back to
+            return  # only the first state is good, and its rows are not rewound
         step = self.simulation.step
-        # When states are kept must not depend on how fast steps are: runs go back to them.
-        # Load steps take long: none is done twice.
+        # When states are stored must not depend on the speed of steps: runs return to them.
+        # Load steps take long: none is repeated.
         often = (
             step % self.simulation.states_every == 0
             or step == self.first_step + 1
@@ -83,7 +83,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Judge steps that ended with `status`: go on from there (True), or from where it is."""
+        """Judge steps that ended with `status`: continue from there (True), or from here."""
         hub, simulation = self.hub, self.simulation
         if status != DONE:
             if status == STOPPED and boundary.delete_leaving(hub, simulation, self.point.arrays):
@@ -109,14 +109,14 @@ class RollBack:
         return True
 
     def act_between_steps(self) -> None:
-        """Call what acts after the present step; what it takes away would not come back."""
+        """Call functions that act after the present step; their deletions are permanent."""
         step = self.simulation.step
         due = [fix for fix in self.hub.fixes.values() if fix.every and step % fix.every == 0]
         if sum(fix.between_steps() for fix in due):
             self._keep()
 
     def tell_of_loss(self, within: float) -> None:
-        """Warn once of a loss of energy above a share of the largest."""
+        """Warn once of an energy loss above a fraction of the largest energy."""
         hub, simulation = self.hub, self.simulation
         lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
         if lost is not None:
@@ -130,7 +130,7 @@ class RollBack:
     def _halve_step(
         self, found: explain.Trouble | energy.Imbalance | None = None, status: int = DONE
     ) -> bool:
-        """Go back to the last good state with half the step, where the script asks for that."""
+        """Return to the last good state with half the step, if the script allows it."""
         hub, simulation = self.hub, self.simulation
         if not self.halve or self.halvings == HALVINGS:
             return False
@@ -138,12 +138,12 @@ class RollBack:
             return False
         found = found or explain.trouble(hub, simulation, status)
         self.halvings += 1
-        # Rows of log and dumps that have been written since go with what they show.
+        # Rows of log and dumps written since are removed with their states.
         self.point.return_to(simulation, cut=True)
         self.point.forget_later()
         simulation.halve_step(self.halvings)
         while simulation.above_limit() and self.halvings < HALVINGS:
-            # What is above the limit would only come back.
+            # Steps above the limit would fail again.
             self.halvings += 1
             simulation.halve_step(self.halvings)
         hub.warn(
@@ -156,7 +156,7 @@ class RollBack:
         return True
 
     def _points_only_leave(self) -> bool:
-        """Tell whether points leave, at no more energy: no smaller step keeps them."""
+        """Return True if points leave without an energy gain: no smaller step prevents this."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
             return False
@@ -167,15 +167,15 @@ class RollBack:
             simulation.advance(steps)
         kept = energy.growth_since(simulation, before) <= WITHIN
         healthy = kept and not simulation.above_limit()
-        simulation.advance(1)  # which goes wrong again, for others to look at
+        simulation.advance(1)  # repeats the failure for output
         return healthy
 
     def _stop(self, status: int) -> NoReturn:
-        """Return to the last good state, write it, and raise what the user should know.
+        """Return to the last good state, write it, and raise the error for the user.
 
-        Where energy has grown before, that is the last state in which it had not; log and dumps end
-        with the last state that has no trouble of its own. Where the step was too large from the
-        start on it is the state of the start: nothing behind that is a good one.
+        If energy has grown before, that is the last state before the growth; log and dumps end with
+        the last state that has no fault itself. If the step was too large from the start, it is the
+        initial state: no later state is good.
         """
         too_large = self.smaller and not self.simulation.control.clock[0].watch_limit
         found = explain.trouble(self.hub, self.simulation, status)
@@ -189,13 +189,13 @@ class RollBack:
         raise error
 
     def _keep_start(self, status: int) -> str:
-        """Write the state that the run began with, end the outputs, and say how to begin anew."""
+        """Write the initial state of the run, end the outputs, and return how to restart."""
         simulation, good = self.simulation, self.point
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)
         if good.step == self.begun_at:
             path = self._write_last_good()
-        present.give(self.hub)  # their files stay as they are
+        present.give(self.hub)  # their files are unchanged
         back = step - simulation.step - (status in (GAINED, HEATED))
         if back <= FAR:
             if back > 0:
@@ -211,13 +211,13 @@ class RollBack:
         )
 
     def _options(self, file: str) -> str:
-        """Write the options that go on from a file, with outputs where those of this run are."""
+        """Return the options to resume from a file, with the output options of this run."""
         folder = os.path.relpath(self.hub.folder)
         file, folder = (f'"{name}"' if " " in name else name for name in (file, folder))
         return f"-restart {file}" + (f" -out {folder}" if folder != os.curdir else "")
 
     def _keep_good(self, status: int) -> str:
-        """Return to the last good state, write it, end the outputs, and say how to go on."""
+        """Return to the last good state, write it, end the outputs, and return how to resume."""
         simulation, good = self.simulation, self.point
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
         grown, path = not energy.grown_little(simulation), None
@@ -226,18 +226,18 @@ class RollBack:
         else:
             good.return_to(simulation)
             if status not in (GAINED, HEATED, STOPPED):
-                # What nodes have depends on how many steps ran at once: here always on as many.
+                # Nodal values depend on the number of steps per call: here always the same.
                 good.again(simulation.advance, step)
         if status not in (GAINED, HEATED) and step > simulation.step:
             before = simulation.energy()
             good.again(simulation.advance, step)
             if path is None and energy.growth_since(simulation, before) > WITHIN:
-                # The watch looks at means of a hundred steps, and has not seen it yet.
+                # The watch averages over a hundred steps, and has not seen it yet.
                 grown, path = True, self._write_before_growth(step)
                 good.again(simulation.advance, step)
         path = path or self._write_last_good()
         if simulation.step < step:
-            present.give(self.hub)  # their files stay as they are, with later rows
+            present.give(self.hub)  # their files are unchanged, with later rows
         self._end_outputs()
         if path is None:
             return ""
@@ -247,7 +247,7 @@ class RollBack:
         return f". {which} is in {name}; {GOES_ON.format(self._options(name), change)}"
 
     def _write_before_growth(self, end: int) -> Path | None:
-        """Return to the last state before step `end` whose energy has not grown, and write it."""
+        """Return to the last state before step `end` without an energy gain, and write it."""
         simulation, good = self.simulation, self.point
         good.return_to(simulation)
         clock = simulation.control.clock[0]
@@ -263,14 +263,14 @@ class RollBack:
         return self._write_last_good()
 
     def _write_last_good(self) -> Path | None:
-        """Write the present state to a file to go on from; one of somebody else is left alone."""
+        """Write the present state to a restart file; existing files of others are not replaced."""
         hub, path = self.hub, restart_file.path_of(self.hub, Path(LAST_GOOD))
         may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
         if not (hub.output.takes_part and may_be):
             return None
         with self._as_warnings():
             path = restart_file.write(hub, Path(LAST_GOOD), within=True)
-            # The files of restart(...) would hold the same once more.
+            # The files of restart(...) would hold the same state again.
             for item in hub.output.last:
                 item.last_step = hub.update.step
             return path
@@ -282,7 +282,7 @@ class RollBack:
 
     @contextmanager
     def _as_warnings(self) -> Iterator[None]:
-        """Warn of what prevents writing: another error is on its way."""
+        """Turn errors in writing into warnings: another error is about to be raised."""
         try:
             yield
         except ScriptError as error:

@@ -1,4 +1,4 @@
-"""Advance of a lowered scene in time: chunks of compiled steps, watched from Python."""
+"""Time integration of a lowered scene: chunks of compiled steps, controlled from Python."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-FAR = 1e9  # cells, further than points ever go
+FAR = 1e9  # cells, further than points ever move
 
 
 class Simulation(SceneArrays):
-    """Take the steps of a scene, or of the share of a process, beside others that do the same."""
+    """Take the steps of a scene, or of the part of one process."""
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
-        # Fixes of the first step that have acted: not again when the scene is lowered anew.
+        # Fixes of the first step that have acted: not again when the scene is lowered again.
         self.begun: set[Any] = set(previous.begun) if previous else set()
         self.visits: Staged | Fused = Fused()
         self.hooks: Hooks | NoHooks = NoHooks()
@@ -42,7 +42,7 @@ class Simulation(SceneArrays):
         self.beginning: list = []  # fixes of the first step that act in this run
 
     states_every = 100  # steps between two states that a run can go back to
-    taken_up = False  # a step goes on whose first moment has been, with other arrays
+    taken_up = False  # a step continues with other arrays after its first stage
 
     @cached_property
     def _whole(self) -> Whole:
@@ -54,14 +54,14 @@ class Simulation(SceneArrays):
         return stable_share(self.hub, self.setup.grids)
 
     def act(self, function: Callable[[Setup], None], s: Setup) -> None:
-        """Call what acts from Python on the arrays of the whole scene."""
+        """Call a function on the arrays of the whole scene."""
         if self.subdomain is None:
             function(s)
         else:
             self._whole.act(function)
 
     def begin(self, end_time: float) -> None:
-        """Start of a run: choose the first dt; the run ends at `end_time` at the latest."""
+        """Start a run: choose the first dt; the run ends at `end_time` at the latest."""
         clock = self.control.clock[0]
         self._ask_for_steps(0)
         clock.end_time = end_time
@@ -82,14 +82,14 @@ class Simulation(SceneArrays):
                 "nothing limits the time step: all that there is is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
-        # A body at rest that has no waves has no first limit to compare with.
+        # A body at rest without waves has no first limit for comparison.
         if clock.first_limit == 0 and np.isfinite(self.limit) and not self.hub.update.fixed_dt:
             clock.first_limit = self.limit
         self._watch_limit()
         self._watch_energy(begun_before)
 
     def go_on(self, end_time: float, halvings: int) -> None:
-        """Go on, to this end, with a state that was put into the arrays, in place of `begin`."""
+        """Continue to this end with a state that was put into the arrays, instead of `begin`."""
         clock = self.control.clock[0]
         self._make_ready()
         other_end, clock.end_time = clock.end_time != end_time, end_time
@@ -102,13 +102,13 @@ class Simulation(SceneArrays):
             clock.over_limit = over_limit
 
     def halve_step(self, times: int) -> None:
-        """Halve the step of the start so many `times`, from here on in this run."""
+        """Halve the initial step `times` times, from now on in this run."""
         self._ask_for_steps(times)
         choose_dt(self.control)
         self._watch_limit()
 
     def _ask_for_steps(self, halvings: int) -> bool:
-        """Tell the clock which steps are asked for; whether these are others than before."""
+        """Set the requested steps in the clock; return whether they have changed."""
         clock = self.control.clock[0]
         now, moving = (
             timestep.step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False)
@@ -127,7 +127,7 @@ class Simulation(SceneArrays):
         before = {name: clock[name] for name in numbers}
         for name, number in numbers.items():
             clock[name] = number
-        # Steps that a script may ask for are shares of h/(c + |v|).
+        # Steps requested by a script are fractions of h/(c + |v|).
         own = update.dt_factor is None and update.fixed_dt is None
         weight = timestep.own_weight_of_drift(self.hub) if own else 1.0
         if weight != clock.weight:
@@ -148,7 +148,7 @@ class Simulation(SceneArrays):
         choose_dt(self.control)
 
     def rate_with(self, weight: float) -> float:
-        """Measure the rate of the fastest point, if the common drift of all had this weight."""
+        """Return the rate of the fastest point, if the common drift of all had this weight."""
         clock = self.control.clock[0]
         common, rate = clock.common.copy(), float(clock.rate)
         clock.common[:] = timestep.common_velocity(self, weight)
@@ -163,7 +163,7 @@ class Simulation(SceneArrays):
         clock.rate = self.comm.allreduce_max(np.array([clock.rate]))[0]
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
-        """Find the largest component of the velocities of all points, less that of a common one."""
+        """Return the largest velocity component of all points, relative to a common velocity."""
         velocities = (block.points.v for block in self.setup.blocks)
         # No copy of them: there may be millions.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
@@ -181,7 +181,7 @@ class Simulation(SceneArrays):
 
     @property
     def limit_moving(self) -> float:
-        """Return the stable step of points that cross cells: steps of a script are its shares."""
+        """Return the stable step of points that cross cells, the basis of a script's fractions."""
         clock = self.control.clock[0]
         waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
         return float(min(waves, clock.heat_limit))
@@ -190,22 +190,22 @@ class Simulation(SceneArrays):
         return not self.implicit and self.control.values[DT] > self.limit * (1 + 1e-12)
 
     def _watch_limit(self) -> None:
-        """Watch the limit, unless the step is above it from the start, as the user wants."""
+        """Watch the limit, unless the step exceeds it from the start, as the user wants."""
         clock = self.control.clock[0]
         clock.watch_limit = int(not self.above_limit() and not self.implicit)
         clock.over_limit = 0
 
     def _watch_energy(self, begun_before: int) -> None:
-        """Begin to watch the balance of energy, or go on where nothing was set since."""
+        """Begin to watch the energy balance, or continue if nothing was changed since."""
         clock = self.control.clock[0]
         clock.watch_energy = int(not unknown_work(self.hub) and self.moves)
         set_anew = len(self.begun) > begun_before or bool(self._first_fixes)
         anew = not self.followed or set_anew
-        self.followed = self.moves  # what load steps do is not in the balance
+        self.followed = self.moves  # load steps are not in the balance
         if anew:
             self.told_of_growth = self.told_of_loss = False
         if clock.watch_energy:
-            # Velocities belong to half a step before, stresses to the share strained before.
+            # Velocities belong to half a step earlier, stresses to the fraction strained before.
             level = 0.25 + 0.5 * self.hub.update.scheme.traits.strained_before
             self._begin_to_look(level, anew)
         clock.watch_heat = int(self.hub.update.thermal and not unknown_heat(self.hub))
@@ -215,7 +215,7 @@ class Simulation(SceneArrays):
             clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
     def _begin_to_look(self, level: float, anew: bool) -> None:
-        """Measure the energies of all points, which the watch over them starts from."""
+        """Measure the initial energies of all points for the watch."""
         s, clock = self.setup, self.control.clock[0]
         strain = COARSE * float(np.finfo(s.nodes.sums.dtype).eps)
         clock.energy_floor = (
@@ -244,14 +244,14 @@ class Simulation(SceneArrays):
         return float((ends[:d] + ends[d:]).max())
 
     def _outside_tiles(self) -> int:
-        """Count the blocks that have points which were not sorted yet."""
+        """Count the blocks with points that were not sorted yet."""
         own = 0
         for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
             own += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
         return int(self.comm.allreduce(np.array([own]))[0])
 
     def energy(self) -> float:
-        """Sum kinetic, stored and dissipated energy less the work; NaN where nobody watches it."""
+        """Sum kinetic, stored and dissipated energy minus the work; NaN if it is not watched."""
         clock = self.control.clock
         if self._outside_tiles() or not clock[0].watch_energy:
             return np.nan
@@ -263,7 +263,7 @@ class Simulation(SceneArrays):
 
     def advance(self, count: int) -> int:
         """Take up to `count` steps (to the end time at most); DONE, or why it stopped."""
-        self.control.clock[0].wrong = 0  # of steps before, that nobody has gone back from
+        self.control.clock[0].wrong = 0  # from earlier steps that were not undone
         with self.comm.joint():
             if self.subdomain is None:
                 return self._advance_to(self.step + count)
@@ -276,7 +276,7 @@ class Simulation(SceneArrays):
     def _advance_to(self, target: int) -> int:
         control = self.control
         while True:
-            self.sort_if_due()  # not behind the last step, which the nodes keep showing
+            self.sort_if_due()  # not after the last step, whose nodes are output
             try:
                 status = self._advance(target - self.step)
             except PointsMoved:
@@ -303,27 +303,27 @@ class Simulation(SceneArrays):
             return status
         self.begun |= set(self._first_fixes)
         self._first = None
-        self.clear_forces()  # the steps to come may have no hook that does it
-        return SORT  # there is more to do, unless that was all
+        self.clear_forces()  # later steps may have no hook that does it
+        return SORT  # not finished, unless all steps are done
 
     @property
     def _acting(self) -> Any:
-        """Return what acts in a step: compiled hooks, or Python between its rows."""
+        """Return the tag for a step: compiled hooks, or Python between its rows."""
         return self._called or (self.python if self.python.by_stage else self.hooks)
 
     @property
     def begins(self) -> bool:
-        """Tell whether fixes of the first step are still to act."""
+        """Return True if fixes of the first step are still to act."""
         return self._first is not None
 
     @property
     def implicit(self) -> bool:
-        """Tell whether the scheme solves equations."""
+        """Return True if the scheme solves equations."""
         return self.hub.update.scheme.traits.implicit
 
     @property
     def moves(self) -> bool:
-        """Tell whether there is inertia: without it nobody watches the energy."""
+        """Return True if there is inertia; without it the energy is not watched."""
         return self.hub.update.scheme.traits.inertia
 
     @cached_property
@@ -334,10 +334,10 @@ class Simulation(SceneArrays):
         return LoadSteps(self)
 
     def refuse(self) -> None:
-        """Refuse a scene that this one cannot run: there is none."""
+        """Refuse a scene that cannot run here: none."""
 
     def compile(self) -> None:
-        """Have the loop over the steps compiled now: nobody waits for it amid a log."""
+        """Compile the loop over the steps now, rather than in the middle of a log."""
         hooks = self._acting
         if config.DISABLE_JIT or isinstance(hooks, PythonHooks) or self.implicit:
             return
@@ -359,7 +359,7 @@ class Simulation(SceneArrays):
         self.visits = Staged() if staged else Fused()
         at_once = [fix for fix in new if sets_initial_state(fix)]
         for fix in at_once:
-            # Nothing happens in a step before this hook: the state shows it from the start.
+            # Nothing precedes this hook in a step: the output shows its state from the start.
             self._set_initial(fix)
         self.begun |= set(at_once)
         self.beginning = new
@@ -371,7 +371,7 @@ class Simulation(SceneArrays):
         self.hub.update.method.begin(self.hub, self.setup.contact)
 
     def _set_initial(self, fix: Any) -> None:
-        """Let a fix set the state that a run begins with."""
+        """Let a fix set the initial state of a run."""
 
         def act(_: Setup) -> None:
             for view in views_of(self, fix):
@@ -382,6 +382,6 @@ class Simulation(SceneArrays):
         if fix.point_by_point:
             act(self.setup)
         else:
-            self.sort_if_due()  # tiles are gathered, too
+            self.sort_if_due()  # tiles are read, too
             self.act(act, self.setup)
         self.changed()

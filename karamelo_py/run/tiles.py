@@ -1,4 +1,4 @@
-"""The grids cut into tiles: which points lie in which, which nodes they give to or are in use."""
+"""The grids cut into tiles: the points of each, the nodes they reach, and the nodes in use."""
 
 from collections.abc import Sequence
 from math import inf
@@ -19,36 +19,36 @@ from karamelo_py.run import boxes as grid_boxes
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
-# stay in caches, large ones share less of their nodes with others.
+# fit in caches, large ones have fewer nodes in common with others.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
-LONGER = 16  # times, along the rows of nodes in space, where cells have one point: boxes have more
-#             nodes than points then, and few tiles would have few points
+LONGER = 16  # times, along the rows of nodes in 3D, if cells have one point: otherwise boxes have
+#             more nodes than points, and many tiles have few points
 SHARES = 64  # of the points of a block, nearly equal: threads share them out
-# Times the nodes: boxes that can have no more rows are made at once, on whole lines of the caches;
-# pages that none touches cost no memory. Larger ones grow.
+# Times the nodes: boxes that cannot have more rows are allocated at once, aligned with cache lines;
+# untouched pages cost no memory. Larger ones grow.
 AT_ONCE = 8
-DIRECT_UP_TO = 2000  # points; to clear and sum boxes costs more than threads save
-PART = 2000  # points that are worth a part of their own where threads sort
-DRIFT = 1.0  # cells that points may go at most before they are sorted again
-# By dimension, the least they may go: boxes are smaller then, and more points beside each other see
-# the same nodes; in the plane that brings less than it costs to sort.
+DIRECT_UP_TO = 2000  # points; clearing and summing boxes costs more than threads save
+PART = 2000  # points per part when threads sort
+DRIFT = 1.0  # cells that points may move at most before they are sorted again
+# By dimension, the minimum: smaller boxes, and more neighbouring points with the same nodes; in 2D
+# the gain is less than the cost of sorting.
 LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
-STEPS = 32  # that are to be between two sorts where points may go further for that
-# The same where points give straight to the nodes: it costs only that more nodes are in use.
+STEPS = 32  # desired between two sorts, if points may move further for that
+# The same if points scatter directly to the nodes: it only brings more nodes into use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts the points of a setup by tile; says what nodes the points of a tile may reach."""
+    """Sorts the points of a setup by tile, and determines the nodes that each tile may reach."""
 
-    threads = 1  # that sum at nodes and sort
+    threads = 1  # for sums at nodes and for sorting
     mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
-        self.direct = points <= DIRECT_UP_TO  # points give straight to the nodes, tile after tile
+        self.direct = points <= DIRECT_UP_TO  # points scatter directly to the nodes, by tile
         self.dimension = d = lattices[0].dimension
-        # Cells of a tile of points, nodes of one of nodes, by direction.
+        # Cells of a tile of points, nodes of a tile of nodes, by direction.
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
         self.long = sparse and d == 3
         if self.long:
@@ -57,8 +57,8 @@ class Tiles:
         self.per_cell = type(basis).nodes_per_cell
         self.least_nodes = type(basis).least_nodes
         self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
-        self.sorts = self.sets = 0  # how often points were sorted; sets of buffers
-        self.rows = 0  # of the buffers, that the boxes of all tiles take
+        self.sorts = self.sets = 0  # number of sorts; sets of buffers
+        self.rows = 0  # of the buffers, for the boxes of all tiles
         self.occupied = 0  # tiles that hold points
         # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
@@ -67,8 +67,8 @@ class Tiles:
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # Points without a domain reach no further than two cells from those of their tile, contact
-        # one more.
+        # Points without a domain reach no further than two cells from those of their tile; contact
+        # adds one.
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)
@@ -76,8 +76,8 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # What points may reach is known of each row of a box where rows of nodes are tiles: of the
-        # boxes around a bar that has spread at one end they reach little at the other.
+        # The reach of points is known for each row of a box if rows of nodes are tiles: in the
+        # boxes around a bar that has spread at one end, they reach little at the other.
         by_rows = self.long and not shaped and not self.direct
         self._most_in_box = int(rows) if by_rows else 0  # rows of a box, at most
         self.count = int(self.first[-1])  # of tiles, of all grids
@@ -103,7 +103,7 @@ class Tiles:
         )
 
     def empty_buffers(self, nodes: kernel_arrays.Nodes, blocks: int) -> kernel_arrays.Buffers:
-        """Make buffers for what points of so many blocks give to `nodes`."""
+        """Make buffers for the contributions of points of this number of blocks to `nodes`."""
         most = blocks * self._most_rows
         rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
         given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
@@ -125,15 +125,15 @@ class Tiles:
                     array[: self.rows] = 0
 
     def sort(self, s: kernel_arrays.Setup) -> None:
-        """Sort all points by tile and find the nodes in use; sums at others become zero.
+        """Sort all points by tile and find the nodes in use; sums at other nodes become zero.
 
-        Those of nodes in use begin anew in the next step, and boxes are zero between two steps.
+        Nodes in use are cleared in the next step, and boxes are zero between two steps.
         """
         before = grid_boxes.used(s.spans)[1:].copy()
         clock = s.control.clock[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
-        # Points that are taken out leave an infinite drift, in the total frame too.
+        # Deleted points leave an infinite drift, in the total frame too.
         clock.drift_limit = limit if s.frame.moves else np.finfo(float).max
         clock.drift = clock.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
@@ -151,10 +151,10 @@ class Tiles:
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
         beyond = far + drift + getattr(type(s.contact), "looks_beyond", 0)
-        return beyond if far < cells else cells  # also where it is not a number
+        return beyond if far < cells else cells  # also for NaN
 
     def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
-        """Return the places (w, n) that weights belong to."""
+        """Return the places (w, n) for the weights."""
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
@@ -166,12 +166,12 @@ class Tiles:
         return tile
 
     def _sort_block(self, s: kernel_arrays.Setup, block: kernel_arrays.Block) -> np.ndarray:
-        """Sort the points of a block; the numbers of the tiles that they are in."""
+        """Sort the points of a block; return the numbers of their tiles."""
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Some parts for each thread: tiles are not of like size, and others may need a core. Of few
-        # points, or fewer than tiles, one thread has sorted all before several have met.
+        # Several parts per thread: tiles differ in size, and a core may be busy. With few points,
+        # or fewer than tiles, one thread is done before several have started.
         n, mode = x.shape[1], self.mode
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
@@ -225,7 +225,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """Do as `_parts_to_sum` where points are few: one share, a part for each span."""
+        """As `_parts_to_sum`, for few points: one share, a part for each span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -239,12 +239,12 @@ class Tiles:
     def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
         """Find spans and ranges of nodes in tiles that boxes reach; first of each share, and parts.
 
-        Nodes are in the order of the shares of points that have most of them: what a thread has
-        given to is in its caches, and to get it from those of another takes longer than to sum it.
+        Nodes are in the order of the shares of points with most of them: the contributions of a
+        thread are in its caches, and fetching them from another thread's takes longer than the sum.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
-        # The largest part first: mostly it has all the nodes that others reach.
+        # The largest part first: mostly it has all the nodes of the rest.
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
         shares = self._shares(s)
         own = order[reached.box[order] < len(shares)][::-1]  # the largest last
@@ -272,10 +272,10 @@ class Tiles:
         return grid_boxes.joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """Find the first of the tiles of nodes (n,) that are of one share with each.
+        """Find the first of the tiles of nodes (n,) that belong to one share with each.
 
-        To go through memory with gaps of some thousand bytes takes twice as long. So, one thread
-        has one share, and long tiles are of one share with those in the same rows of nodes.
+        Memory access with gaps of some thousand bytes takes twice as long. So one thread has one
+        share, and long tiles share with those in the same rows of nodes.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -285,7 +285,7 @@ class Tiles:
         return tile - (tile - first) % along
 
     def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
-        """Find the share of the points of its block that each own tile is in."""
+        """Return for each own tile the share of the points of its block."""
         found = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count
@@ -323,7 +323,7 @@ class Tiles:
         return boxes, grid_boxes.Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
     def _number(self, s: kernel_arrays.Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
-        """Give each box its rows of the buffers: its number of node 0, and steps (k, d)."""
+        """Give each box its rows of the buffers: the number of its node 0, and steps (k, d)."""
         steps = grid_boxes.steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
@@ -338,7 +338,7 @@ class Tiles:
         return first, steps
 
     def _tell_buffers(self, s: kernel_arrays.Setup, begins, ends, first, steps) -> None:
-        """Tell the tiles of all blocks where in the buffers their boxes are; see `Tiling`."""
+        """Set for the tiles of all blocks the position of their boxes in the buffers."""
         columns = np.zeros((len(first), 5), np.int64)
         columns[:, 0], columns[:, 1], columns[:, 2] = begins, ends, first
         columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
@@ -351,12 +351,12 @@ class Tiles:
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        """Take note of the tiles of nodes in use, and of the nodes from `begin` to `end` there."""
+        """Note the tiles of nodes in use, and their nodes from `begin` to `end`."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
         """Make `Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
 
-        In boxes they have the numbers `first` + sum of `steps` (k, d) times places.
+        In boxes their numbers are `first` + sum of `steps` (k, d) times positions.
         """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
@@ -379,11 +379,11 @@ def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Find which share each of n tiles of nodes is: ascending (n,), from 0 to SHARES - 1.
+    """Return the share of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
-    `parts` (n, 10) are those of all nodes of a tile in use (see `Buffers`). A share gets the tiles
-    whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same
-    number in `beside` (n,) are of one share, that of the first of them.
+    `parts` (n, 10) are the parts of all nodes of a tile in use (see `Buffers`). A share gets the
+    tiles whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the
+    same number in `beside` (n,) get the share of the first of them.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -393,7 +393,7 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
 
 
 def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
-    """Name the arrays of a tiling that a sort changes, and tell how many rows are in use."""
+    """Name the arrays of a tiling that a sort changes, with the number of rows in use."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
     return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]

@@ -1,4 +1,4 @@
-"""The time step: the program's own share of the stable one, and what limits that."""
+"""The default time step as a fraction of the stable step, and its limits."""
 
 from math import inf, sqrt
 from typing import Any
@@ -24,28 +24,28 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.traits import USUAL
 
 BOXES = 6.0  # weight of a common drift in the steps of boxes
-LOST = 2.05  # times the stable step, beyond which everything is lost that was tried
+LOST = 2.05  # times the stable step, beyond which every run that was tried failed
 NO_LIMITS = ("set_dt", "end")  # of stability
-LONE = 0.9  # of the stable step of a lone point: one that swells is stiffer
-DAMPED = 0.5  # the least, with one point per cell, where a share of the nodal velocity damps
+LONE = 0.9  # of the stable step of a lone point: an expanded point is stiffer
+DAMPED = 0.5  # minimum, with one point per cell, if a PIC fraction damps
 
 
 def one_a_cell(solid: Any) -> bool:
-    """Tell whether a solid has one point in a cell and direction, not two or more."""
+    """Return True if a solid has one point per cell and direction, not two or more."""
     return 2 * np.max(solid.half_size) > 0.75 * solid.h
 
 
 def sparse(hub: Hub) -> bool:
-    """Tell whether a solid has about one point per cell and direction."""
+    """Return True if a solid has about one point per cell and direction."""
     return any(map(one_a_cell, hub.solids.values()))
 
 
 def keeping_share(hub: Hub) -> float:
-    """Return the largest share of the stable step with which a drifting body keeps its energy.
+    """Return the largest fraction of the stable step with which a drifting body conserves energy.
 
-    Where points go from cell to cell, and keep their own velocities (FLIP and its kin), jumps of
-    the gradients feed energy to a body, about as the third power of the step. The numbers are those
-    of the energy table of the documentation: at most 10 % in 50 periods.
+    If points move from cell to cell and retain their velocities (FLIP and similar), gradient jumps
+    add energy to a body, about as the third power of the step. The numbers come from the energy
+    table of the documentation: at most 10 % in 50 periods.
     """
     update = hub.update
     alpha = getattr(update.transfer, "alpha", 0.0)
@@ -61,12 +61,12 @@ def keeping_share(hub: Hub) -> float:
 
 
 def keeps_moments(hub: Hub) -> bool:
-    """Tell whether points keep moments or gradients of their velocity."""
+    """Return True if points store moments or gradients of their velocity."""
     return Moment in getattr(hub.update.transfer, "point_fields", ())
 
 
 def _keeps_velocities(hub: Hub) -> bool:
-    """Tell whether points of FLIP and its kin move through the grid, without moments and usl."""
+    """Return True if FLIP-like points move through the grid, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
@@ -82,7 +82,7 @@ def _deforming(hub: Hub) -> list[Any]:
 
 
 def _flows(law: Any) -> bool:
-    """Tell whether a body of this law has no shape of its own, as liquids and soils."""
+    """Return True if a body of this law has no stable shape, like liquids and soils."""
     strength = getattr(law, "strength", None)
     return strength is not None and (
         getattr(strength, "flows", False) or not shear_modulus(strength) > 0
@@ -90,12 +90,12 @@ def _flows(law: Any) -> bool:
 
 
 def lone_point(hub: Hub) -> float:
-    """Return the stable step over h/c of a point that has its nodes for itself and keeps a moment.
+    """Return the stable step over h/c of an isolated point that stores a moment.
 
-    The velocity gradient L that it keeps answers to its pressure by dL/dt = -p / (rho D): an
-    oscillator of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; sums of
-    |grad N|^2 / N stand for 1 / D where gradients are kept. Points of what flows come to be alone;
-    those of a gas keep no moments then (`kernels.loss.in_company`).
+    The stored velocity gradient L responds to its pressure by dL/dt = -p / (rho D): an oscillator
+    of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; if gradients are stored,
+    sums of |grad N|^2 / N replace 1 / D. Points of flowing materials can become isolated; points of
+    a gas then store no moments (`kernels.loss.in_company`).
     """
     update = hub.update
     keeps = keeps_moments(hub) and update.method.frame.moves
@@ -108,17 +108,17 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """Tell whether a body that drifts bears the steps of one at rest, and keeps its energy.
+    """Return True if a drifting body is stable and conserves energy with the steps of one at rest.
 
-    With cubic splines next to no energy comes from the places in the cells; usavg feeds none with
-    functions that are smooth (50 periods at 0.05 to 0.5 of the speed of waves, in the plane). Disks
-    that meet tear sooner by these steps.
+    With cubic splines hardly any energy depends on the position in the cells; usavg adds none with
+    smooth basis functions (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks
+    fracture sooner with these steps.
     """
     basis, scheme = hub.update.method.basis, hub.update.scheme
     laws = _deforming(hub)
     return (
         _keeps_velocities(hub)
-        and len(laws) == 1  # one solid, of an elastic law or a metal
+        and len(laws) == 1  # one elastic or metallic solid
         and not _flows(laws[0])
         and not getattr(basis, "gradient_jumps", False)
         and (getattr(basis, "bears_drift", False) or scheme.traits.bears_drift)
@@ -127,11 +127,11 @@ def bears_drift(hub: Hub) -> bool:
 
 
 def own_weight_of_drift(hub: Hub) -> float:
-    """Return the weight of the common velocity in the step that the program takes of itself.
+    """Return the weight of the common velocity in the default step.
 
-    1 as in the rule of the language, h/(c + |v|). What drifts by boxes (ugimp, cpgimp), two and
-    more per cell, gains the more the faster it is: by edges of shaken bars and blocks at 0.05 to
-    0.5 of the speed of waves.
+    1 as in the rule of the language, h/(c + |v|). Drifting boxes (ugimp, cpgimp), two and more per
+    cell, gain more energy at higher speed: at edges of shaken bars and blocks at 0.05 to 0.5 of the
+    wave speed.
     """
     if bears_drift(hub):
         return 0.0
@@ -142,7 +142,7 @@ def own_weight_of_drift(hub: Hub) -> float:
 
 
 def common_velocity(simulation: Any, weight: float) -> np.ndarray:
-    """Return the velocity (3,) to measure speeds from so that the common drift has this weight."""
+    """Return the reference velocity (3,) for speeds so that the common drift has this weight."""
     bodies = motions(simulation) if weight != 1 else []
     common = np.zeros(3)
     if bodies:
@@ -152,9 +152,9 @@ def common_velocity(simulation: Any, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Return the stable step over h/c; `longer` is that of points which stay where they are.
+    """Return the stable step over h/c; `longer` is for points that stay at their positions.
 
-    In the total frame the nodes of a thin or round body allow less to points with moments.
+    In the total frame the nodes of a thin or round body reduce it for points with moments.
     """
     update = hub.update
     if keeps_moments(hub) and not (update.method.frame.moves or update.scheme.traits.implicit):
@@ -167,7 +167,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
     scheme, method = hub.update.scheme, hub.update.method
     two, one = scheme.traits.courant
     if min(two, one) < 1:
-        # Nodes between the corners of cells make the highest frequency higher.
+        # Nodes between the corners of cells raise the highest frequency.
         nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
         return (one if sparse(hub) else two) * nodes
     if not method.frame.moves:
@@ -181,23 +181,23 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the stable step over h/c, and the share of it that the program takes of itself.
+    """Return the stable step over h/c, and the default fraction of it.
 
-    `still`: while no point has gone as far as `STILL`. The stable step is that of scheme, basis and
-    points per cell.
+    `still`: while no point has moved as far as `STILL`. The stable step depends on scheme, basis
+    and points per cell.
     """
     method, share = hub.update.method, keeping_share(hub)
-    # Transfers of moments bear 1.3 h/c with quadratic splines, 1.5 with cubic ones.
+    # Transfers of moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic ones.
     still &= method.frame.moves and not keeps_moments(hub)
     if still:
-        # A lone point of linear functions is stable up to 0.8 h/c in space.
+        # A lone point with a linear basis is stable up to 0.8 h/c in 3D.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
     courant = courant_number(hub, longer=still or bears_drift(hub))
     return min(courant, lone_point(hub)), share
 
 
 def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the same with the share of the script: that of the same step at rest as after."""
+    """Return the same with the script's fraction, which is the same at rest as after."""
     update = hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return own_step_of_waves(hub, still=still)
@@ -205,7 +205,7 @@ def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
 
 def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
-    """Return the step that the program would take of itself now: at rest, or had points moved."""
+    """Return the default step now: at rest, or as if points had moved."""
     clock = simulation.control.clock[0]
     courant, share = own_step_of_waves(hub, still=still)
     weight = own_weight_of_drift(hub)
@@ -217,18 +217,18 @@ def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
 
 
 def _borne(hub: Hub, simulation: Any) -> float:
-    """Find the largest step that points bear where they are."""
+    """Find the largest stable step of points at their positions."""
     clock = simulation.control.clock[0]
     return own_step_of_waves(hub, still=clock.path <= STILL)[0] * clock.spacing / clock.rate
 
 
 def blows_up(hub: Hub, simulation: Any) -> bool:
-    """Tell whether the step is so far above the stable one that a run gets nowhere."""
+    """Return True if the step is so far above the stable one that a run fails."""
     return simulation.dt > LOST * _borne(hub, simulation)
 
 
 def what_follows(hub: Hub, simulation: Any, step: float) -> str:
-    """Say what is known of a `step` above the stable one of bodies that move."""
+    """Describe the known effects of a `step` above the stable one for moving bodies."""
     borne = _borne(hub, simulation)
     if step <= borne:
         return (
@@ -240,7 +240,7 @@ def what_follows(hub: Hub, simulation: Any, step: float) -> str:
 
 
 def own_step_instead_of(hub: Hub, simulation: Any) -> float | None:
-    """Find the step that the program would take itself; None where it does."""
+    """Return the default step; None if the script does not override it."""
     if hub.update.dt_factor is None and hub.update.fixed_dt is None:
         return None
     still = simulation.control.clock[0].path <= STILL
@@ -248,7 +248,7 @@ def own_step_instead_of(hub: Hub, simulation: Any) -> float | None:
 
 
 def words_of_own_step(hub: Hub, simulation: Any) -> str:
-    """Tell the step that the program would take itself and how long; empty where it does."""
+    """Describe the default step and its duration; empty if the script does not override it."""
     step = own_step_instead_of(hub, simulation)
     if step is None:
         return ""
@@ -258,12 +258,12 @@ def words_of_own_step(hub: Hub, simulation: Any) -> str:
 
 
 def stable_step(hub: Hub, simulation: Any, limit: float) -> float:
-    """Return the stable step where a script asks for one: `limit`, or that of the program's own."""
+    """Return the stable step if a script sets the step: `limit`, or the default's."""
     return max(limit, own_step(hub, simulation) / USUAL)
 
 
 def own_step_instead(hub: Hub, command: str = "") -> str:
-    """Say what to write in the place of a step that is too large, by the command for it."""
+    """Return the fix for a step that is too large, by the command that set it."""
     if command == "set_dt" or (not command and hub.update.fixed_dt is not None):
         return f"set_dt({own_step(hub, hub.simulation):.3g}) or less, or leave set_dt out"
     share = own_step(hub, hub.simulation) / hub.simulation.limit_moving
@@ -271,12 +271,12 @@ def own_step_instead(hub: Hub, command: str = "") -> str:
 
 
 def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
-    """Name the step that a script asks for, by which it is known that it has been told."""
+    """Name the step set by a script, as a key for messages already given."""
     return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
 
 
 def words_of_share(hub: Hub) -> str:
-    """Say what share of the stable step is taken, and what it means."""
+    """Describe the fraction of the stable step, and its meaning."""
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
         share = hub.update.fixed_dt / stable_step(hub, hub.simulation, hub.simulation.limit)
@@ -292,20 +292,19 @@ def words_of_share(hub: Hub) -> str:
     else:
         share = asked
         words = f"{share:g} of the stable step, by dt_factor"
-    # Of a share above 1 `large_steps` warns.
+    # `large_steps` warns of a fraction above 1.
     if max(keeping, 1e-9) * (1 + 1e-9) < share <= 1 and keeping < USUAL:
         return words + f": above {keeping:g} a body that drifts gains energy"
     return words
 
 
 def ruling_limit(simulation: Any) -> str:
-    """Return the name of what limits the step now.
+    """Return the name of the present limit of the step.
 
-    ``set_dt`` and ``end`` (of the run) are no limits of stability; ``conduction`` is that of heat,
-    ``viscosity`` that of waves which viscosity slows down, ``speed`` that of points which move
-    faster than waves, ``light_nodes`` that of usl and of
-    :mod:`karamelo_py.run.light_nodes`, ``lone_points`` that of points with moments, and ``waves``
-    that of the others.
+    ``set_dt`` and ``end`` (of the run) are not stability limits. ``conduction`` is the limit of
+    heat, ``viscosity`` of waves slowed by viscosity, ``speed`` of points faster than waves,
+    ``light_nodes`` of usl and of :mod:`karamelo_py.run.light_nodes`, ``lone_points`` of points with
+    moments, and ``waves`` of the rest.
     """
     control = simulation.control
     clock = control.clock[0]
@@ -333,14 +332,14 @@ def ruling_limit(simulation: Any) -> str:
 
 
 class LimitsTold:
-    """Tell what limits the step where that changes: a name once, and a limit that has halved."""
+    """Report changes of the limit of the step: each name once, and a limit that has halved."""
 
     def __init__(self, simulation: Any):
         self.simulation, self.names = simulation, {ruling_limit(simulation)}
         self.least = simulation.limit
 
     def words(self) -> str:
-        """Describe a change since it was told last; empty where there is none."""
+        """Describe a change since the last report; empty if there is none."""
         simulation = self.simulation
         name, limit, before = ruling_limit(simulation), simulation.limit, self.least
         halved = not limit > 0.5 * before

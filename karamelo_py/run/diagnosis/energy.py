@@ -1,4 +1,4 @@
-"""The watch over a scene's energy: what it cannot see, and where a gain comes from."""
+"""The watch over a scene's energy: its limits, and the causes of a gain or loss."""
 
 from typing import Any, NamedTuple
 
@@ -15,8 +15,8 @@ from karamelo_py.run.advice.facts import SceneFacts
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
-LOSS = 0.05  # of the largest energy, at the end of a run: more is told; WITHIN before the end
-TOLD = 2  # windows of growth one after another, of which a run tells
+LOSS = 0.05  # of the largest energy, at the end of a run: more gives a warning; WITHIN before
+TOLD = 2  # consecutive windows of growth, after which a run warns
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
@@ -25,10 +25,10 @@ def not_watched(why: str) -> str:
 
 
 def unknown_work(hub: Hub) -> str:
-    """Name what does work that nobody adds up; empty where energy can be watched.
+    """Name the source of work that is not tracked; empty if energy can be watched.
 
-    Compiled hooks on nodes and points have their work added up by the loops. Fixes in Python say
-    by `Fix.conserves` that they bring none.
+    The loops sum the work of compiled hooks on nodes and points. Fixes in Python declare by
+    `Fix.conserves` that they do no other work.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -45,7 +45,7 @@ def unknown_work(hub: Hub) -> str:
 
 
 def unknown_heat(hub: Hub) -> bool:
-    """Look for a fix in Python that may bring heat, or for friction that does."""
+    """Return True if a fix in Python may supply heat, or friction does."""
     return warms_by_friction(hub) or any(
         name in HEAT_STAGES and not isinstance(hook, CompiledHook)
         for fix in hub.fixes.values()
@@ -54,7 +54,7 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
-    """Name what is known to feed energy in such a scene, the most likely first, and its cure."""
+    """Name the likeliest known cause of an energy gain in such a scene, and its fix."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
@@ -74,7 +74,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         pressed = "points that the edge of the domain puts back, while their neighbours press on"
         return pressed, "nodes held by fix velocity_nodes along walls in place of boundary(reflect)"
     courant, _ = timestep.own_step_of_waves(hub, still=False)
-    # Of waves in bodies that nothing has deformed: later they may be softer.
+    # For undeformed bodies: later they may be softer.
     fastest = timestep.fastest_wave(simulation)
     across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
@@ -99,7 +99,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"{share:.2g} of the stable step",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
-    if moves and simulation.points.largest(swelling)[0] > 1.5:  # what a cell cannot hold
+    if moves and simulation.points.largest(swelling)[0] > 1.5:  # too much for a cell
         return "points that are further apart than a cell (numerical fracture)", WHOLE
     said = SceneFacts(hub, simulation, simulation.time).advice("gain")
     fed = max(said, key=lambda one: one.share, default=None)
@@ -132,18 +132,18 @@ def _step_of(hub: Hub, simulation: Any, share: float) -> str:
 
 
 def swelling(points: PointTable) -> np.ndarray:
-    """Return the volumes (n,) over those before the first step."""
+    """Return the volumes (n,) relative to the initial volumes."""
     return points.particle("volume") / points.reference_volume
 
 
 def has_grown(simulation: Any) -> bool:
-    """Judge, by looks at it, that energy has come from nowhere."""
+    """Return True if the watch has measured a spurious energy gain."""
     clock = simulation.control.clock[0]
     return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
 
 class Imbalance(NamedTuple):
-    """A gain or loss of energy that nothing explains: what to say, and its likely cause."""
+    """An unexplained gain or loss of energy: the message, and its likely cause."""
 
     message: str
     hint: str
@@ -152,7 +152,7 @@ class Imbalance(NamedTuple):
 
 
 def words_of_growth(hub: Hub, simulation: Any) -> Imbalance | None:
-    """Describe a gain of energy from nowhere, with its cure; None where there is none."""
+    """Describe a spurious energy gain, with its fix; None if there is none."""
     clock = simulation.control.clock[0]
     if not has_grown(simulation):
         return None
@@ -170,12 +170,12 @@ def words_of_growth(hub: Hub, simulation: Any) -> Imbalance | None:
 
 
 def blends(transfer: Any) -> bool:
-    """Check that points take a share of the velocities of nodes, and so lose what these lack."""
+    """Return True if points take a fraction of nodal velocities, which lack the unresolved part."""
     return getattr(transfer, "alpha", 0) < 1
 
 
 def taken_by(hub: Hub) -> list[str]:
-    """Name what a script has chosen that takes energy without an account of it."""
+    """Name the script's choices that dissipate energy without a record."""
     found, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
@@ -183,22 +183,22 @@ def taken_by(hub: Hub) -> list[str]:
         share = f" {transfer.alpha:g}" if hasattr(transfer, "alpha") else ""
         found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
     if hub.update.method.fields_per_solid:
-        # Contact turns round what they have braked, within the step: nodes chatter, and the points
-        # see less of that than the nodes.
+        # Contact reverses the motion that damping has reduced, within the step: nodes chatter, and
+        # the points are less affected than the nodes.
         braking = dict.fromkeys(fix.style for fix in hub.fixes.values() if fix.brakes)
         found += [f"fix {style}" for style in braking]
     return found
 
 
 def share_lost(simulation: Any) -> float:
-    """Share of the largest energy so far that has gone since the first step; negative: a gain."""
+    """Fraction of the largest energy so far lost since the first step; negative: a gain."""
     clock = simulation.control.clock[0]
     mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
     return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
 
 
 def words_of_loss(hub: Hub, simulation: Any, within: float) -> Imbalance | None:
-    """Describe a loss above `within` that nothing chosen explains, with its cure; else None."""
+    """Describe a loss above `within` that no choice explains, with its fix; else None."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
@@ -242,7 +242,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Describe collisions that take energy, with their cure; None where nothing collides so."""
+    """Describe collisions that dissipate energy, with their fix; None without such collisions."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
             "contact that undoes penetrations within a step: of such impulses the grid carries "
@@ -258,26 +258,26 @@ def collides(hub: Hub) -> tuple[str, str] | None:
 
 
 def grown_little(simulation: Any) -> bool:
-    """Judge the present state a good one, as far as its energy and its last step tell."""
+    """Return True if the present state is good, judged by its energy and its last step."""
     clock = simulation.control.clock[0]
     swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
     if swings or has_grown(simulation):
         return False
     if not clock.watch_energy:
         return True
-    # The last look, too: noise that grows by half in a hundred steps is there in the state already.
+    # The last look, too: noise that grows by half in a hundred steps is already in the state.
     before = clock.first_mean if clock.looks >= FEW else clock.first_balance
     return bool(keeps(before, clock.balance, unit_of(clock)))
 
 
 def growth_since(simulation: Any, before: float) -> float:
-    """Find the growth of energy since one that it had `before`; NaN where nobody watches it."""
+    """Return the energy growth relative to `before`; NaN if energy is not watched."""
     unit = max(abs(before), float(simulation.control.clock[0].energy_floor), 1e-300)
     return growth(before, simulation.energy(), unit)
 
 
 def change_of_energy(simulation: Any) -> float | None:
-    """Find the change of energy since the first step, in % of the largest; None where unknown."""
+    """Return the energy change since the first step, in % of the largest; None if unknown."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= FEW:
         return None
@@ -286,7 +286,7 @@ def change_of_energy(simulation: Any) -> float | None:
 
 
 def words_of_change(hub: Hub, share: float) -> str:
-    """Describe a change of energy in % for the end of a run, and what takes some."""
+    """Describe an energy change in % for the end of a run, and known dissipation."""
     takers, by = taken_by(hub), ""
     words = "the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
@@ -296,13 +296,13 @@ def words_of_change(hub: Hub, share: float) -> str:
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
-    # Losses add up, and may come to more than there ever was at a time.
+    # Losses add up, and may exceed the largest energy at any time.
     much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
     return f"{much} {words}{by}"
 
 
 def forget_growth(simulation: Any) -> None:
-    """Count from the present state on what energy grows by: that it has grown was told."""
+    """Measure growth from the present state: a warning has been given."""
     clock = simulation.control.clock[0]
     clock.first_few = clock.first_mean = clock.largest_mean
     clock.windows, clock.grown = 0, 0.0
