@@ -513,6 +513,15 @@ def test_the_gallery_shows_every_scene(tmp_path):
             assert re.search(rf"^{variable} *=", text, re.M), (name, variable)
 
 
+def test_warnings_of_the_page_have_the_names_that_are_printed():
+    page = (ROOT / "docs" / "methods.md").read_text("utf-8")
+    table = page.partition("## Combinations that trigger")[2].partition("\n\nThe program")[0]
+    names = re.findall(r"^\| \[?`([^`]+)`", table, re.M)
+    assert len(names) > 20
+    code = "".join(path.read_text("utf-8") for path in (ROOT / "karamelo_py").rglob("*.py"))
+    assert [name for name in names if f'"{name}"' not in code] == []
+
+
 def test_equations_link_to_functions_that_exist():
     """Each by its file and its name; every scheme and the stable step have theirs."""
     sys.path.insert(0, str(ROOT / "docs" / "_ext"))
