@@ -26,7 +26,7 @@ CLOSES = 1.0  # per cent
 RUN = re.compile(r"^ *run(_time)?\((.*?)(?:, *on_trouble.*)?\) *$", re.M)
 HEAD = """# Balances of energy and momentum
 
-This table shows how well each scene of `inputs/` keeps energy and momentum.
+This table shows how well each scene of `inputs/` conserves energy and momentum.
 `python -m comparisons.balance` writes it. It takes the first run of each scene, with at most 3000
 steps, and fewer for more than 700 points. With `--full` it takes the whole run.
 

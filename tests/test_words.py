@@ -25,7 +25,7 @@ EXPRESSIONS = {
     r"of (?:its|their|his|one's) own": ("separate, or nothing", 0),
     r"(?:that|those) of": ("repeat the noun", 8),
     r"shares?": ("fraction; FLIP coefficient", 12),
-    r"keeps?(?! [\d.]+ \|)": ("conserves, stores, retains", 3),
+    r"keeps?(?! [\d.]+ \|)": ("conserves, stores, retains", 2),
     r"from nowhere": ("spurious energy gain", 2),
     r"averaged volumes|volumes averaged": ("F-bar", 6),
     r"swings?|whirls?": ("sloshes, oscillates; vortex", 6),
