@@ -1,7 +1,7 @@
-"""Grid to points: what a visit of the points gathers from the nodes, and what follows from it.
+"""Grid to points: gather from the nodes in a visit of the points, and update the points.
 
-A task names, for `karamelo-py check` and `bench`, the fields of points and of nodes that it goes
-through.
+A task names the fields of points and nodes that it reads and writes, for `karamelo-py check` and
+`bench`.
 """
 
 from math import inf, sqrt
@@ -33,7 +33,7 @@ from karamelo_py.points.transfers.xpic import Reflected, Series, TermOfSeries
 
 
 class Task(NamedTuple):
-    """Base of tasks that lanes do, too, and corners of domains."""
+    """Base of tasks that also work in lanes and at domain corners."""
 
     in_lanes = True
     not_at_corners = ()
@@ -58,35 +58,35 @@ class Strain(Task):
 
 
 class StrainOfLastStep(Strain):
-    """The same by the velocity that has led here, at the places that it has led to."""
+    """`Strain` with the velocity that led here, at the new positions."""
 
 
 class SecondStrain(Strain):
-    """The same for the second of two strain increments of a step."""
+    """`Strain` for the second of two strain increments of a step."""
 
     says = "second half of the stress"
 
 
 class StrainOfLoadStep(Strain):
-    """The same of a step that may turn points far (:func:`~karamelo_py.points.kinematics.large`).
+    """`Strain` for large rotations in a step (:func:`~karamelo_py.points.kinematics.large`).
 
-    Implicit schemes take such.
+    Used by implicit schemes.
     """
 
 
 class StrainInMove(Strain):
-    """`Strain` in one visit with `Move`, behind it: what v* gave already is not gathered again."""
+    """`Strain` in one visit after `Move`, without gathering again."""
 
 
 class TrialStrain(Strain):
-    """Gather the gradient; update only by what factor it would change the volume (F-bar)."""
+    """Gather the gradient; compute only the volume ratio that it would cause (F-bar)."""
 
     says = "trial volume"
     writes = ("volume ratio",)
 
 
 class TrialStrainOfLastStep(TrialStrain):
-    """The same of `StrainOfLastStep`."""
+    """`TrialStrain` for `StrainOfLastStep`."""
 
 
 class SetMeanStress(Task):
@@ -111,7 +111,7 @@ class SeriesTerm(NamedTuple):
 
 @point_function()
 def empty(task: arrays.Tag, w: Work, x: tuple) -> tuple:
-    """Return the totals of a gather before the first node: zeros."""
+    """Return the initial totals of a gather: zeros."""
 
 
 @empty.on(Move)
@@ -120,7 +120,7 @@ def _empty_move(task, w, x):
 
 
 def _is_known(task, w):
-    """Return True for a gradient that the transfer may have from v* already."""
+    """Return True for a gradient that the transfer may already have from v*."""
     return isinstance(task, StrainInMove) and not isinstance(w.averaging, visit.FBar)
 
 
@@ -153,7 +153,7 @@ def _records_of_strain(task, nodes):
 
 @point_function()
 def gathered(task: arrays.Tag, w: Work, stencil: tuple, k: int, total: tuple) -> tuple:
-    """Add the part of the k-th node of the stencil to `total`."""
+    """Add the contribution of the k-th node of the stencil to `total`."""
 
 
 @gathered.on(Move)
@@ -169,13 +169,13 @@ def _gathered_move(task, w, stencil, k, total):
 
 
 def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
-    """Return True for a gather at corners of domains that move with the velocity there."""
+    """Return True for a gather at domain corners that move with their velocity."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
 def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: arrays.Number) -> tuple:
-    """Return v* and v* - v of a node: one record in the plane, two in space."""
-    if many_threads() and not isinstance(i, Weighted):  # records that lie side by side
+    """Return v* and v* - v of a node: one record in 2D, two in 3D."""
+    if many_threads() and not isinstance(i, Weighted):  # adjacent records
         both = aligned_record(nodes.update, i, 2 * arrays.of_change(kin))
         first, d = arrays.of_change(kin), kin.dimension
         return vector(kin, both[:d]), vector(kin, both[first : first + d])
@@ -187,7 +187,7 @@ def update_at(kin: arrays.Tag, nodes: arrays.Nodes, i: arrays.Index, like: array
 
 
 def add_gradient(w, stencil, k, grad_v):
-    """Add the part of the k-th node to the velocity gradient, where it is gathered at all."""
+    """Add the contribution of the k-th node to the velocity gradient, if it is gathered."""
     if not len(grad_v):
         return grad_v
     i, _, grad_N = straining_node(w, stencil, k)
@@ -221,19 +221,19 @@ def _gathered_series_term(task, w, stencil, k, total):
 
 @point_function()
 def updated(task, w, stencil, p, dt, total, totals, fastest):
-    """Store what follows from `total`; return how far the point moved in cells, and its rate.
+    """Store the update from `total`; return the move of the point in cells, and its rate.
 
-    The rate, c + max |v_i - common_i|, bounds the stable step; what is returned is the larger of it
-    and `fastest`, the largest so far. A point that went wrong (det F <= 0, NaN, outside the domain)
-    returns a distance or a rate of NaN or infinity. `totals` are those of all tasks of the visit.
+    The rate, c + max |v_i - common_i|, bounds the stable step; the larger of it and `fastest`, the
+    largest so far, is returned. A failed point (det F <= 0, NaN, outside the domain) returns a
+    distance or a rate of NaN or infinity. `totals` are the totals of all tasks of the visit.
     """
 
 
 @updated.on(Strain)
 def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
-    """Return state of the law and shape of the domain after a step; growth in cells, and rate."""
+    """Update the state of the law and the domain shape; return growth in cells, and rate."""
     gradient, ratio = total
-    if not len(gradient):  # the point keeps it
+    if not len(gradient):  # the point stores it
         gradient = totals[0][2]
     dl = increment(dt, gradient)
     if isinstance(task, StrainOfLastStep):
@@ -242,7 +242,7 @@ def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
     law, old, f = visit.deformed_state(w, p)
     growth = frames.spatial_increment(w.frame, w.kin, dl, f)
     load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
-    strained = large(growth) if load_step else growth  # domains grow by the whole of it
+    strained = large(growth) if load_step else growth  # domains grow by the whole gradient
     beside = load(field(w.points.fields, visit.PressureBeside), p, (dt,))
     state = laws.advance_beside(law, w.kin, old, strained, dt, sum(beside))
     store(w.points.state, p, state)
@@ -258,12 +258,12 @@ def _updated_strain(task, w, stencil, p, dt, total, totals, fastest):
         grown = grown + further_reach(w.basis, w.kin, w.grid, before, after)
     if not all_lanes(j > 0):
         return where(j > 0, grown, inf), fastest
-    # The speed of waves is only asked of the few points that may be faster than all before them.
+    # The wave speed is computed only for the few points that may be faster than all before them.
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter
     speed = (load_vector(w.kin, w.points.v, p) - w.common).largest()
     slack = fastest - speed
-    if all_lanes((slack >= 0) & (most <= slack * slack)):  # so written, NaN is noticed too
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # in this form, NaN is noticed too
         return grown, fastest
     rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
     return grown, where(fastest > rate, fastest, rate)
@@ -304,14 +304,14 @@ def _updated_series_term(task, w, stencil, p, dt, total, totals, fastest):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """Find by how many cells the domain of a point reaches further than before."""
+    """Return by how many cells the domain of a point reaches further than before."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 
 
 @updated.on(Move)
 def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
-    """Return the new velocity, position and carried corners; how far that is in cells."""
+    """Update velocity, position and carried corners; return the move in cells."""
     law, state = visit.law_and_state(w, p)
     v_pic, dv, moment, *corners = total
     old = load_vector(w.kin, w.points.v, p)
@@ -323,7 +323,7 @@ def _updated_move(task, w, stencil, p, dt, total, totals, fastest):
     y = x + step
     force = field(w.points.fields, Force)
     if force is not None and not laws.moves_as_told(w.laws):
-        # With the mean velocity of the nodes in the step: stress and holders act at the same time.
+        # With the mean nodal velocity in the step: stress and constraints act at the same time.
         work = w.kick * dot(load_vector(w.kin, force, p), v_pic - 0.5 * dv)
         increase(field(w.points.fields, WorkOfForces), p, (work,))
     warm_by_friction(field(w.nodes.fields, FrictionalHeat), w, stencil, p, v[0])
@@ -359,7 +359,7 @@ gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
 
 
 def updated_all(tasks, w, stencil, p, dt, totals, fastest):
-    """Update by the tasks in turn: distances add up, and the rate goes from one to the next."""
+    """Update by the tasks in turn: distances are summed, and the rate is passed on."""
     moved = real(0, fastest)
     for task, total in zip(tasks, totals, strict=True):
         further, fastest = updated(task, w, stencil, p, dt, total, totals, fastest)

@@ -1,8 +1,8 @@
-"""Hooks of fixes, their totals, and the watch over energy on a GPU: what one thread does.
+"""Hooks of fixes, their totals, and the watch over energy on a GPU: the work of one thread.
 
 The functions of :mod:`karamelo_py.kernels.hook_loop` do the work, for one member at a time: each
-thread has the tables of the hooks with a scratch of its own. Totals are sums of whole numbers,
-which threads may add to in any order: a few copies of them share the traffic.
+thread has the tables of the hooks with a private scratch. Totals are sums of integers, which
+threads may add to in any order: a few copies of them spread the traffic.
 """
 
 from collections.abc import Callable
@@ -27,14 +27,14 @@ from karamelo_py.points.kinematics import planar
 
 
 class Own(NamedTuple):
-    """Rooms of a thread in the place of those of `Hooks`."""
+    """Arrays of a thread instead of those in `Hooks`."""
 
     chosen: np.ndarray
     scratch: np.ndarray
 
 
 class OwnTotals(NamedTuple):
-    """Totals of a thread in the place of those of `Control`."""
+    """Totals of a thread instead of those in `Control`."""
 
     totals: np.ndarray
 
@@ -54,7 +54,7 @@ def _hooks_with_room(hooks):
 
 
 def _control(count: int) -> Callable:
-    """Make what gives a thread its control; `count` values, if it needs some of its own, or 0."""
+    """Make the control of a thread; `count` private values, or 0."""
 
     def own_values(values):
         room = room_for(count, (0.0,))[0]
@@ -78,7 +78,7 @@ _CONTROL = _control(0)
 
 
 def clear_held(i, fate, held):
-    """Forget who has held a node."""
+    """Clear the record of what holds a node."""
     for c in range(held.shape[1]):
         held[i, c].slot = 0
 
@@ -89,7 +89,7 @@ def _member(hooks, h, i):
 
 
 def count_node(i, fate, nodes, hooks, h, heavy):
-    """Count a member that has mass."""
+    """Count a member with mass."""
     if nodes.sums[_member(hooks, h, i), arrays.MASS] > 0:
         counted(heavy, h, 1)
 
@@ -99,7 +99,7 @@ def _share(hooks, h, heavy):
 
 
 def _planar_nodes(nodes):
-    """Return the nodes with what hooks know of them."""
+    """Return the nodes with the fields for hooks."""
     known = hook_loop.known_to_hooks(nodes)
     return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known)
 
@@ -115,7 +115,7 @@ def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Calla
             return
         own = _hooks_with_room(hooks)
         own.chosen[0] = n
-        # Temperatures are always kept: FLIP, whatever the transfer of velocity.
+        # For temperatures always FLIP, whatever the transfer of velocity.
         control, kept = control_of(s, copies, i), 1.0 if of_heat else s.control.clock[0].kept
         nodes = _planar_nodes(s.nodes)
         what = hook_loop.HookedNodes(target, planar(s.kin), s.grids, nodes, s.ranges, kept)
@@ -140,7 +140,7 @@ def on_whole_node(target: int, early: bool) -> Callable:
 
 
 def work_of_loads(i, fate, s, hooks, copies):
-    """Add up the work of loads on a node, and forget them."""
+    """Sum the work of loads on a node, and clear them."""
     if s.nodes.sums[i, arrays.MASS] > 0:
         own = _hooks_with_room(hooks)
         own.chosen[0] = i
@@ -154,7 +154,7 @@ def work_of_loads(i, fate, s, hooks, copies):
 
 
 def clear_force(i, fate, s, block):
-    """Let a point bear no force of fixes, until these say so anew."""
+    """Clear the force of fixes on a point."""
     force = field(block.points.fields, Force)
     if force is not None:
         for c in range(s.kin.dimension):
@@ -171,7 +171,7 @@ def _act_on_point(what, control_of, i, s, hooks, h, copies):
 
 
 def on_point(what_of: Callable, then: int, values: int) -> Callable:
-    """Make what a point does for a hook on what `what_of` gives; `then` is 1 behind the move."""
+    """Make a point's function for a hook on the result of `what_of`; `then` is 1 after the move."""
     control_of = _control(values)
 
     def visit_point(i, fate, s, block, hooks, h, copies):
@@ -192,7 +192,7 @@ def on_whole_point(then: int, heats: bool = False) -> Callable:
 
 
 def check_point(i, fate, s, block):
-    """Look at the new position of a point again, after hooks that may have changed it."""
+    """Check the new position of a point again, after hooks that may have changed it."""
     points, clock = block.points, s.control.clock[0]
     cells, good = checked_move(s.frame, s.kin, s.grids, points, clock.now, clock.stride, i)
     if good:
@@ -202,7 +202,7 @@ def check_point(i, fate, s, block):
 
 
 def take_moves(i, fate, s):
-    """Take over how far points have come."""
+    """Accept the distances that points have moved."""
     clock = s.control.clock[0]
     clock.move = max(clock.move, fate[MOVED])
     fate[MOVED] = 0.0
@@ -212,14 +212,14 @@ def take_moves(i, fate, s):
 
 
 class OwnParts(NamedTuple):
-    """Items of a thread in the place of those of `Setup`."""
+    """Items of a thread instead of those in `Setup`."""
 
     contact: NamedTuple
     control: NamedTuple
 
 
 def _setup(s: arrays.Setup) -> Callable:
-    """Make what gives a thread the setup with all that it writes to in the way of others."""
+    """Make the setup of a thread, with private copies of arrays that threads would overwrite."""
     contact = s.contact
     fields = len(contact.slot) if isinstance(contact, SeparateFields) else 0
     d = s.kin.dimension
@@ -294,7 +294,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, always):
-    """Publish the totals of all hooks, if somebody sees them."""
+    """Publish the totals of all hooks, if they are read."""
     if always or is_last(s):
         for h in range(len(hooks.table)):
             hook_loop.publish_total(hooks, h, s.control)
@@ -309,7 +309,7 @@ def publish_hook(i, fate, s, hooks, h):
 
 
 def add_energies(i, fate, s, block, copies, threads):
-    """Add up the energies of some points, and mass and momentum of their solids."""
+    """Sum the energies of some points, and mass and momentum of their solids."""
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
     own = copies[index(i % len(copies))]
     firsts, first_row = s.control.firsts, s.control.values.size
@@ -342,7 +342,7 @@ def _add_all(own, first_row, solid, total):
 
 
 def add_work(i, fate, s, block, copies):
-    """Add the work of forces on a point to that of the loads on nodes."""
+    """Add the work of forces on a point to the work of loads on nodes."""
     work = field(block.points.fields, WorkOfForces)
     if work is not None:
         totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))
@@ -350,14 +350,14 @@ def add_work(i, fate, s, block, copies):
 
 
 def look_before(i, fate, s):
-    """Keep the energies of a step whose next is looked at."""
+    """Store the energies of a step if the next one is checked."""
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)
     watch.note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))
 
 
 def look_behind(i, fate, s):
-    """Look at the energy; the run ends where it has come from nowhere."""
+    """Check the energy; the run ends at a spurious gain."""
     clock = s.control.clock[0]
     if clock.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return

@@ -1,12 +1,12 @@
-"""Heat that flows between points through the nodes: what they carry, give and take.
+"""Heat flow between points through the nodes.
 
 A temperature is to a heat capacity what a velocity is to a mass: the nodes of heat are `Nodes` with
-one component, and the loops over nodes and the fixes of velocities serve them, too. The steps
-that they take together are those of :mod:`karamelo_py.kernels.heat`.
+one component, and the loops over nodes and the fixes of velocities work on them, too. Their common
+steps are in this module.
 
-Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt & Guilkey 2007 for points that bring their
-gradient along; Tao et al. 2016, "A generalized interpolation material point method for coupled
-thermo-mechanical processes", for heat.
+Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt & Guilkey 2007 for points with gradients;
+Tao et al. 2016, "A generalized interpolation material point method for coupled thermo-mechanical
+processes", for heat.
 """
 
 from typing import NamedTuple
@@ -56,13 +56,13 @@ class Volume(StepField):
 
 
 class Supply(StepField):
-    """Heat per time that fixes bring to a point."""
+    """Heat per time that fixes supply to a point."""
 
     columns = ("gamma",)
 
 
 class TemperatureShare(StepField):
-    """TemperatureShare of the change of the nodes' temperature that a point takes."""
+    """Fraction of the change of the nodal temperature that a point takes."""
 
 
 class HeatGradient(Field):
@@ -72,7 +72,7 @@ class HeatGradient(Field):
 
 
 class HeatContent(NamedTuple):
-    """Scatter heat capacity and heat, as if the points' gradients reached to the nodes."""
+    """Scatter heat capacity and heat, with the points' gradients up to the nodes."""
 
     in_lanes = True
     says = "heat to grid"
@@ -91,7 +91,7 @@ class TemperatureGradient(NamedTuple):
 
 
 class HeatFlow(NamedTuple):
-    """Scatter the heat flow and what fixes supply."""
+    """Scatter the heat flow and the supply of fixes."""
 
     in_lanes = True
     says = "heat flow"
@@ -118,10 +118,10 @@ class Warming(NamedTuple):
 
 
 def at_least_round_off(weight):
-    """Return `weight`, and next to nothing where it is nothing.
+    """Return `weight`, or a tiny number if it is 0.
 
-    A point that stands on a node has no weight at the next, but a gradient: that node needs the
-    temperature that the point has there, and what flows to it has to come back.
+    A point on a node has no weight at the next node, but a gradient: that node needs the
+    temperature that the point has there, and the flow to it has to return.
     """
     return max(weight, round_off(weight))
 
@@ -139,7 +139,7 @@ def _load_of_heat_content(quantity, w, p, like):
     field(fields, Capacity)[0, p] = capacity
     field(fields, Conductance)[0, p] = conductance
     field(fields, Volume)[0, p] = volume
-    # Fixes may supply heat, and reset what share of the change the point takes.
+    # Fixes may supply heat, and reset the fraction of the change that the point takes.
     field(fields, Supply)[0, p] = real(0, like)
     field(fields, TemperatureShare)[0, p] = real(1, like)
     return of_present(p, capacity), of_present(p, conductance), T, _gradient(w, p)
@@ -191,7 +191,7 @@ def _empty_temperature_gradient(task, w, x):
 @gathered.on(TemperatureGradient)
 def _gathered_temperature_gradient(task, w, stencil, k, total):
     i, _, gradient = node_of(w, stencil, k)
-    # An axisymmetric gradient has the part around the axis behind; a scalar has none there.
+    # An axisymmetric gradient also has the hoop part after it; a scalar has none.
     return total + w.nodes.velocity[i, 0] * gradient.planar()
 
 
@@ -228,7 +228,7 @@ def _updated_warming(task, w, stencil, p, dt, total, totals, fastest):
     change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
     T = where(some, fma(field(fields, TemperatureShare)[0, p], change, T), T)
     store(w.points.state, p, laws.with_temperature(law, w.kin, state, T))
-    # By what factor conduction has become faster than in the undeformed body.
+    # Factor by which conduction has become faster than in the undeformed body.
     faster = laws.jacobian(law, w.kin, state) * inverse_stretch_squared(w.frame, w.kin, f, dt)
     return real(0, dt) * T, max(fastest, faster)
 
@@ -240,7 +240,7 @@ def at_heat_nodes(hooks, stage, target, s):
 
 @at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
-    # Temperatures are always kept: FLIP, whatever the transfer of velocity.
+    # For temperatures always FLIP, whatever the transfer of velocity.
     clock = s.control.clock[0]
     clock.set_low, clock.set_high = np.inf, -np.inf
     hook_loop.node_hooks(
@@ -252,14 +252,14 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
 
 
 def heated(s, block, then):
-    """Give what fixes that heat points act on."""
+    """Return the argument of fixes that heat points."""
     points, kinds = block.points, (Capacity, Temperature, Volume, Supply, TemperatureShare)
     own = [field(points.fields, kind) for kind in kinds]
     return hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[s.control.clock[0].now])
 
 
 def heat_of(points):
-    """Give supply and capacity of points."""
+    """Return supply and capacity of points."""
     return tuple([field(points.fields, kind) for kind in (Supply, Capacity)])
 
 
@@ -284,12 +284,12 @@ def _of_heat(s):
 
 
 def at_its_nodes(s):
-    """Return the same for tasks at nodes, which have one component."""
+    """Return the setup for tasks at nodes, which have one component."""
     return _of_heat(s)._replace(kin=Line())
 
 
 def _take_factor(clock):
-    # What `Warming` reports as a rate is by what factor conduction has become faster.
+    # `Warming` reports as a rate the factor by which conduction has become faster.
     clock.heat_limit = clock.heat_reference / clock.new_rate
 
 
@@ -301,7 +301,7 @@ SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# And the flow that present gradients make.
+# And the heat flow from present gradients.
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),
@@ -311,12 +311,12 @@ FLOW_TO_NODES = (
 )
 # The fixes hold the new temperature of nodes.
 HOLD = ByFixes(at_heat_nodes, (arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE))
-# Points take what the temperature of the nodes changes by.
+# Points take the change of the nodal temperature.
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
 
 class Conducting(NamedTuple):
-    """Heat flows through `nodes`, whose fields are those of velocities and of F-bar.
+    """Heat flows through `nodes`, with the fields of velocities and of F-bar.
 
     sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted with
     conductance.

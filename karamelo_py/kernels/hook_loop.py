@@ -1,8 +1,8 @@
 """The loop of compiled hooks of fixes over the members of their groups, at nodes and at points.
 
-What hooks act on is a tuple (`HookedNodes`, `MovingPoints`, `HeatedPoints`), whose class says how
-the next members are chosen and what is done with a block of them. The functions of the hooks are
-described in `karamelo_py.kernels.hooks`.
+Hooks act on a tuple (`HookedNodes`, `MovingPoints`, `HeatedPoints`), whose class determines how the
+next members are chosen and a block of them is processed. The functions of the hooks are described
+in `karamelo_py.kernels.hooks`.
 """
 
 from typing import NamedTuple
@@ -30,14 +30,14 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import moves_as_told
 
-# Bare numbers would be types of their own.
+# Bare numbers would each be a type.
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
-END = np.iinfo(np.int64).max  # behind the last of the members
+END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
-COUNT, ACT, RUB = 0, 1, 2  # what is done with the members of a hook
-LOADS = 3  # and with all nodes, as a target
-DONE = -1  # in the place of a stage
+COUNT, ACT, RUB = 0, 1, 2  # task for the members of a hook
+LOADS = 3  # as a target: for all nodes
+DONE = -1  # instead of a stage
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
 _call_point_function = caller_of(kinds.POINT_FUNCTION)
@@ -45,12 +45,12 @@ _call_heat_function = caller_of(kinds.HEAT_FUNCTION)
 
 
 class HookedNodes(NamedTuple):
-    """Nodes that node functions change, those of heat too.
+    """Nodes that node functions change, nodes of heat included.
 
-    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
+    `kept` is the fraction of its velocity that a point retains, and changes by nodal increments.
     """
 
-    target: int  # where in the arrays of nodes they act
+    target: int  # position in the arrays of nodes
     kin: NamedTuple
     grids: np.ndarray
     nodes: NamedTuple
@@ -66,15 +66,15 @@ class WholeNodes(NamedTuple):
     grids: np.ndarray
     nodes: NamedTuple
     ranges: np.ndarray
-    before_update: bool  # else behind it
+    before_update: bool  # else after it
     target: int
 
 
 class MovingPoints(NamedTuple):
-    """Points whose velocity point functions change, and the places y that follow from x.
+    """Points whose velocity point functions change, with the places y that follow from x.
 
-    Behind the d coordinates of a point, `y` has those of `corners` corners of its domain. What
-    moves rigid points does no work on others; they do, where they touch them.
+    After the d coordinates of a point, `y` has `corners` corners of its domain. Moving rigid points
+    does no work on other points; they do work where they touch them.
     """
 
     ids: np.ndarray
@@ -95,7 +95,7 @@ class WholePoints(NamedTuple):
     points: NamedTuple
     laws: NamedTuple
     x: np.ndarray  # (w, n)
-    heat: tuple  # supply and capacity, (1, n) each, where heat is supplied
+    heat: tuple  # supply and capacity, (1, n) each, if heat is supplied
 
 
 class HeatedPoints(NamedTuple):
@@ -115,17 +115,17 @@ class HeatedPoints(NamedTuple):
 
 
 def _turns(what, k, parts):
-    """Return where the turns of thread `k` of so many begin and end, and the step between them."""
+    """Return begin, end and stride of the turns of thread `k` of `parts`."""
     if isinstance(what, (HookedNodes, WholeNodes)):
         shares = what.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-    # By turns: members may lie beside each other.
+    # In turns, as members may be clustered.
     size = TURN if parts > 1 else max(what.ids.size, 1)
     return k * size, what.ids.size, parts * size
 
 
 def _bounds(what, turn, parts):
-    """Return from where to before where members are chosen in a turn."""
+    """Return the range of members in a turn."""
     if isinstance(what, (HookedNodes, WholeNodes)):
         return what.ranges[turn, 0], what.ranges[turn, 1]
     return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
@@ -133,12 +133,12 @@ def _bounds(what, turn, parts):
 
 @point_function()
 def act(what, task, hooks, control, dt, h, count, share):
-    """Do `task` with the chosen members, add to the totals; return how many count."""
+    """Do `task` with the chosen members and add to the totals; return how many count."""
 
 
 @noinline
 def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
-    """Do `task` with the members of hook `h` in the part of thread `k`; how many count."""
+    """Do `task` with the members of hook `h` in the part of thread `k`; return how many count."""
     found = 0
     hooks.scratch[:6] = 0.0
     first, last, step = _turns(what, k, parts)
@@ -157,7 +157,7 @@ def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
 
 @shared_out
 def _act_on_parts(what, task, hooks, control, dt, h, share, k):
-    """Act in the part of thread `k`, with a scratch and totals of its own: totals do not round."""
+    """Act in the part of thread `k`, with private scratch and totals: totals do not round."""
     own = record(hooks.apart, k)
     for i in range(control.values.size):
         own.values[i] = control.values[i]
@@ -170,7 +170,7 @@ def _act_on_parts(what, task, hooks, control, dt, h, share, k):
     here, mine = hold(arrays.with_items_of(hooks, own)), hold(arrays.with_items_of(control, own))
     _act_on_part(what, task, here, mine, dt, h, share, k, hooks.apart.chosen.shape[0])
     totals.hand_over(own.totals, control.totals, totals.WORK)
-    # Of nodes that others have held before, their totals change, too.
+    # If other hooks have held the nodes before, their totals change, too.
     several = hooks.held.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)
@@ -200,7 +200,7 @@ def _act_on_all(what, task, hooks, control, dt, h, share):
 
 
 def directions(hooks):
-    """Read their number: so that no loop over them is unrolled."""
+    """Return their number at run time, so that loops over them are not unrolled."""
     return hooks.x0.shape[1]
 
 
@@ -227,17 +227,17 @@ def evaluate(hooks, h, component, count, control, result, shift):
 
 @noinline
 def _evaluate_now_and_before(hooks, h, c, count, control):
-    """Evaluate the formula of direction `c`, and that of one step earlier where it is used."""
+    """Evaluate the formula of direction `c`, and one step earlier if it is used."""
     evaluate(hooks, h, c, count, control, VALUE, 0.0)
     if hooks.table[h].uses_before:
-        # Nothing was before time 0.
+        # There is nothing before time 0.
         step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
         evaluate(hooks, h, c, count, control, BEFORE, -step_back)
 
 
 @noinline
 def _published(hooks, h):
-    """Return the first of the totals of a hook, and how many it publishes."""
+    """Return the first total of a hook, and its number of totals."""
     slot = hooks.table[h].slot
     if hooks.table[h].address == arrays.WHOLE:
         return slot, hooks.table[h].totals
@@ -260,7 +260,7 @@ def _clear_total(hooks, h, control):
 @noinline
 def publish_total(hooks, h, control):
     """Publish the totals of a hook."""
-    totals.carry(control.totals[totals.WORK])  # it grows from step to step
+    totals.carry(control.totals[totals.WORK])  # it accumulates over steps
     first, count = _published(hooks, h)
     if count > 0:
         totals.publish(control, first, count)
@@ -270,9 +270,9 @@ def publish_total(hooks, h, control):
 
 
 def _choose_nodes(what, hooks, h, row, end, member):
-    """Choose up to a block of members in use, with mass; how many, and where to go on.
+    """Choose up to a block of members in use, with mass; return their number and where to continue.
 
-    Members ascend as rows do: a wall may have more than in use.
+    Members ascend like rows: a wall may have more members than are in use.
     """
     ranges, sums = what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
@@ -340,7 +340,7 @@ def locate_nodes(grids, hooks, count):
 
 @noinline
 def _clear_held(what, held):
-    """Forget who has held nodes."""
+    """Clear the record of what holds nodes."""
     kin, ranges = what.kin, what.ranges
     if held.size > 0:
         for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
@@ -351,7 +351,7 @@ def _clear_held(what, held):
 
 @noinline
 def _take_over(hooks, control, h, n, c, force):
-    """Let hook `h` hold node `n` by `force`; return what those had of it that held it before."""
+    """Let hook `h` hold node `n` by `force`; return the force of the previous hooks on it."""
     before = 0.0
     if hooks.held.size > 0 and hooks.table[h].holds:
         held = hooks.held[n, c]
@@ -366,28 +366,28 @@ def _take_over(hooks, control, h, n, c, force):
 
 @noinline
 def _moves_as_told(hooks, n):
-    """Return True if a node is of the field of a rigid solid: nothing does work on it."""
+    """Return True if a node belongs to the field of a rigid solid: no work is done on it."""
     told = hooks.told
     return told.size > 0 and told[n // (hooks.loads.shape[0] // told.size)]
 
 
 def _is_taken(rigid, n):
-    """Return True if rigid points decide about the velocity of a node that others see, too."""
+    """Return True if rigid points set the velocity of a node that other points also see."""
     return rigid is not None and rigid[n, arrays.MASS] > 0
 
 
 @noinline
 def _change_nodes(what, hooks, control, dt, h, count, share):
-    """Act on the chosen nodes; add to the totals, and to the work that is done."""
+    """Act on the chosen nodes; add to the totals, and to the work."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
     slot = hooks.table[h].slot
     stage = hooks.table[h].stage
     remaps = target == arrays.ON_VELOCITY and stage == arrays.POST_VELOCITIES_TO_GRID
-    # What is strained by before the forces belongs to the last step, and to what held it then.
+    # Strain before the forces belongs to the last step, and to the hooks that held then.
     strains_first = target == arrays.ON_VELOCITY and stage == arrays.POST_UPDATE_GRID_STATE
     strains_first = strains_first and hooks.table[h].holds > 0
     given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
-    # Contact may take the velocity of a node that nothing holds, and a rigid body that of any.
+    # Contact may take the velocity of a free node, and a rigid body the velocity of any node.
     late = stage == arrays.POST_UPDATE_GRID_STATE
     yields, rigid = late and hooks.table[h].holds == 0, field(nodes.fields, RigidSums)
     for c in range(directions(hooks)):
@@ -407,7 +407,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
             else:
                 v = nodes.velocity[n, c]
                 star = v
-                last = nodes.update[n, c]  # before the forces, that of the step before
+                last = nodes.update[n, c]  # before the forces, from the step before
                 if remaps or (strains_first and last == hooks.scratch[given, q]):
                     star = last
             old, old_star = v, star
@@ -417,7 +417,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
                 hooks.scratch[given, q], hooks.scratch[BEFORE, q], dt, share,
             )  # fmt: skip
             if target == arrays.ON_UPDATE:
-                # Points that keep their velocity take the change v* - v: another v is an impulse.
+                # Points that retain velocity take the change v* - v: another v is an impulse.
                 total += kept * mass * (old - v) / dt
                 if star == hooks.scratch[VALUE, q]:
                     before = _take_over(hooks, control, h, n, c, total)
@@ -425,8 +425,8 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
                 hooks.loads[n, c] += force - old_force  # see _work_at_nodes
                 nodes.sums[n, arrays.of_force(kin) + c] = force
             elif target == arrays.ON_UPDATE:
-                # Impulse times the mean of the velocities before and after it; of what holds the
-                # node, as one that a bound stops has not moved with the wall before.
+                # Impulse times the mean of the velocities before and after it; or of the holding
+                # hook, as a node stopped by a bound has not moved with the wall before.
                 moved = v + star
                 if hooks.table[h].uses_before and star == hooks.scratch[VALUE, q]:
                     moved = hooks.scratch[BEFORE, q] + star
@@ -441,7 +441,7 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
                 nodes.update[n, arrays.of_change(kin) + c] = star - v
             else:
                 nodes.velocity[n, c] = star if strains_first else v
-            # Formulas have been taken: their rows hold what is to be added up.
+            # Formulas have been used: their rows hold the terms to be summed.
             own = totals.counts(control.ranks, n)
             hooks.scratch[VALUE, q] = total if own else 0.0
             hooks.scratch[BEFORE, q] = work if own else 0.0
@@ -454,11 +454,11 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
 
 @noinline
 def _rub_at_nodes(what, hooks, control, dt, h, count):
-    """Rub the chosen nodes along their wall."""
+    """Apply friction to the chosen nodes along their wall."""
     target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
     programs = hooks.programs[h]
     if target == arrays.ON_VELOCITY:
-        # Else v* is that of the step before.
+        # Otherwise v* belongs to the step before.
         if hooks.table[h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
                 stick(kin, nodes, programs, hooks.chosen[q])
@@ -472,10 +472,10 @@ def _rub_at_nodes(what, hooks, control, dt, h, count):
 
 @noinline
 def _work_at_nodes(what, hooks, control, dt, count):
-    """Add up what loads on the chosen nodes have done, and forget them; v* is that of the points.
+    """Sum the work of loads on the chosen nodes, and clear them; v* is the points' velocity.
 
-    Force times the mean of the velocities before and after the step: what stress, holders and
-    contact of a node do to it in the same step counts, or the work would be of first order.
+    Force times the mean of the velocities before and after the step: the effect of stress,
+    constraints and contact in the same step counts, or the work would be of first order.
     """
     update, change = what.nodes.update, arrays.of_change(what.kin)
     terms = hooks.scratch[VALUE]
@@ -518,26 +518,26 @@ def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
 
 
 class _NoWhole(NamedTuple):
-    """Take the place of the functions of whole points in loops that know none."""
+    """Takes the place of the functions of whole points in loops without them."""
 
     whole: tuple
 
 
 def without_whole(hooks):
-    """Leave functions of whole points out: loops are not compiled anew for each of these."""
+    """Omit functions of whole points: otherwise loops are compiled again for each of them."""
     return arrays.with_items_of(hooks, _NoWhole(()))
 
 
 def known_to_hooks(nodes):
-    """Return the declared fields that the loop knows: others would have it compiled anew."""
+    """Return the declared fields that the loop uses: others would have it compiled again."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
 def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
     """Call the node functions of `stage` on the members that have mass.
 
-    `kept` is the share of its own velocity that a point keeps, and changes by what nodes change by.
-    Of `LOADS` the work is added up: here, so that the way through the nodes is compiled once.
+    `kept` is the fraction of its velocity that a point retains, and changes by nodal increments.
+    For `LOADS` the work is summed: here, so that the loop over the nodes is compiled once.
     """
     fields = known_to_hooks(nodes)
     early, flat = stage == arrays.POST_PARTICLES_TO_GRID, planar(kin)
@@ -573,13 +573,13 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control,
             share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
-                # Before the forces (usf) v* is that of the step before.
+                # Before the forces (usf) v* belongs to the step before.
                 if one.tag.row == h and target != arrays.ON_VELOCITY:
                     _act_on_all(one, ACT, hooks, control, dt, h, share)
         else:
             _act_on_all(what, ACT, hooks, control, dt, h, share)
         publish_total(hooks, h, control)
-    # Walls rub when it is known which of them hold a node.
+    # Friction at walls follows when it is known which of them hold a node.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -606,7 +606,7 @@ def _at_nodes_hooks(hooks, stage, target, s):
 
 @point_function(otherwise=True)
 def add_work(hooks, s):
-    """Add up the work of the loads on nodes."""
+    """Sum the work of the loads on nodes."""
 
 
 @add_work.on(arrays.Hooks)
@@ -618,7 +618,7 @@ def _add_work_hooks(hooks, s):
 
 
 def choose_points(what, hooks, h, p, end):
-    """Choose up to a block of members; how many, where to go on. Note places before the step."""
+    """Choose up to a block of members; return their number, where to continue. Store places."""
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
@@ -643,7 +643,7 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
             continue
         _evaluate_now_and_before(hooks, h, c, count, control)
         slot = hooks.table[h].slot
-        # Forces act while a hook leads a point from what it had at the start of the step.
+        # Forces act while a hook leads a point from its initial velocity in the step.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
@@ -657,7 +657,7 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
             work = 0.5 * float(what.mass[p]) * (velocity - speed) * (velocity + first)
             totals.add_to(control.totals, totals.WORK, 0.0 if what.rigid else work)
             v[c, p] = velocity
-            # As far as a point moves, its corners do.
+            # Corners move with their point.
             for corner in range(what.corners):
                 y[d + d * corner + c, p] += place - y[c, p]
             y[c, p] = place
@@ -686,11 +686,11 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
         what.temperature[0, p] = T
         if slot >= 0:
             totals.add_to(control.totals, slot, supply - before)
-        # What a temperature is led to bounds it: what it has come to be says nothing.
+        # A prescribed temperature bounds it: the resulting one does not.
         if hooks.table[h].holds > 0:
             T = hooks.scratch[BEFORE, q]
         elif what.capacity[0, p] > 0:
-            # What the fastest point takes, another may have got before.
+            # Another point may have got earlier what the fastest point takes.
             rate = supply / what.capacity[0, p]
             clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
         if share == 0 or hooks.table[h].holds > 0:
@@ -699,7 +699,7 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
 
 
 def _of_time(tag, kin, hooks, control, dt, h):
-    """Give formulas of time now and at the end of the step, 0 without; and the times of contact."""
+    """Return formulas of time now and at the end of the step, 0 without; and contact times."""
     found = []
     for shift in (0.0, dt):
         for c in range(kin.dimension):
@@ -770,8 +770,8 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 def point_hooks(stage, then, hooks, s, what_of, heat_of):
     """Call the point functions of `stage` on the members in each block; sum over them.
 
-    ``what_of(s, block, then)`` gives what functions of one component act on, and
-    ``heat_of(points)`` what those of whole points heat.
+    ``what_of(s, block, then)`` gives the argument of functions of one component, and
+    ``heat_of(points)`` the heat arguments of functions of whole points.
     """
     control, dt, without = s.control, step_size(s), without_whole(hooks)
     of_points = [tag for tag in hooks.whole if not tag.of_nodes]
@@ -784,27 +784,27 @@ def point_hooks(stage, then, hooks, s, what_of, heat_of):
 
 
 def _positions(s, points, then):
-    """Give the positions before a step, and with `then` those behind it, else the same."""
+    """Return the positions before a step, and after it if `then`, else the same."""
     now = s.control.clock[0].now
     return points.x[now], points.x[1 - now if then else now]
 
 
 def whole_points(tag, s, block, then, heat):
-    """Give what a function of whole points acts on."""
+    """Return the argument of a function of whole points."""
     points = block.points
     _, y = _positions(s, points, then)
     return WholePoints(tag, points.id, s.kin, points, block.laws, y, heat)
 
 
 def moving_points(s, block, then):
-    """Give what point functions act on."""
+    """Return the argument of point functions."""
     points, rigid = block.points, moves_as_told(block.laws)
     x, y = _positions(s, points, then)
     return MovingPoints(points.id, points.v, points.mass, x, y, corners_that_move(s), rigid)
 
 
 def clear_forces(kin, force, count):
-    """Let points bear no force of fixes, until these say so anew."""
+    """Clear the forces of fixes on points."""
     if force is not None:
         for c in range(kin.dimension):
             for p in range(count):
@@ -812,7 +812,7 @@ def clear_forces(kin, force, count):
 
 
 def corners_that_move(s):
-    """Count the corners that stand behind the position of a point, and move with it."""
+    """Count the corners that are stored after the position of a point, and move with it."""
     return placed(s.basis, s.kin) if s.frame.moves else 0
 
 

@@ -1,8 +1,8 @@
-"""Points to grid: what a visit of the points scatters to the nodes, and its sums there.
+"""Points to grid: scatter to the nodes in a visit of the points, and the sums there.
 
-A quantity says in ``fills(kin)`` which columns of the nodes' arrays take it: (array, first column,
-end), the array a name in `Nodes` or the class of a field, which a scene may not have. With
-``adds = True`` it adds to what is there.
+A quantity lists in ``fills(kin)`` its columns of the nodes' arrays: (array, first column, end), the
+array a name in `Nodes` or the class of a field, which a scene may not have. With ``adds = True`` it
+adds to the present values.
 """
 
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
 class Scattered(NamedTuple):
-    """Base of quantities that lanes give, too, and corners of domains."""
+    """Base of quantities that also work in lanes and at domain corners."""
 
     in_lanes = True
     not_at_corners = ()
@@ -56,7 +56,7 @@ class MassMomentum(Scattered):
 
     @staticmethod
     def fills(kin):
-        """Name the columns of the nodes that it adds to, see `columns_of`."""
+        """Return the columns of the nodes that it adds to, see `columns_of`."""
         vectors = [(kind, 0, kin.dimension) for kind in (Normal, Centre)]
         numbers = [(kind, 0, 1) for kind in (SquaredMass, EnergyLoss)]
         whole = [(kind, 0, of_force(kin)) for kind in ("sums", RigidSums)]
@@ -64,7 +64,7 @@ class MassMomentum(Scattered):
 
 
 class InternalForce(Scattered):
-    """Scatter the internal force, and that of fixes on points."""
+    """Scatter the internal force, and the forces of fixes on points."""
 
     not_at_corners = ("moments",)
     says = "internal force"
@@ -93,12 +93,12 @@ class Volumes(Scattered):
 
 
 class AveragedForce(Scattered):
-    """Scatter the internal force of the averaged mean stress less that of a point's own (F-bar)."""
+    """Scatter the force of the averaged mean stress minus the point's mean stress (F-bar)."""
 
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     reads = ("mass", "state", "material", "deformation gradient", "averaged stress")
-    adds = True  # to a force that is there
+    adds = True  # to an existing force
 
     fills = staticmethod(lambda kin: (_forces(kin),))
 
@@ -120,14 +120,14 @@ class VelocityBefore(Field):
 
 
 class Force(StepField):
-    """Force that fixes put on a point."""
+    """Force of fixes on a point."""
 
     shape = vector
     columns = ("bx", "by", "bz")
 
 
 class WorkOfForces(Field):
-    """Work of that force since the watch over the energy has looked last."""
+    """Work of that force since the last look at the energy."""
 
 
 class Normal(SummedField):
@@ -137,11 +137,11 @@ class Normal(SummedField):
 
 
 class SquaredMass(SummedField):
-    """Sum of N m^2 at a node: over that of N m it is the mean mass of the points it sees (USL)."""
+    """Sum of N m^2 at a node: divided by the sum of N m, the mean mass of its points (USL)."""
 
     @staticmethod
     def needed(basis: Any) -> bool:
-        """Return True if a basis makes light nodes that the gradient feels."""
+        """Return True if a basis makes light nodes that affect the gradient."""
         return basis.steep_edge
 
 
@@ -162,7 +162,7 @@ class RigidSums(SummedField):
 
 @point_function()
 def load_of(quantity: Tag, w: Work, p: Index, like: Number) -> tuple:
-    """Return the load of a point: the numbers that it scatters, before they are weighted."""
+    """Return the load of a point: the numbers that it scatters, before weighting."""
 
 
 visit.records_of.on(MassMomentum)(lambda quantity, nodes: nodes.sums)
@@ -173,7 +173,7 @@ visit.records_of.on(MomentumAgain)(lambda quantity, nodes: nodes.velocity)
 
 @point_function()
 def scattered(quantity: Tag, w: Work, stencil: tuple, k: int, load: tuple) -> None:
-    """Give the k-th node of the stencil its part."""
+    """Add the contribution to the k-th node of the stencil."""
 
 
 def _moment(w, p, like):
@@ -181,7 +181,7 @@ def _moment(w, p, like):
 
 
 def _is_apart(w):
-    """Return True for rigid points whose nodes have sums of their own for them."""
+    """Return True for rigid points with separate sums at their nodes."""
     return laws.moves_as_told(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
@@ -245,7 +245,7 @@ def _load_of_internal_force(quantity, w, p, like):
     force = load(field(w.points.fields, Force), p, load_vector(w.kin, w.points.v, p))
     of_mean = isinstance(w.averaging, visit.FBar)
     mean = _mean_stress(w.kin, law, state, volume) if of_mean else ()
-    # Rigid points take no force: where they share nodes with others, it would push those.
+    # Rigid points take no force: it would act on other points at their nodes.
     here = of_present(p, real(0 if laws.moves_as_told(w.laws) else 1, volume))
     return stress, here * force if len(force) else (), mean
 
@@ -305,7 +305,7 @@ def _scattered_series_back(quantity, w, stencil, k, load):
 
 
 def accumulate_optional(array, i, values):
-    """Add to a node, where there is an array for it."""
+    """Add to a node, if the array exists."""
     if array is not None:
         accumulate(array, i, 0, (*values,))
 
@@ -320,7 +320,7 @@ def adds(quantity: NamedTuple) -> bool:
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """List the columns that take all the quantities; those that follow each other are one entry."""
+    """List the columns that take all the quantities; adjacent ones are one entry."""
     found: dict[tuple[Any, int], int] = {}  # the first column of each array that ends there
     for quantity in quantities:
         for array, first, end in quantity.fills(kin):
@@ -346,7 +346,7 @@ def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
 
 
 def _take_record(quantities, kin, nodes, n, buffers, m, keep):
-    """Add what record `m` of the buffers has to node `n`, or put it there; it is zero then."""
+    """Move record `m` of the buffers to node `n`, adding or replacing; the record becomes zero."""
     for name, first, end, add in _columns(quantities, kin):
         array = _array(nodes, name)
         if array is not None:
@@ -355,7 +355,7 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
 
 
 def _clear_record(quantities, kin, nodes, n):
-    """Clear the columns of node `n` that take the quantities, but those that they add to."""
+    """Clear the columns of node `n` for the quantities, except those that add."""
     for name, first, end, add in _columns(quantities, kin):
         array = _array(nodes, name)
         if array is not None and not add:

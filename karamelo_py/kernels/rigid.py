@@ -1,8 +1,8 @@
-"""Rigid bodies on a grid that all solids share: nodes under them take their velocity.
+"""Rigid bodies on a grid that all solids share: nodes near them take their velocity.
 
-Rigid points give their mass and momentum to sums of their own (`RigidSums`), so that those of the
-nodes are of the other solids alone, whatever the density of a rigid body. Where a node sees rigid
-points its velocity is theirs; what that takes is the force that they put on the others.
+Rigid points scatter mass and momentum to separate sums (`RigidSums`), so that the nodal sums belong
+to the other solids alone, whatever the density of a rigid body. A node with rigid points takes
+their velocity; the force needed for that is the force on the other solids.
 """
 
 from typing import NamedTuple
@@ -35,12 +35,12 @@ class RigidBodies(NamedTuple):
 
 @noinline
 def _impose(kin, nodes, rigid, dt, control, n):
-    """Give a node that sees rigid points their velocity; the force of that stands in `rigid`.
+    """Set the velocity of a node with rigid points; the force for that is stored in `rigid`.
 
-    Its work on the others is that of one that prescribes velocities.
+    Its work on the other points is that of a prescribed velocity.
 
-    The change v* - v of the node has that force, too: else points that keep their own velocity
-    (FLIP) never learn the speed of the body that they touch.
+    The change v* - v of the node includes that force: otherwise FLIP points never acquire the
+    velocity of the body that they touch.
     """
     d = kin.dimension
     if not rigid[n, MASS] > 0:

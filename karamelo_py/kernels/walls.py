@@ -1,8 +1,8 @@
-"""Coulomb friction at walls: nodes that a fix holds across a wall rub along it.
+"""Coulomb friction at walls: nodes held by a fix across a wall rub along it.
 
-The force of the wall on a node has the parts that the fix prescribes, across the wall, and along it
-at most mu times as much, against the motion: as much as stops it, if that is less. The wall is at
-rest in the directions in which nothing is prescribed.
+The normal force of the wall on a node is the force for the prescribed velocity. The tangential
+force is at most mu times as much, against the motion, and at most what stops it. The wall is at
+rest in the directions without a prescribed velocity.
 """
 
 from math import sqrt
@@ -13,22 +13,21 @@ from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts
 
-FRICTION = 3  # the program of the coefficient, behind those of the components
+FRICTION = 3  # the program of the coefficient, after those of the components
 
 
 @noinline
 def _is_free(held, programs, n, c):
-    """Return True if no fix holds node `n` in direction `c`, as far as that of `programs` knows."""
+    """Return True if no fix holds node `n` in direction `c`, judged by `programs` and `held`."""
     return programs[c].begin < 0 and (held.size == 0 or held[n, c].slot == 0)
 
 
 @noinline
 def rub(kin, nodes, programs, hooks, n, mu, dt, kept, control, slot):
-    """Give node `n` the friction of its wall; add the force to the totals from `slot` on.
+    """Apply the wall friction to node `n`; add the force to the totals from `slot`.
 
-    `programs` are those of the hook that has held the node: what it changed v* by is the impulse
-    across the wall. Where several fixes hold the node, each rubs for the directions in which it
-    decides.
+    `programs` are the programs of the holding hook, whose change of v* is the normal impulse. If
+    several fixes hold the node, each applies friction for the directions in which it decides.
     """
     d, held = kin.dimension, hooks.held
     mass = nodes.sums[n, MASS]
@@ -60,15 +59,15 @@ def rub(kin, nodes, programs, hooks, n, mu, dt, kept, control, slot):
             hooks.loads[n, c] -= mass * taken / dt
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
-    # With the mean of the speeds at the beginning and the end of the step; a wall takes no heat.
+    # With the mean of the speeds at the beginning and end of the step; a wall takes no heat.
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Stop the velocity that deforms, too, where friction stopped the node.
+    """Also stop the deforming velocity if friction stopped the node.
 
-    Where it is mapped apart from v*, stress would else do work on a slip that there is not.
+    If it is mapped separately from v*, stress would otherwise do work on a spurious slip.
     """
     d = kin.dimension
     for c in range(d):

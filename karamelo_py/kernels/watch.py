@@ -1,17 +1,16 @@
-"""The watch over energy and temperatures: every so many steps, inside the compiled loop.
+"""The watch over energy and temperatures, at intervals of steps, inside the compiled loop.
 
-Kinetic plus stored plus dissipated energy less the work of the loads cannot grow. Velocities belong
-to the middles of steps and stresses to their ends, more or less by the scheme: energies of two
-steps in a row give those of one time, to second order. Sums go through the points in the order of
-their tiles, the same on any number of threads.
+Kinetic plus stored plus dissipated energy minus the work of the loads cannot grow. Velocities
+belong to the middles of steps and stresses to their ends, more or less, by the scheme: two
+consecutive steps give energies at one time, to second order. Sums run over the points in the order
+of their tiles, the same on any number of threads.
 
-Growth (`karamelo_py.kernels.watch`) is measured by the energy that bodies have besides their
-drift, the motion of their centres of mass: large as that may be, from the start or by loads, it
-cannot hide what vibrates.
+Growth is measured relative to the energy besides drift, the motion of the centres of mass: however
+large that is, from the start or by loads, it cannot hide vibrations.
 
-The same looks measure how many cells matter moves through while it is stressed, weighed by the
-elastic energy of points (`karamelo_py.kernels.watch.note_crossing`): linear basis functions in the
-updated frame lose stress by that.
+The same looks measure the number of cells that stressed material moves through, weighted by the
+elastic energy of points (`karamelo_py.kernels.watch.note_crossing`): in the updated frame, a linear
+basis loses stress by that.
 """
 
 from math import exp, inf, sqrt
@@ -39,29 +38,29 @@ from karamelo_py.points.laws import (
 )
 
 LOOK = 10  # steps between two looks
-FEW = 3  # looks that are compared where no window is whole: the present and the two before
+FEW = 3  # looks that are compared without a full window: the present and the two before
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
-GROWTH = 0.01  # of the largest energy so far, in a window: more is told
-WITHIN = 0.1  # of the unit: more growth than that since the start is told, and is not kept
-DRIFTING = 1e-3  # of the energy of bodies that drift: what they vibrate by and matters is more
-BOUND = 10.0  # times the energy that there was and that loads have brought: more stops the run
+GROWTH = 0.01  # of the largest energy so far, in a window: more gives a warning
+WITHIN = 0.1  # of the unit: more growth since the start gives a warning
+DRIFTING = 1e-3  # of the energy of drifting bodies: relevant vibrations have more
+BOUND = 10.0  # times the initial energy and the work of loads: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
-COARSE = 1000.0  # round-off errors: a strain of so many is noise, too
+COARSE = 1000.0  # round-off errors: a strain of this size is noise, too
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
-HEAT_NOISE = 1e-4  # of a temperature: what does not count where all are alike
-OVERSHOOT = 0.1  # of the range of temperatures that sources allow: more stops the run
-# Steps so many times the stable one of conduction are borne: what nodes do not show of the points'
-# temperatures is levelled (measured with 2 points per cell: 4 and 5.8 with and without convection).
+HEAT_NOISE = 1e-4  # of a temperature: tolerated if all are equal
+OVERSHOOT = 0.1  # of the range of temperatures from the sources: more stops the run
+# Steps up to these multiples of the stable one of conduction are tolerated: point temperatures in
+# the null space decay (measured with 2 points per cell: 4 and 5.8 with and without convection).
 BORNE = 4.0
 
 
 def solid_of(firsts, number):
-    """Find the solid that a point of this id belongs to."""
+    """Return the solid of the point with this id."""
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
 
 def energies_of(kin, points, laws, p):
-    """Find mass and velocity of a point, its energies: kinetic, elastic, elastic and dissipated."""
+    """Return mass, velocity, and energies of a point: kinetic, elastic, elastic and dissipated."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
@@ -105,7 +104,7 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
 
 @kernel
 def _take_work(work, control):
-    """Add the work of forces on points to that of the loads on nodes."""
+    """Add the work of forces on points to the work of loads on nodes."""
     for p in range(work.size):
         totals.add_to(control.totals, totals.WORK, float(work[0, p]))
         work[0, p] = 0
@@ -115,7 +114,7 @@ def _take_work(work, control):
 def sum_energies(s, mode):
     """Sum energies of points, kinetic and stored plus dissipated, and the work into the clock.
 
-    Rigid bodies have none: they move as they are told, and do work on others.
+    Rigid bodies have none: their motion is prescribed, and does work on other bodies.
     """
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
@@ -129,7 +128,7 @@ def sum_energies(s, mode):
 
 
 def take_energies(s):
-    """Take over the totals of energies and work into the clock."""
+    """Copy the totals of energies and work to the clock."""
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
     clock, answer = s.control.clock[0], s.control.answer
     clock.kinetic = answer[totals.KINETIC]
@@ -139,7 +138,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, ids, masses, v, tiling, control):
-    """Add mass and momentum of each solid, 1 + d, to totals behind those of published values.
+    """Add mass and momentum of each solid, 1 + d, to the totals after the published values.
 
     Elastic energy, and this times velocity, of all points follow.
     """
@@ -187,7 +186,7 @@ def _sum_drift(s):
 
 
 def take_drift(s):
-    """Take over the totals of mass and momentum of the solids."""
+    """Read the totals of mass and momentum of the solids."""
     control, d = s.control, s.kin.dimension
     own = control.values.size
     totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
@@ -202,11 +201,10 @@ def take_drift(s):
 
 
 def note_crossing(control, d):
-    """Add up the cells that elastic energy has been carried through since the last look.
+    """Add the cells that elastic energy has moved through since the last look.
 
-    Of energy that goes, its way goes, too; what comes has none. Vibrations renew it in the time in
-    which waves go there and back. So waves that come and go count by what they move while they
-    last.
+    When energy leaves, its path is removed, too; new energy has none. Vibrations renew it in the
+    time of a wave there and back, so transient waves count by what they move while they last.
     """
     clock, row = control.clock[0], (control.firsts.size - 1) * (1 + d)
     now, before = control.answer[row], clock.elastic
@@ -222,7 +220,7 @@ def note_crossing(control, d):
     renewed = (
         min(max((clock.kinetic - clock.of_drift) / now, 0.0), 1.0) * lasting / clock.to_and_fro
     )
-    # What linear basis functions lose of it on the way is no energy that goes.
+    # The loss by a linear basis on the way does not count as leaving.
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
@@ -230,40 +228,40 @@ def note_crossing(control, d):
 
 
 def _sum_before(s, mode, step):
-    """Sum the energies of a step whose next is looked at."""
+    """Sum the energies of a step if the next one is checked."""
     sum_energies(s, mode)
     note_before(s.control.clock[0], step)
 
 
 def note_before(clock, step):
-    """Keep the present energies for the look at the next step."""
+    """Store the present energies for the look at the next step."""
     clock.stored_before = clock.stored
     clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step
 
 
 def growth(first, later, unit):
-    """Share of the unit by which a later mean exceeds the first."""
+    """Growth of a later mean over the first, as a fraction of the unit."""
     return (later - first) / unit
 
 
 def keeps(first, later, unit, within=WITHIN):
-    """Compare growth with a share of the unit; NaN is not kept."""
+    """Return True if growth is within a fraction of the unit; False for NaN."""
     return later - first <= within * unit
 
 
 def unit_of(clock):
-    """Return the unit of the growth of energy: the most there was, of a drift no more than so."""
+    """Return the unit of energy growth: the largest energy, with a limited part of the drift."""
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
 @kernel
 def judge(control):
-    """Take the present sums into account; whether energy keeps within its bound."""
+    """Update the balance with the present sums; return whether energy is within its bound."""
     clock = control.clock[0]
     # The mean of the balances at the middle of a step and at its end, each with the other energy
-    # from both sides. A wave turns omega dt in a step: alone each of them swings by (omega dt)^2/8,
-    # one up where the other goes down, and the mean by (omega dt)^3/16.
+    # from both sides. Over the phase omega dt of a step, each alone oscillates by (omega dt)^2/8,
+    # in opposite phase, and the mean by (omega dt)^3/16.
     moving = clock.kinetic - clock.work
     balance = moving + clock.level * (clock.moving_before - moving)
     balance += clock.stored_before + clock.level * (clock.stored - clock.stored_before)
@@ -288,15 +286,15 @@ def judge(control):
         if part > clock.lost:
             clock.lost = part
             clock.crossed = way
-    # Means: a single look shows the shortest waves, too.
+    # Means: a single look also shows the shortest waves.
     unit = unit_of(clock)
     if clock.looks == FEW:
         clock.first_few = clock.first_mean = clock.largest_mean = (
             balance + clock.last_balance + clock.last_but_one
         ) / FEW
     if clock.looks >= 2 * FEW:
-        # The least of a few: where bodies meet a look or two shows what is not there. And kept, so
-        # that it does not matter which of the looks is the last before one asks.
+        # The minimum of a few: in collisions a look or two may be wrong. Stored, so that the result
+        # does not depend on which look is the last before it is read.
         least = min(balance, clock.last_balance, clock.last_but_one)
         clock.grown = max(clock.grown, growth(clock.first_few, least, unit))
     clock.sum_of_balance += balance
@@ -310,7 +308,7 @@ def judge(control):
         clock.grown = max(clock.grown, growth(clock.first_mean, mean, unit))
         clock.largest_mean = max(clock.largest_mean, mean)
     given = abs(clock.first_balance) + clock.supplied
-    # So written, NaN is noticed.
+    # In this form, NaN is noticed.
     return balance - clock.first_balance <= max(BOUND * given, clock.energy_floor)
 
 
@@ -322,7 +320,7 @@ def _range_of_heat(kin, points, laws, control):
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
-            # So written, NaN is noticed.
+            # In this form, NaN is noticed.
             clock.T_low = T if not clock.T_low <= T else clock.T_low
             clock.T_high = T if not clock.T_high >= T else clock.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)
@@ -330,7 +328,7 @@ def _range_of_heat(kin, points, laws, control):
 
 
 def measure_heat(s):
-    """Find the lowest and highest temperature of all points, for the clock."""
+    """Store the lowest and highest temperature of all points in the clock."""
     clock = s.control.clock[0]
     clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
     for block in s.blocks:
@@ -351,10 +349,10 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Note the stored energy before a run, where a look is due after a step.
+    """Note the stored energy before a run, if a look is due after a step.
 
-    `level` is the share of the later stored energy, and of the earlier kinetic one, in the balance.
-    With `anew` the balance starts from here.
+    `level` is the fraction of the later stored energy, and of the earlier kinetic energy, in the
+    balance. With `anew` the balance starts from here.
     """
     clock = s.control.clock[0]
     clock.level = level
@@ -370,7 +368,7 @@ def begin_to_look(s, mode, level, anew):
 
 
 def look(s, mode):
-    """Look at the energy where it is due; whether it keeps within its bound."""
+    """Check the energy if it is due; return whether it is within its bound."""
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
         return True
@@ -385,9 +383,9 @@ def look(s, mode):
 
 
 def look_at_end(s, mode):
-    """Look at the energy of the end of an implicit step; whether it keeps within its bound.
+    """Check the energy at the end of an implicit step; return whether it is within its bound.
 
-    Velocities and stresses are of one time there, and steps are few: each is looked at.
+    Velocities and stresses belong to one time there, and steps are few: each is checked.
     """
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
