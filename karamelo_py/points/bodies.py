@@ -83,7 +83,8 @@ def rub(mu, hold, load, mean, unused, stop):
     unused = (1 - NEW) * unused + mu * load
     bound = mu * max(mean, load)
     force = _shortened(hold + stop, min(bound, unused))
-    return force, _shortened(hold, bound), mean, unused - sqrt(force.squared())
+    # Never below 0, not even by rounding: friction would drive the slip, and ever more.
+    return force, _shortened(hold, bound), mean, max(unused - sqrt(force.squared()), 0.0)
 
 
 def along(v, normal):
