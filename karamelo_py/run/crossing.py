@@ -84,7 +84,7 @@ def _struck(scene: Any) -> Any:
     for a in bodies:
         for b in bodies:
             for k in range(scene.d):
-                begins = _meeting(a, b, k, solids[a.number].h)
+                begins = meeting(a, b, k, solids[a.number].h)
                 whole = z[a.number] + z[b.number]
                 if not (begins < scene.duration and whole > 0):
                     continue
@@ -102,7 +102,7 @@ def _side(one: BodyMotion, k: int, solids: list) -> float:
     return float(one.high[k] - one.low[k]) + 2 * float(solids[one.number].half_size[:, k].max())
 
 
-def _meeting(a: BodyMotion, b: BodyMotion, k: int, h: float) -> float:
+def meeting(a: BodyMotion, b: BodyMotion, k: int, h: float) -> float:
     """Return when body a meets body b ahead of it in direction k; infinite if never."""
     faster, gap = a.velocity[k] - b.velocity[k], b.low[k] - a.high[k] - h
     if not faster > 0 or b.centre[k] <= a.centre[k]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
-from karamelo_py.run import settling, timestep
+from karamelo_py.run import settling, timestep, uneven
 from karamelo_py.run.body_motion import (
     BodyMotion,
     Lag,
@@ -135,6 +135,16 @@ class SceneFacts:
     def settling(self) -> settling.Settling:
         """Estimate how far weight presses the softest body that is held at one end."""
         return settling.expected(self)
+
+    @cached_property
+    def uneven(self) -> uneven.Uneven:
+        """Find a light body next to a heavy one with too long a step for their common nodes."""
+        return uneven.expected(self)
+
+    @property
+    def share_of_uneven(self) -> float:
+        """Return the fraction of the stable step that holds for them."""
+        return self.share * self.uneven.of_step
 
     @property
     def share(self) -> float:
