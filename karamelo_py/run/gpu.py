@@ -36,7 +36,7 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 POLL = 64  # steps between two looks at how far a run is
 REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell sums up, by the size of numbers
 FAR = 1.0  # cells that points go before they are ordered anew in memory
-PARTS = "begin", "step", "last step", "before", "behind", "order"  # of what is launched
+PARTS = "begin", "step", "last step", "before", "behind", "order"  # of launches
 _NONE = arrays.NoHooks()
 
 
@@ -102,7 +102,7 @@ class StepsOnCard:
         self.ordered = -np.inf  # how far points had gone when they were ordered
 
     def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
-        """List the launches of a step, and those of the last of several."""
+        """List the launches of a step, and of the last of several steps."""
         begin, end = self._clear(*self._slots()), [self._launch(gpu.finish_step, 1, self.s)]
         ahead: list[KernelLaunch] = []  # sums for the next step
         own = self._launches(rows, ahead)
@@ -420,7 +420,7 @@ class StepsOnCard:
         return [*self._collect(*self._slots()), *self._collect(WORK, WORK + 1), publish]
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish the totals of a hook behind it, where formulas of others may read them."""
+        """Publish the totals of a hook after it, if other formulas may read them."""
         slots = range(*self._slots())
         if self._table()[h].slot < 0 or all(read not in slots for _, read in self._globals()):
             return []
@@ -506,7 +506,7 @@ class StepsOnCard:
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Time each launch of a step behind the last one: the medians of a few steps."""
+        """Time each launch of a step after the last one: the medians of a few steps."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]

@@ -231,7 +231,7 @@ class Runner:
         simulation.go_on(self.end_time, self.rollback.halvings)
         if not (self.rollback.halvings or simulation.implicit):  # else it is not the script's
             known_failures.warn_about_steps(hub, simulation, self.rollback.halve, again=True)
-        # It may hold the end of this run already, or what comes behind it.
+        # It may hold the end of this run already, or later states.
         step, time, last_step = simulation.step, simulation.time, self.last_step
         holds = f"{file} holds step {step}, time {time:.6g}"
         hint = "a longer run, or a file from before its end"

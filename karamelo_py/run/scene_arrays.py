@@ -63,7 +63,7 @@ def scene_key(hub: Hub) -> tuple:
 
 
 class SceneArrays:
-    """Hold the arrays of a scene, or of the share of a process, and the threads at work on them."""
+    """Hold the arrays of a scene, or of the part of a process, and its threads."""
 
     def __init__(self, hub: Hub, previous: SceneArrays | None = None):
         self.hub = hub
@@ -75,7 +75,7 @@ class SceneArrays:
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
         check_room(hub, copied=previous is None and hub.running is not None)
-        # Processes begin with equal shares of the ids: to sort them hands them over by tiles.
+        # Processes begin with equal ranges of the ids: sorting distributes them by tiles.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
             state = previous.state() if previous else None
@@ -93,7 +93,7 @@ class SceneArrays:
         self.subdomain = Subdomain(self) if comm.size > 1 else None
         self.control = self.setup.control
         self.version = 0  # grows when fields change without a step
-        self.measured = False  # whether the rate of the fastest point is that of the present state
+        self.measured = False  # whether the rate of the fastest point is up to date
         self.followed = False  # whether the clock knows the balance of energy up to it
         self.told_of_growth = False  # since the balance of energy is followed
         self.told_of_loss = False

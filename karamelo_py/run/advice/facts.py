@@ -53,16 +53,16 @@ class SceneFacts:
         self.d, self.corners = hub.domain.dimension, 2**hub.domain.dimension  # of a cell
         self.moves = self.method.frame.moves  # points move through the grid
         keeps = timestep.keeps_moments(hub)
-        self.moments = self.moves and keeps  # and keep moments or gradients of their velocity
+        self.moments = self.moves and keeps  # and store moments or gradients of their velocity
         # They move through places at which D of the affine transfers vanishes.
         self.vanishing = self.moves and not self.basis.steady_moment
-        # The share of FLIP, of transfers that keep velocities alone.
+        # The FLIP coefficient, for transfers that store only velocities.
         self.kept = 0.0 if keeps else getattr(self.transfer, "alpha", 0.0)
         # Gradients jump at the faces of cells, with nodes at their corners alone.
         jumps = getattr(self.basis, "gradient_jumps", False)
         self.linear = jumps and self.basis.nodes_per_cell == 1
         solids = hub.solids.values()
-        # Of laws that store all work, and bear tension.
+        # Whether laws store all work, and sustain tension.
         self.elastic = [s for s in solids if getattr(s.material.law, "rebounds", False)]
         # About one point per cell and direction.
         self.single = [s.id for s in solids if timestep.one_a_cell(s)]
@@ -158,12 +158,12 @@ class SceneFacts:
 
     @property
     def locks(self) -> bool:
-        """Tell whether hat functions are to keep the volume of several points per cell, each."""
+        """Return True if linear cells contain several points whose volumes hardly change."""
         return self.hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
 
     @cached_property
     def even(self) -> bool:
-        """Tell whether all bodies deform evenly, so that no cell has to keep its volume alone."""
+        """Return True if all bodies deform evenly, so that no cell is constrained alone."""
         return all(pressed_evenly(self, one) for one in self.motions)
 
     @property

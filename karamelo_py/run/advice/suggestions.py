@@ -17,7 +17,7 @@ from karamelo_py.script.errors import plural
 Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
 AXES = "xyz"
-NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from where on linear functions lock
+NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from which a linear basis locks
 LARGE = 100_000  # points from where on their numbers are read from memory
 RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
 # Seconds of a core (Intel Xeon): a point in a step of linear functions, a line of the log, a
@@ -63,7 +63,7 @@ def _unread(hub: Hub, simulation: Any) -> Words:
 
 
 def _unused(hub: Hub, simulation: Any) -> Words:
-    """Find groups whose names stand nowhere but where they are made."""
+    """Find groups whose names appear only where they are defined."""
     text = script_text(hub)
     for ID in hub.groups:
         made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))

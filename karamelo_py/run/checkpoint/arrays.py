@@ -42,7 +42,7 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     for k, block in enumerate(s.blocks):
         now = s.control.clock[0].now  # known once the clock is put back
         for name, array in arrays_of(block.points):
-            # The other places are those of the step before, and of none that went wrong.
+            # The other places belong to the step before, and to no failed step.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
 
 
@@ -93,7 +93,7 @@ def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterat
 
 
 def _shown_by_nodes(simulation: Any) -> Iterator[Stored]:
-    """Yield the nodes that show anything but zero, by number, and their rows, so many at a time."""
+    """Yield the nodes with nonzero values, by number, and their rows, in pieces."""
     comm, own = simulation.comm, simulation.nodes.counted()
     found = np.zeros(len(own), np.bool_)
     for _, array in of_nodes(simulation.setup):
@@ -213,7 +213,7 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
 
 
 def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
-    """Read the snapshot that a file holds; each process reads its own share."""
+    """Read the snapshot in a file; each process reads its part."""
     with opened(path, "good") as found:
         check_numbers(simulation, found)
         if simulation.subdomain is not None:
@@ -224,7 +224,7 @@ def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
 
 
 def take_stored(simulation: Any, path: Path) -> None:
-    """Take the state that a file to go on from holds; each process reads its own share."""
+    """Load the state of a restart file; each process reads its part."""
     with opened(path) as state, simulation.comm.joint():
         # Nothing of the arrays changes where the file is of another scene.
         for k, block in enumerate(simulation.setup.blocks):
@@ -431,7 +431,7 @@ def _points(
     for of_piece in comm.bcast(limits):
         if of_piece is not None:
             found = comm.gather(points_of_tiles(stripped(own, f"tiling/{k}/"), arrays, *of_piece))
-        else:  # not sorted yet: each has those of an equal share of the ids
+        else:  # not sorted yet: each process has an equal range of the ids
             found = comm.gather({"points": arrays})
         if found is None:
             continue
@@ -464,7 +464,7 @@ def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
         found["work"] = np.zeros_like(found["work"])
     for k, tiling in enumerate(tilings):
         points, of_tiles = share_of_tiling(k, tiling, owner == comm.rank)
-        if not tiling.count[0]:  # not sorted yet: an equal share
+        if not tiling.count[0]:  # not sorted yet: an equal range
             count = state[f"points/{k}/id"].size
             points = np.arange(count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size)
         names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
@@ -473,7 +473,7 @@ def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
 
 
 def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
-    """Read some points (ascending) of an array in a file, of which so many are read at a time."""
+    """Read some points (ascending) of an array in a file, a limited number at a time."""
     found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
     for begin in range(0, array.shape[-1], PIECE):
         own = slice(*np.searchsorted(points, (begin, begin + PIECE)))

@@ -43,7 +43,7 @@ class PartStates(NamedTuple):
 
     @classmethod
     def of(cls, hub: Hub, families: tuple[str, ...] = ()) -> PartStates:
-        """Return the present states of all parts, or of those of some families."""
+        """Return the present states of all parts, or of some families."""
         arrays: list[np.ndarray] = []
         parts = {
             key: state_of(part, arrays, grows=key[0] in OUTPUTS)
@@ -146,7 +146,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A copy of what a function in Python keeps and no file takes, and what is said of it."""
+    """A copy of Python values that no file can store, and the warning for them."""
 
     kept: Any
     fault: ScriptError
@@ -242,7 +242,7 @@ class RollbackPoint:
         self._parts = others | {self.step: PartStates.of(self.hub)}
 
     def forget_later(self) -> None:
-        """Forget what parts remembered at other states: nobody goes to them any more."""
+        """Clear the memory of parts at earlier states, which are not needed any more."""
         self._parts = {self.step: self.parts}
 
     def take(self, arrays: dict[str, np.ndarray], step: int, parts: PartStates) -> None:

@@ -36,7 +36,7 @@ CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
     "values", "begun", "parts", "run",
 )  # fmt: skip
-# HDF5 keeps checksums of all but arrays from this version on; these have one as an attribute.
+# HDF5 stores checksums of all but arrays from this version on; arrays have one as an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
 PIECE = 1 << 22  # bytes that are looked at together
@@ -182,7 +182,7 @@ def is_restart(path: Path) -> bool:
 
 
 class Restart:
-    """The content of a file; of those that a ``*`` stands for, of the largest number."""
+    """The content of a file; for a name with ``*``, of the file with the largest number."""
 
     def __init__(self, path: Path, out: Path | None = None):
         import h5py
@@ -234,7 +234,7 @@ class Restart:
         return Replay(record, self.content["within"], str(self.path))
 
     def is_over(self, hub: Hub) -> bool:
-        """Tell whether no run has come behind the state of the file."""
+        """Return True if no later run has followed the state of the file."""
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, *, outputs: bool) -> None:

@@ -20,7 +20,7 @@ from karamelo_py.script.errors import Place, ScriptError
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
-LONG = 1e30  # a time in which viscosity bears nothing
+LONG = 1e30  # a time in which viscosity sustains no stress
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 

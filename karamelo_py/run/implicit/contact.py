@@ -22,9 +22,9 @@ from karamelo_py.kernels.loss import FrictionalHeat
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
 
-STIFF = 1e3  # springs, by what a cell of the softer body bears
-LIGHT = 0.01  # share of the mass of nodes within a body
-SLIPPERY = 0.05  # the same: below it nodes of splines beside a body bear too little to stick
+STIFF = 1e3  # springs, relative to the stiffness of a cell of the softer body
+LIGHT = 0.01  # fraction of the mass of nodes within a body
+SLIPPERY = 0.05  # the same: below it, spline nodes next to a body are too weak to stick
 CLOSE = 1e-4  # cells between bodies of which Newton's method first supposes that they touch
 
 
@@ -58,7 +58,7 @@ class Contact:
         pairs, gap = np.zeros((room, 2), np.int64), np.zeros(room)
         normal = np.zeros((room, self.d))
         count = list_pairs(tag, s.kin, s.grids, s.nodes, s.spans, pairs, normal, gap)
-        # What has next to nothing of a body bears nothing: contact would only shake it.
+        # Nodes with almost none of a body sustain nothing: contact would only disturb it.
         shares = self._shares()[equations.number_of(pairs[:count])].min(1)
         chosen = np.flatnonzero(shares >= LIGHT)
         count = len(chosen)
@@ -82,7 +82,7 @@ class Contact:
         self.respond(np.zeros((m, self.d)), supposed=True)
 
     def _shares(self) -> np.ndarray:
-        """Find what share (m,) nodes have of the mass of one within the body."""
+        """Return the mass of nodes (m,), as a fraction of a node within the body."""
         equations = self.equations
         mass = equations.mass.copy()
         if isinstance(self.s.kin, Axisymmetric):
@@ -97,7 +97,7 @@ class Contact:
         softer = np.where(both > 0, both, np.inf).min(0)
         h = self.s.grids.spacing[self.a]
         stiffness = STIFF * np.where(np.isfinite(softer), softer, 0.0) * h ** (self.d - 2)
-        if isinstance(self.s.kin, Axisymmetric):  # forces are those of a radian
+        if isinstance(self.s.kin, Axisymmetric):  # forces are per radian
             stiffness *= np.maximum(self.equations.positions[self.first, 0], 0.25 * h)
         return stiffness
 
@@ -254,7 +254,7 @@ class Contact:
 
 
 def contact_of(equations: Equations, moduli: np.ndarray) -> Any:
-    """Find where bodies meet; None where they have no fields of their own."""
+    """Find where bodies meet; None if they have no separate fields."""
     if not isinstance(equations.s.contact, SeparateFields):
         return None
     return Contact(equations, moduli)

@@ -28,7 +28,7 @@ class Rest:
         return 0.0
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Give no work: nobody watches the energy of load steps."""
+        """Return no work: the energy of load steps is not watched."""
         return 0.0
 
     def end(self, u: np.ndarray) -> None:
@@ -100,7 +100,7 @@ class Motion:
         return total * self.inverse
 
     def acceleration(self, u: np.ndarray) -> np.ndarray:
-        """Find the accelerations (m, d) after displacements (m, d); as they are told where held."""
+        """Return accelerations (m, d) after displacements (m, d); prescribed ones where held."""
         free = (u - self.dt * self.v) / (self.beta * self.dt**2) - self.rest * self.a
         return np.where(self.given, (self.prescribed - self.v) / self.dt, free)
 

@@ -1,4 +1,4 @@
-"""Load steps: Newton's method in the place of a step that an explicit scheme takes."""
+"""Load steps: Newton's method instead of an explicit step."""
 
 from math import ceil
 from typing import Any, NamedTuple
@@ -243,7 +243,7 @@ class LoadSteps:
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
         clock = s.control.clock[0]
-        # Points that are led start with the velocity of one step earlier. Here it is that of now.
+        # Points with prescribed velocity start one step earlier; here the present value is used.
         dt, clock.last_dt = float(clock.last_dt), 0.0
         if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
             raise PointsWrong

@@ -19,7 +19,7 @@ ASTRAY = 1e4  # times as far as points may go: nothing holds them
 
 @contextmanager
 def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the time of what is done within to that of its stage."""
+    """Add the time of the enclosed block to its stage."""
     begun = perf_counter()
     try:
         yield
@@ -32,7 +32,7 @@ class Failed(Exception):
 
 
 class TooFar(Failed):
-    """Points would go so many times as far as they may at once."""
+    """Points would move this many times further than allowed at once."""
 
     def __init__(self, reason: str, times: float):
         super().__init__(reason)
@@ -103,7 +103,7 @@ class Newton:
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
-        self.kept: dict = {}  # what a solver keeps from one correction to the next
+        self.kept: dict = {}  # data of a solver between corrections
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
 
@@ -163,14 +163,14 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _rounding(self, u: np.ndarray) -> float:
-        """Estimate what forces are rounded to: those of strains to the digits of 1, and of u."""
+        """Estimate the rounding of forces: from strains to the digits of 1, and from u."""
         far = np.abs(u) + self.spacing
         return ROUNDING * float(np.linalg.norm((self.stiff * far)[self.free]))
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
         """Solve the linear equations for the change of all displacements (m, d).
 
-        As accurate as keeps Newton's method quadratic (Eisenstat & Walker 1996).
+        The accuracy that retains quadratic convergence (Eisenstat & Walker 1996).
         """
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):

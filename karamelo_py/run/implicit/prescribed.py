@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Setup
 
-SHOWN = 1e20  # a value that nobody prescribes
+SHOWN = 1e20  # a value that no script prescribes
 
 
 def prescribed(

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import MatrixRankWarning, splu
 
 MANY = 5000  # unknowns, from which on multigrid is faster than a direct solver
 MANY_IN_SPACE = 2000
-MANY_ITERATIONS = 25  # of multigrid, behind which its coarse equations are made anew
+MANY_ITERATIONS = 25  # of multigrid, after which its coarse equations are made again
 
 
 class Singular(Exception):
@@ -38,7 +38,7 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
     """Scale rows and columns such that the diagonal is 1, or by given factors (n,)."""
     if A.format == "bsr":
         A = A.tocsr()
-        A.eliminate_zeros()  # of components that stand alone, of which there may be many
+        A.eliminate_zeros()  # of decoupled components, which may be many
     if s is None:
         diagonal = np.abs(A.diagonal())
         if not np.all(diagonal > 0):
@@ -66,7 +66,7 @@ def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarra
 
 
 def release(kept: dict) -> None:
-    """Give the memory back that a solver keeps things in."""
+    """Release the memory of a solver."""
     for level in getattr(kept.get("multigrid"), "levels", ()):
         vars(level).clear()  # levels know themselves, and would wait to be found
     kept.clear()
@@ -145,7 +145,7 @@ def from_one_seed() -> Iterator[None]:
 def solve(
     name: str, A: sp.spmatrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
-    """Solve by the solver of a `name`: direct, amg or auto; `kept` is what it keeps."""
+    """Solve with the solver of a `name`: direct, amg or auto; `kept` is its data."""
     in_space = rigid.shape[1] == 6
     large = np.count_nonzero(rigid.any(1)) >= (MANY_IN_SPACE if in_space else MANY)
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):

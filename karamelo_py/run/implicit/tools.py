@@ -12,7 +12,7 @@ NEAR = 1e-6  # cells, over which forces are compared
 
 
 class Displaced:
-    """Points of a view, further on by a way (n, d); volume and damage are those of before."""
+    """Points of a view, displaced by (n, d); volume and damage are the old ones."""
 
     def __init__(self, view: Any, way: np.ndarray):
         self.view, self.position = view, view.position + way

@@ -28,7 +28,7 @@ from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
 STRAINS = (0, 1e-3, 0.05)  # the last beyond what metals yield at
-TRIED = 8  # points, at least, where the scene has so many
+TRIED = 8  # points, at least, if the scene has enough
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 

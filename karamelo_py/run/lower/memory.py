@@ -104,7 +104,7 @@ def bytes_per_point(simulation: Any) -> int:
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
-FEW = 100_000  # points; so many have room everywhere
+FEW = 100_000  # points; this number fits everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:

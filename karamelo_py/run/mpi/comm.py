@@ -1,4 +1,4 @@
-"""The processes of MPI that share a scene, through mpi4py."""
+"""The MPI processes of a scene, through mpi4py."""
 
 import os
 import signal

@@ -60,7 +60,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     return part
 
 
-IMBALANCE = 1.1  # largest share of the work over that after a new cut: above it tiles are cut anew
+IMBALANCE = 1.1  # limit of largest work now over that after a new cut, for cutting tiles again
 # Times longer than across, from which on bodies are cut along long tiles: to go through rows of
 # nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
 ROWS = 4
@@ -205,7 +205,7 @@ class SharedTiles(Tiles):
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     def _boxes(self, s: Setup) -> Boxes:
-        """List the own boxes, and behind them those of others that may have nodes of them."""
+        """List the own boxes, then those of others that may contain the same nodes."""
         own, me = self.own_boxes(s), self.comm.rank
         self._looks_beyond = getattr(type(s.contact), "looks_beyond", 0) > 0
         of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
@@ -472,7 +472,7 @@ def join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
     rows = {name: _joint(tilings, name)[order] for name in names}
     ranges = one_after_another(rows["range"])
     if "report" in rows:
-        # Points that went wrong keep their place in their tile.
+        # Failed points stay in their tile.
         wrong = rows["report"][:, 2] > 0
         rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
     for name, array in (rows | {"range": ranges}).items():

@@ -17,7 +17,7 @@ from karamelo_py.run.timestep import sparse
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
 
-MAY_CHANGE = 1.25  # largest share of the points over the mean that is no waste yet
+MAY_CHANGE = 1.25  # largest number of points over the mean that is acceptable
 
 
 class ProcessShare(NamedTuple):
@@ -74,7 +74,7 @@ def bytes_of_node(simulation: Simulation) -> int:
 
 
 def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
-    """Plan the shares of so many processes in a scene whose points are sorted."""
+    """Plan the parts of `ranks` processes in a scene whose points are sorted."""
     s, method = simulation.setup, simulation.hub.update.method
     lattices, one_place = method.lattices(simulation.hub), method.fields_per_solid
     few = simulation.count, sparse(simulation.hub)

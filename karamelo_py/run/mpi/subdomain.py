@@ -1,4 +1,4 @@
-"""The share of one of several processes in a scene: its points, and its work, which is measured."""
+"""One of several processes of a scene: its points, and its measured work."""
 
 import time
 from typing import Any

@@ -1,4 +1,4 @@
-"""The whole of a scene that processes share, at the first, for what acts on all points at once."""
+"""The whole of a scene with several processes, at the first, for functions of all points."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Whole:
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
-            array[nodes] = 0  # also those that no box reaches: nobody has them
+            array[nodes] = 0  # also those that no box reaches and no process has
         memory = self.simulation.subdomain.memory()
         for part in parts:
             for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
