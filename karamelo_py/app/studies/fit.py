@@ -1,7 +1,9 @@
 """karamelo-py fit: values of a script's variables that bring its log nearest to measurements."""
 
 from argparse import ArgumentParser
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +26,20 @@ squares, and says how surely the measurements determine them.
   karamelo-py fit in.file -var H=5e8,2e9 -var Y=3e8,5e8 -match S_22=test.csv:stress
   karamelo-py fit in.file -var E=1e6,1e8 -match max:depth=3.28 -match when:v:0=0.7
 
-A variable with several values is searched between the smallest and the largest, from the middle on;
-one with a single value is passed on. A measurement is a number, or a column of a file over its
-first column, the time. Differences are relative to the largest measured value. The true value is
-within +- with a probability of 95 %, where the differences that remain are independent. There is
-no +- for a value at the end of its range: the measurements ask for a wider one. Runs in the table
-(-o) of the same script, program and options are not repeated; -again repeats them."""
-STEP = 0.01  # of a range, for derivatives: above the noise of points that cross cells
-ENOUGH = 1e-4  # relative change of the misfit, or of the values, at which the search ends
+A variable with several values is searched between the smallest and the largest, from three starts:
+the middle, 20 % and 80 % of each range. A variable with a single value is passed on. A measurement
+is a number, or a column of a file over its first column, the time. Differences are relative to the
+largest measured value. The true value is within +- with a probability of 95 %, where the
+differences that remain are independent. There is no +- where the three searches disagree, nor for a
+value at the end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
+in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
+STARTS = (0.5, 0.2, 0.8)  # of each range
+# Of a range, for derivatives and to look around an end. Waves and points that cross cells make
+# curves rough: derivatives over 0.01 of a range read the roughness and end in a local minimum.
+STEP = 0.04
+NEAR = 0.01  # of a range: at its end; ends of searches that are one
+ENOUGH = 1e-3  # relative change of the misfit, or of the values, at which the search ends
+AGAIN = 3  # searches from a lower point near the end, at most
 ALIKE = 0.99  # correlation from which on variables are not told apart
 
 
@@ -72,11 +80,30 @@ class Observation:
         return (found - self.wanted) / (abs(self.wanted).max() or 1.0)
 
 
+class NoSlope(ScriptError):
+    """No derivative: runs on both sides failed."""
+
+
+@dataclass
+class End:
+    """Hold where a search ended: shares of the ranges, differences that remain, slopes there."""
+
+    share: np.ndarray
+    off: np.ndarray
+    slopes: np.ndarray
+
+    @property
+    def left(self) -> float:
+        """The mean difference (root of the mean square)."""
+        return float(np.sqrt(np.mean(self.off**2)))
+
+
 class Search:
     """Runs of a script by the shares of the ranges of its variables, from 0 to 1."""
 
     def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
+        self.failed: dict[str, ScriptError] = {}  # by the folders of runs
         self.fixed = {name: given[0] for name, given in values.items()}
         self.names = [name for name, given in values.items() if given[1:]]
         numbers: list[Any] = [[number_of(value) for value in values[name]] for name in self.names]
@@ -91,21 +118,73 @@ class Search:
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *shares: np.ndarray) -> list[np.ndarray]:
-        """Run the script at each of the shares, and compare its logs with what is measured."""
+        """Compare the logs of runs at these shares with what is measured: inf where one failed."""
         cases, found = [self.case(share) for share in shares], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
-            if row["status"] != "done":
-                said = f"the run with {worded(case)} is not done: {row['reason']}"
-                raise ScriptError(said, hint="narrower ranges of the variables")
-            log = read_log(self.study.folder / folder_name(case))
-            found.append(np.concatenate([one.differences(log, case) for one in self.measured]))
+            try:
+                if row["status"] != "done":
+                    said = f"the run with {worded(case)} is not done: {row['reason']}"
+                    raise ScriptError(said, hint="narrower ranges of the variables")
+                log = read_log(self.study.folder / folder_name(case))
+                off = np.concatenate([one.differences(log, case) for one in self.measured])
+                if not np.isfinite(off).all():
+                    raise ScriptError(f"the run with {worded(case)} logs what is no number")
+            except ScriptError as error:
+                self.failed[folder_name(case)] = error
+                off = np.full(sum(len(one.wanted) for one in self.measured), np.inf)
+            found.append(off)
         return found
 
-    def slopes(self, share: np.ndarray) -> np.ndarray:
-        """Derivatives (n, variables) by differences, towards the middle of the ranges."""
-        steps = np.where(share < 0.5, STEP, -STEP)
-        first, *others = self.differences(share, *(share + np.diag(steps)))
-        return np.column_stack([(o - first) / h for o, h in zip(others, steps, strict=True)])
+    def slopes(self, share: np.ndarray, both: bool = False) -> np.ndarray:
+        """Derivatives (n, variables) by differences: towards the middle, or over `both` sides.
+
+        NoSlope where the runs on both sides fail.
+        """
+        moves = np.diag(np.where(share < 0.5, STEP, -STEP))
+        first, *ahead = self.differences(share, *(share + moves))
+        columns = []
+        for k, off in enumerate(ahead):
+            points = [(share, first), (share + moves[k], off)]
+            if both or not np.isfinite(off).all():
+                back = np.clip(share - moves[k], 0, 1)
+                points.append((back, *self.differences(back)))
+            done = sorted((at[k], tuple(off)) for at, off in points if np.isfinite(off).all())
+            (low, below), (high, above) = done[0], done[-1]
+            if low == high:
+                raise NoSlope(*list(self.failed.values())[-1].args)
+            columns.append((np.array(above) - below) / (high - low))
+        return np.column_stack(columns)
+
+    def down(self, start: np.ndarray, most: int) -> End | None:
+        """Search from a start on; None where the runs there fail."""
+        from scipy.optimize import least_squares
+
+        if not np.isfinite(self.differences(start)[0]).all():
+            return None
+        try:
+            found = least_squares(
+                lambda share: self.differences(share)[0], start, jac=self.slopes,
+                bounds=(0, 1), max_nfev=most, ftol=ENOUGH, xtol=ENOUGH,
+            )  # fmt: skip
+        except NoSlope:
+            return None
+        return End(found.x, found.fun, found.jac)
+
+    def around(self, end: End) -> End:
+        """Look around an end, along the variables and along what is determined least; the lowest.
+
+        Its slopes become those over both sides.
+        """
+
+        def beside(*moves: np.ndarray) -> list[End]:
+            near = [np.clip(end.share + s * move, 0, 1) for move in moves for s in (1, -1)]
+            found = self.differences(*near)
+            return [End(at, off, end.slopes) for at, off in zip(near, found, strict=True)]
+
+        ends = beside(*np.diag([STEP] * len(end.share)))
+        end.slopes = self.slopes(end.share, both=True)
+        weak = STEP * np.linalg.eigh(end.slopes.T @ end.slopes)[1][:, 0]
+        return min([end, *ends, *beside(weak, 2 * weak)], key=lambda one: one.left)
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -122,61 +201,108 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
-    try:
-        from scipy.optimize import least_squares
-    except ImportError:
+    if find_spec("scipy") is None:
         hint = "pip install '.[implicit]' in the folder of karamelo-py"
-        raise ScriptError("karamelo-py fit needs SciPy", hint=hint) from None
+        raise ScriptError("karamelo-py fit needs SciPy", hint=hint)
     out = variables.out_file(options.o, ".csv")
     values, script, launch, jobs = variables.family(options)
     measured = [Observation(text, script, values) for text in options.match]
     items = [one.item for one in measured if one.times is None]
     study = Study(launch, out, list(values), items, jobs, options.again, strict=True)
     search = Search(study, values, measured)
-    study.most = options.most * (len(search.names) + 1)
+    count = len(search.names)
+    study.most = (len(STARTS) * (count + 1) + AGAIN * (3 * count + 5)) * options.most
     study.page = live_page(options, study)
     study.describe(variables=values, match=options.match)
-    best = least_squares(
-        lambda share: search.differences(share)[0], np.full(len(search.names), 0.5),
-        jac=search.slopes, bounds=(0, 1), max_nfev=options.most, ftol=ENOUGH, xtol=ENOUGH,
-    )  # fmt: skip
-    half, alike = certainty(best.jac, best.fun)
-    at_end = (best.x <= STEP) | (best.x >= 1 - STEP)
-    half[at_end] = np.nan
+    ends = [search.down(np.full(count, start), options.most) for start in STARTS]
+    best, others = settled(search, [end for end in ends if end], options.most)
+    half, alike = certainty(best.slopes, best.off)
+    apart: list[End] = []
+    for end in sorted(others, key=lambda end: end.left):
+        if all(disagree(one, end, half) for one in [best, *apart]):
+            apart.append(end)
+    if apart:
+        half[:] = np.nan
+    at_end = (best.share <= NEAR) | (best.share >= 1 - NEAR)
+    half[at_end | np.isinf(half)] = np.nan
     table = plain_table(["variable"], ["value", "+-"])
     for k, name in enumerate(search.names):
-        value = shown(float(search.case(best.x)[name]))
+        value = shown(float(search.case(best.share)[name]))
         table.add_row(name, value, shown(float(half[k] * (search.high - search.low)[k])))
     terminal().print(table)
     for k, name in enumerate(search.names):
-        if not best.jac[:, k].any():
+        if not best.slopes[:, k].any():
             print(f"{name} changes nothing that is measured")
         elif at_end[k]:
             print(f"{name} is at the end of its range: search a wider one")
     for a, b in alike:
         print(f"the measurements do not tell {search.names[b]} and {search.names[a]} apart")
-    left = f"{np.sqrt(np.mean(best.fun**2)):.3g} of the largest measured value"
+    if apart:
+        tell_apart(search, [best, *apart])
+    if search.failed:
+        reason = list(search.failed.values())[-1].message
+        print(f"{plural(len(search.failed), 'run')} of the search failed: {reason}")
+    left = f"{best.left:.3g} of the largest measured value"
     earlier = len(study.rows) - study.ran
     before = f", and {earlier} of an earlier study (-again repeats them)" if earlier else ""
     print(f"what remains is {left} in the mean, after {plural(study.ran, 'run')}{before}")
-    print(command_of(options.script, search.case(best.x)))
+    print(command_of(options.script, search.case(best.share)))
     return 0
 
 
-def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Half the ranges of 95 %, NaN where nothing tells, and pairs that are not told apart.
+def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[End]]:
+    """Give the lowest end after a look around it, and the other ends of searches."""
+    if not ends:
+        raise next(iter(search.failed.values()))
+    best, *others = sorted(ends, key=lambda end: end.left)
+    for _ in range(AGAIN):
+        lower = search.around(best)
+        if lower.left > best.left * (1 - ENOUGH):
+            break
+        others.append(best)
+        best = min(search.down(lower.share, most) or lower, lower, key=lambda end: end.left)
+    return best, others
 
-    Of the covariance s^2 (J^T J)^-1, s^2 from the n - p differences `off` that remain (Seber & Wild
-    2003, Nonlinear Regression, section 2.1).
+
+def disagree(best: End, other: End, half: np.ndarray) -> bool:
+    """Tell whether ends differ by more than both ranges of 95 %, in variables that matter."""
+    off = abs(best.share - other.share)
+    wide = np.maximum(np.where(np.isnan(half), 0, 2 * half), NEAR)
+    return bool((off > wide)[best.slopes.any(axis=0)].any())
+
+
+def tell_apart(search: Search, ends: Sequence[End]) -> None:
+    """Say where searches ended that disagree, why that may be, and what to do."""
+    print("The searches end at different values, so that there is no +-:")
+    for end in ends:
+        values = search.case(end.share)
+        said = ", ".join(f"{name} = {shown(float(values[name]))}" for name in search.names)
+        print(f"  {said}: what remains is {end.left:.3g}")
+    print("  Likely cause: a rough curve. Inertia makes curves rough: waves run through the body.")
+    print("  Fix: load slowly, or add fix local_damping. If both values match: measure more.")
+
+
+def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Half the ranges of 95 %, and pairs of variables that are not told apart.
+
+    NaN for a variable that changes nothing, and for all without more measurements than variables;
+    inf where measurements determine a combination only. Of the covariance s^2 (J^T J)^-1, s^2 from
+    the n - p differences `off` that remain (Seber & Wild 2003, Nonlinear Regression, section 2.1).
     """
     from scipy.stats import t
 
-    free = slopes.shape[0] - slopes.shape[1]
     size = np.linalg.norm(slopes, axis=0)
     scaled = slopes / np.where(size > 0, size, 1)
     pairs = [(a, b) for a in range(len(size)) for b in range(a)]
     alike = [(a, b) for a, b in pairs if abs(scaled[:, a] @ scaled[:, b]) > ALIKE]
-    if free < 1 or np.linalg.matrix_rank(scaled, 1e-6) < len(size):
-        return np.full(len(size), np.nan), alike
-    spread = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled))) / size
-    return t.ppf(0.975, free) * np.sqrt(off @ off / free) * spread, alike
+    half, known = np.full(len(size), np.nan), size > 0
+    seen = scaled[:, known]
+    free = len(seen) - known.sum()
+    if not known.any():
+        return half, alike
+    if np.linalg.matrix_rank(seen, 1e-6) < known.sum():
+        half[known] = np.inf
+    elif free > 0:
+        spread = np.sqrt(np.diag(np.linalg.inv(seen.T @ seen))) / size[known]
+        half[known] = t.ppf(0.975, free) * np.sqrt(off @ off / free) * spread
+    return half, alike
