@@ -95,6 +95,39 @@ def test_what_cannot_be_found_is_told(folder, capsys, words, said):
     assert said in capsys.readouterr().out
 
 
+def test_searches_that_disagree_give_no_range(folder, capsys):
+    """A sine of 11.5 rad/s: beside it, its misfit has minima every few 2 pi/T = 2 (any textbook).
+
+    The search from the middle, 9, ends in one of them.
+    """
+    script = SCRIPT.replace("run(20)", "run(6)").replace("set_output(5)", "set_output(1)")
+    script = script.replace("set_dt(0.02)", "set_dt(0.5)").replace("speed)", "0)")
+    script = script.replace("place = c_x - 1.5 + begin", "place = sin(speed*time)")
+    (folder / "in.sine").write_text(script, encoding="utf-8")
+    times = np.linspace(0, 3, 7)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(len(times))
+    table = pandas.DataFrame({"time": times, "y": np.sin(11.5 * times) + noise})
+    table.to_csv("sine.csv", index=False)
+    words = ["-var", "speed=9,13", "-jobs", "1", "-match", "place=sine.csv:y"]
+    assert main(["fit", "in.sine", *words]) == 0
+    out = capsys.readouterr().out
+    (value,) = re.findall(r"^speed +(\S+) +–$", out, re.M)
+    # The noise of 0.01 over slopes of up to 3 s.
+    assert float(value) == pytest.approx(11.5, abs=0.01)
+    ends = re.findall(r"^  speed = (\S+): what remains is (\S+)$", out, re.M)
+    assert len(ends) >= 2 and ends[0][0] == value and float(ends[1][1]) > 10 * float(ends[0][1])
+    assert "Inertia makes curves rough" in out and "load slowly" in out
+
+
+def test_a_failed_run_is_a_bad_trial(folder, capsys):
+    """From the middle (21) and from 0.8 of the range (33) the block leaves the domain."""
+    words = ["-var", "speed=1,41", "-jobs", "1", "-match", "max:c_x=2.7"]
+    assert main(["fit", "in.flight", *words]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^speed +3 +–", out, re.M)
+    assert "2 runs of the search failed" in out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
