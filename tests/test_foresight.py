@@ -875,3 +875,122 @@ def test_a_free_rotation_that_flip_brakes_is_told(run_interpreted):
     for method in ("tlmpm, FLIP, linear, 1", "tlmpm, APIC, linear"):
         text = SPIN.format(method=method, h=0.25, time="4*PI", more="")
         assert "braked" not in run_interpreted(text, command="check", folder=method[:10]).err
+
+
+def _told(run_interpreted, script):
+    return run_interpreted(dedent(script), command="check").err
+
+
+@pytest.mark.parametrize(
+    ("transfer", "name"),
+    [
+        ("FLIP, linear, 0.99", "viscosity of the grid"),
+        ("FLIP, linear, 1", "velocities beside moving walls"),
+        ("APIC, quadratic-spline", "rigid walls and splines"),
+        ("APIC, linear", ""),
+    ],
+)
+@pytest.mark.parametrize("seen", [True, False])
+def test_viscous_fluid_under_a_moving_plate(run_interpreted, transfer, name, seen):
+    """Plane Couette flow; where viscosity reaches no further than a cell, nothing is told."""
+    said = _told(
+        run_interpreted,
+        f"""
+        method(ulmpm, {transfer})
+        dimension(2, 0, 2, -0.5, 1.5, 0.1)
+        region(f, block, 0, 2, 0, 1)
+        region(p, block, 0, 2, 1, 1.2)
+        eos(w, fluid, 1, 100, 7)
+        strength(w, fluid, {0.1 if seen else 1e-5})
+        material(w, eos-strength, w, w)
+        material(r, rigid, 1)
+        solid(f, region, f, 2, w, 0.1)
+        solid(p, region, p, 2, r, 0.1)
+        group(p, particles, region, p, solid, p)
+        fix(v, velocity_particles, p, 0.1, 0)
+        run_time(5)
+        """,
+    )
+    names = ["viscosity of the grid", "velocities beside moving walls", "rigid walls and splines"]
+    assert [one for one in names if f"warning: {one}: " in said] == [name] * bool(name and seen)
+
+
+@pytest.mark.parametrize(
+    ("gap", "speed", "method", "told"),
+    [
+        (0.1, 1, "ulmpm", True),
+        (0.1, -1, "ulmpm", False),  # they meet
+        (0.1, 0, "ulmpm", False),
+        (2, 1, "ulmpm", False),
+        (0.1, 1, "ulmpm/contacts", False),
+        (0.1, 1, "tlmpm", False),
+    ],
+)
+def test_bodies_within_a_cell_that_part(run_interpreted, gap, speed, method, told):
+    words = {"method": f"{method}, FLIP, linear, 1", "u": f"{-speed}, 0", "v": f"{speed}, 0"}
+    text = SCENE.format(**(QUIET | words)).replace("7, 10, 2, 5", f"{5 + gap}, 8, 2, 5")
+    said = _told(run_interpreted, text)
+    assert ("warning: bodies that part: solids 'left' and 'right'" in said) == told, said
+
+
+BEAM = """
+    method({method})
+    dimension(2, 0, 4, 0, 2, 0.1)
+    region(b, block, 0.5, 2.5, 0.9, {top})
+    material(m, linear, 1000, 1e6, 0)
+    solid(s, region, b, {ppc}, m, 0.1{points})
+    region(end, block, -INF, 0.5, -INF, INF)
+    group(end, nodes, region, end, all)
+    fix(clamp, velocity_nodes, end, 0, 0)
+    fix(g, body_force, all, {g})
+    run(1)
+"""
+HALF = {"method": "ulmpm, FLIP, linear, 1", "top": 0.95, "ppc": 2, "points": ", points=cut",
+        "g": "0, -0.1"}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ({}, True),
+        ({"method": "tlmpm, APIC, linear"}, True),
+        ({"ppc": 4}, False),
+        ({"g": "0.1, 0"}, False),
+        ({"method": "tlmpm, APIC, quadratic-spline"}, False),
+    ],
+)
+def test_one_row_of_points_does_not_bend(run_interpreted, words, told):
+    """A cantilever of half a cell: 0.0004 of beam theory with one row, 0.38 with two."""
+    said = _told(run_interpreted, BEAM.format(**(HALF | words)))
+    assert ("warning: one row of points: solid 's'" in said) == told, said
+
+
+@pytest.mark.parametrize(
+    ("top", "points", "told"),
+    [
+        (1.03, "", "15.38% more"),  # three rows of h/2: 0.15 for 0.13
+        (1.03, ", points=cut", ""),
+        (1.5, "", ""),
+    ],
+)
+def test_thin_plates_without_part_of_their_mass(run_interpreted, top, points, told):
+    said = _told(run_interpreted, BEAM.format(**(HALF | {"top": top, "points": points})))
+    assert (f"points have {told}" in said) if told else "volume" not in said, said
+    assert not told or "hint: points=cut" in said
+
+
+@pytest.mark.parametrize(("side", "told"), [(0.08, True), (0.2, False)])
+def test_cells_larger_than_the_body(run_interpreted, side, told):
+    said = _told(
+        run_interpreted,
+        f"""
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.1)
+        region(b, block, 0.3, {0.3 + side}, 0.3, {0.3 + side})
+        material(m, linear, 1000, 1e6, 0.3)
+        solid(s, region, b, 2, m, 0.1, points=cut)
+        fix(g, body_force, all, 0, -1)
+        run(1)
+        """,
+    )
+    assert ("the cells (0.1) are larger than region 'b'" in said) == told, said

@@ -28,6 +28,19 @@ class Primitive(region.Region):
     def aligned(self) -> bool:
         return not self.across or self.dimension == 1
 
+    @property
+    def volume(self) -> float | None:
+        if self.exterior or self.unknown:
+            return None
+        sides = (self.hi - self.lo)[: self.dimension]
+        if not self.across:
+            return float(np.prod(sides))
+        if (sides < (self.box_hi - self.box_lo)[: self.dimension]).take(self.across).any():
+            return None  # the edge of the domain cuts it
+        n = len(self.across)
+        ball = math.pi ** (n / 2) / math.gamma(n / 2 + 1) * self.radius**n
+        return ball * math.prod(float(sides[axis]) for axis, *_ in self.slabs)
+
     def contains(self, x: np.ndarray) -> np.ndarray:
         return self.distance(x, np.inf) >= -self.tolerance
 

@@ -22,6 +22,7 @@ from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
 MISSED = 0.01  # of the volume of a shape in a file
+COARSE = 0.05  # of the volume of a box or ball, which thin ones miss
 MANY = 10  # more points per cell and direction than useful
 
 
@@ -115,21 +116,34 @@ class RegionSolid(Solid):
         room = partial(room_for_points, hub, self.first_id, domain.dimension, state)
         placement = fill(region, domain, lattice, ppc, points, room)
         self.put(hub, placement, may_be_empty=region.unknown)
-        self.volumes = self._volumes(placement)
+        volumes = self._volumes(placement)
+        self.volumes = volumes if region.from_file else None
+        missed = MISSED if region.from_file else COARSE
         if placement.missed:
             hub.warn(
                 f"parts of {self.described()} are thinner than points=cut sees, "
                 f"{placement.missed:.3g}: their mass may be wrong or missing",
                 hint="smaller cells, or more points per cell",
             )
-        elif self.volumes and abs(self.volumes[0] / self.volumes[1] - 1) > MISSED:
-            self._warn_of_volume(hub, *self.volumes)
+        elif volumes and abs(volumes[0] / volumes[1] - 1) > missed:
+            self._warn_of_volume(hub, *volumes)
+        self._warn_of_size(hub)
 
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
         """Return the volume of the points, and of the shape in a file, if there is one."""
         whole = self.region.volume
         own = float(np.sum(np.broadcast_to(placement.volume, self.count)))
         return None if whole is None else (own, whole)
+
+    def _warn_of_size(self, hub: Hub) -> None:
+        """Warn if all of the body fits into a cell: the grid sees next to no deformation then."""
+        size = float((self.hi - self.lo).max()) if self.count > 1 else np.inf
+        if size < (1 - 1e-6) * self.h:
+            hub.warn(
+                f"the cells ({self.h:g}) are larger than {self.described()}, whose longest side is "
+                f"{size:.3g}: the grid cannot resolve how it deforms",
+                hint="cells of a quarter of its thinnest side or smaller",
+            )
 
     def _warn_of_volume(self, hub: Hub, own: float, whole: float) -> None:
         hub.warn(

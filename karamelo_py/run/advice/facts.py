@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.language import registry, rules
+from karamelo_py.points import transfers
+from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run import settling, timestep, uneven
 from karamelo_py.run.body_motion import (
     BodyMotion,
@@ -24,11 +26,13 @@ from karamelo_py.run.body_motion import (
     turn_of,
 )
 from karamelo_py.run.crossing import Crossing, expected
+from karamelo_py.run.neighbours import bent_row, parting
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import read_script
 
+PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities that come from the grid
 TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
 
 
@@ -165,6 +169,35 @@ class SceneFacts:
     def even(self) -> bool:
         """Return True if all bodies deform evenly, so that no cell is constrained alone."""
         return all(pressed_evenly(self, one) for one in self.motions)
+
+    @property
+    def grid_viscosity(self) -> float:
+        """Return the kinematic viscosity of the velocities that points take from the grid."""
+        series = transfers.terms.defined(type(self.transfer))
+        if not self.moves or self.moments or series or self.simulation.implicit:
+            return 0.0
+        dt = self.simulation.limit if getattr(self.transfer, "per_time", False) else 0.0
+        return PIC * (1 - self.kept) * self.hub.domain.h**2 / (dt or self.simulation.dt)
+
+    @cached_property
+    def moving_walls(self) -> bool:
+        """Tell whether a rigid solid moves, or a fix leads it."""
+        solids = list(self.hub.solids.values())
+        rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
+        led = (fix for fix in self.hub.fixes.values() if fix.leads_points)
+        led = (fix for fix in led if not all(map(is_zero, fix.formulas)))
+        moving = (rigid[m.number] and np.any([m.slow, m.fast]) for m in self.motions)
+        return any(rigid) and (any(led) or any(moving))
+
+    @cached_property
+    def bent_row(self) -> dict[str, Any] | None:
+        """Find a slender body of one row of points that its weight bends."""
+        return bent_row(self)
+
+    @cached_property
+    def parting(self) -> dict[str, Any] | None:
+        """Find two bodies that begin within a cell of each other on one grid, and move apart."""
+        return parting(self)
 
     @property
     def turns(self) -> bool:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.rigid import RigidBodies
+from karamelo_py.language.rules import known_failure
 from karamelo_py.points.frames import Total
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
@@ -45,6 +46,16 @@ class ULMPM(Method):
             slots[:, k] = slots_of_loads(hub, solids[k])
         force, torque = np.repeat(slots, [solid.count for solid in solids], axis=1)
         return RigidBodies(force=force, torque=torque, slots=slots[slots >= 0])
+
+
+known_failure(
+    ULMPM,
+    "bodies that part",
+    when=lambda method, scene: scene.parting,
+    reason="solids '{one}' and '{two}' begin {cells:.2g} cells apart and part at {speed:.3g}, and "
+    "on one grid bodies within a cell of each other stick together: they pull each other back",
+    cure="method(ulmpm/contacts, ...), or a gap of two cells",
+)
 
 
 class TLMPM(Method):

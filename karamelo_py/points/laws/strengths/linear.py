@@ -1,10 +1,12 @@
 """Strengths linear and fluid: unlimited elastic shear, and viscous shear."""
 
+from math import sqrt
 from typing import Annotated, NamedTuple
 
+from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import dev, inner, nothing
-from karamelo_py.points.laws import strengths
+from karamelo_py.points.laws import specific_volume, strengths
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.viscosity import damped
 
@@ -77,6 +79,66 @@ class Viscous(NamedTuple):
         return cls(mu, 0.0)
 
 
+COUNTS = 0.05  # of the viscosity of the fluid
+
+
+def _viscosity(strength, scene):
+    """Find the kinematic viscosity, 0 where it reaches no further than a cell in the run."""
+    laws = [solid.material.law for solid in scene.hub.solids.values()]
+    own = [law for law in laws if getattr(law, "strength", None) is strength]
+    nu = max((float(strength.mu * specific_volume(law)) for law in own), default=0.0)
+    seen = scene.d > 1 and sqrt(nu * scene.duration) > scene.hub.domain.h
+    return nu if seen and scene.moves and not scene.simulation.implicit else 0.0
+
+
+def _slows(strength, scene):
+    nu, added = _viscosity(strength, scene), scene.grid_viscosity
+    if not 0 < COUNTS * nu < added:
+        return None
+    return {
+        "place": scene.method.place, "pic": 1 - scene.kept, "added": added, "nu": nu,
+        "more": 100 * added / nu,
+    }  # fmt: skip
+
+
+def _beside_walls(strength, scene):
+    flip = scene.kept > 0.999 and scene.moving_walls and _viscosity(strength, scene) > 0
+    return flip and {"place": scene.method.place}
+
+
+def _reaches(strength, scene):
+    splines = not scene.hats and scene.basis.nodes_per_cell == 1
+    moved = splines and scene.moving_walls and _viscosity(strength, scene) > 0
+    return moved and {"place": scene.method.place}
+
+
+FOR_FLUIDS = "method(ulmpm, APIC, linear): between plates, force and velocities within 0.1 %"
+known_failure(
+    Viscous,
+    "viscosity of the grid",
+    when=_slows,
+    reason="{scene.transfer_name} takes {pic:.2g} of velocities from the grid in each step, which "
+    "is a kinematic viscosity of {added:.2g}: {more:.0f} % of that of the fluid, {nu:.2g}, comes "
+    "on top of it",
+    cure=FOR_FLUIDS,
+)
+known_failure(
+    Viscous,
+    "velocities beside moving walls",
+    when=_beside_walls,
+    reason="a rigid solid moves next to a viscous fluid, and points that keep all of "
+    "their velocities ({scene.transfer_name} {scene.kept:g}) never take its speed: the force "
+    "between plates is right, velocities are wrong by 14 to 27 % of that of the plate",
+    cure=FOR_FLUIDS,
+)
+known_failure(
+    Viscous,
+    "rigid walls and splines",
+    when=_reaches,
+    reason="a rigid solid drags a viscous fluid, and with {scene.basis_name} functions it reaches "
+    "0.75 of a cell into it: between plates the force is 18 % too large with 10 cells, 8 % with 20",
+    cure=FOR_FLUIDS,
+)
 strengths.initial_loss.on(Viscous)(lambda strength, like: (0.0,))
 strengths.shear_modulus.on(Viscous)(lambda strength: 0)
 strengths.shear_strain.on(Viscous)(lambda strength, kin, s: nothing(kin))

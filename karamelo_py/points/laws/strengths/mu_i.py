@@ -92,7 +92,6 @@ known_failure(
 )
 
 
-PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities interpolated from the grid
 SLOW = 0.05  # of the viscosity of the grains, above which a warning is given
 
 
@@ -101,9 +100,7 @@ def _slows(strength, scene):
 
     The pressure is at half the height of a body, the inertial number is half of I0.
     """
-    if not scene.moves or scene.moments or scene.kept >= 1 or scene.simulation.implicit:
-        return None
-    added = PIC * (1 - scene.kept) * scene.hub.domain.h**2 / scene.simulation.dt
+    added = scene.grid_viscosity
     for solid in scene.hub.solids.values():
         law = solid.material.law
         if getattr(law, "strength", None) is not strength or not scene.weights:
