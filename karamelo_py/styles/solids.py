@@ -22,7 +22,7 @@ from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
 MISSED = 0.01  # of the volume of a shape in a file
-COARSE = 0.05  # of the volume of a box or ball, which thin ones miss
+COARSE = 0.08  # of the volume of a box or ball, which thin ones miss
 MANY = 10  # more points per cell and direction than useful
 
 
