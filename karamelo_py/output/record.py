@@ -74,6 +74,11 @@ class RunRecord:
             "variables": dict(variables),
         }
 
+    @property
+    def script(self) -> str:
+        """The file of the script as the user wrote it; SCRIPT where there is none."""
+        return str(self.content.get("script", {}).get("file", "SCRIPT"))
+
     def begin(self, facts: Mapping[str, Any]) -> None:
         """Begin a run with what is known of it before its first step."""
         self.runs.append(dict(facts))
@@ -87,26 +92,24 @@ class RunRecord:
     def warn(
         self, text: str, hint: str | None, place: Place | None, code: str = "", cause: str = ""
     ) -> None:
-        """Note a warning: `code` names its kind, and `cause` what is known to lead to it."""
-        self._note("warning", text, hint, place, code, cause)
+        """Note a warning: `code` names its kind, `cause` its likely cause."""
+        self._note("warning", text, place, hint=hint, code=code, cause=cause)
 
     def end(self, status: str, error: BaseException | None = None) -> None:
         """Note how the script ended: finished, interrupted or failed, with the error."""
         self.content["status"] = status
         if isinstance(error, ScriptError):
-            self._note("error", error.sentence, error.hint, error.place, error.code, error.cause)
+            fields = {"code": error.code, "cause": error.cause, "resume": error.resume}
+            self._note("error", error.sentence, error.place, hint=error.hint, **fields)
         elif error is not None:
-            self._note("error", f"{type(error).__name__}: {error}", None, None, "internal", "")
+            self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
         if self.runs or self.is_asked_for:
             self._write()
 
-    def _note(
-        self, kind: str, text: str, hint: str | None, place: Place | None, code: str, cause: str
-    ) -> None:
+    def _note(self, kind: str, text: str, place: Place | None, **optional: str | None) -> None:
         note: dict[str, Any] = {"kind": kind, "text": text}
         if place is not None:
             note["place"] = {"file": place.file, "line": place.line, "column": place.column}
-        optional = {"hint": hint, "code": code, "cause": cause}
         self.messages.append(note | {name: of for name, of in optional.items() if of})
 
     def _write(self) -> None:

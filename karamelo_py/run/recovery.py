@@ -11,6 +11,7 @@ from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.diagnosis import energy, explain
+from karamelo_py.run.diagnosis.trouble import Trouble, when
 from karamelo_py.run.timestep import LimitsTold, own_step_instead
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
@@ -21,11 +22,10 @@ RETURNS = 2  # at most, to one state before an energy gain: two halvings without
 
 
 LAST_GOOD = "last_good.*.h5"
-GOES_ON = "karamelo-py SCRIPT {} goes on from there, with {}: as it is, it would end here again"
-SMALLER_STEP = "a smaller step (set_dt, dt_factor)"
-# For implicit schemes; a run may raise the number of corrections.
-OTHER_LOAD_STEPS = "smaller steps (set_dt), or another tolerance, iterations or solver"
-FAR = 100  # steps; more are not repeated for the last rows of log and dumps
+SMALLER_STEP = "a smaller time step (set_dt, dt_factor)"
+# Of implicit schemes; more of them is what a run may change.
+OTHER_LOAD_STEPS = "smaller load steps (set_dt), or another tolerance, iterations or solver"
+FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
@@ -52,8 +52,8 @@ class RollBack:
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks_always
         too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
-        # For the first state only: a later one is ruined, and its limit too.
-        self.smaller = "a smaller step" if ruined else own_step_instead(self.hub)
+        # Said of the first state: a later one is ruined, and its limit with it.
+        self.smaller = "a smaller time step" if ruined else own_step_instead(self.hub)
         self.smaller *= too_large
         # Deleted points would not come back.
         deletes = any(fix.every for fix in self.hub.fixes.values())
@@ -97,7 +97,7 @@ class RollBack:
                 self.returns += 1
                 energy.forget_growth(simulation)
                 return False
-            hub.warn(found.message, hint=found.hint, code=found.code, cause=found.cause)
+            hub.warn(found.message, hint=found.fix, code=found.code, cause=found.cause)
             simulation.told_of_growth = True
         self.tell_of_loss(WITHIN)
         if (
@@ -120,17 +120,15 @@ class RollBack:
         hub, simulation = self.hub, self.simulation
         lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
         if lost is not None:
-            hub.warn(lost.message, hint=lost.hint, code=lost.code, cause=lost.cause)
+            hub.warn(lost.message, hint=lost.fix, code=lost.code, cause=lost.cause)
             simulation.told_of_loss = True
 
     def _keep(self) -> None:
         self.point.keep(self.simulation)
         self.returns = 0
 
-    def _halve_step(
-        self, found: explain.Trouble | energy.Imbalance | None = None, status: int = DONE
-    ) -> bool:
-        """Return to the last good state with half the step, if the script allows it."""
+    def _halve_step(self, found: Trouble | None = None, status: int = DONE) -> bool:
+        """Go back to the last good state with half the step, where the script asks for that."""
         hub, simulation = self.hub, self.simulation
         if not self.halve or self.halvings == HALVINGS:
             return False
@@ -147,8 +145,7 @@ class RollBack:
             self.halvings += 1
             simulation.halve_step(self.halvings)
         hub.warn(
-            f"{found.message}. Back to step {simulation.step}, time {simulation.time:.6g}, with "
-            f"1/{2**self.halvings} of the step",
+            f"{found.message}. Back to {when(simulation)}, with 1/{2**self.halvings} of the step",
             place=self.place,
             code=found.code,
             cause=found.cause,
@@ -178,18 +175,19 @@ class RollBack:
         initial state: no later state is good.
         """
         too_large = self.smaller and not self.simulation.control.clock[0].watch_limit
-        found = explain.trouble(self.hub, self.simulation, status)
-        hint, kind = found.hint, ScriptError
+        smaller = self.smaller if too_large else ""
+        found = explain.trouble(self.hub, self.simulation, status, smaller)
+        resume, kind = "", ScriptError
         with suppress(OthersWait):
-            hint += self._keep_start(status) if too_large else self._keep_good(status)
+            resume = self._keep_start(status) if too_large else self._keep_good(status)
             kind = Stopped
-        error = kind(found.message, place=found.place or self.place, hint=hint)
-        error.code, error.cause = found.code, found.cause
+        error = kind(found.message, place=found.place or self.place, hint=found.fix)
+        error.code, error.cause, error.resume = found.code, found.cause, resume
         error.complete = found.place is not None
         raise error
 
     def _keep_start(self, status: int) -> str:
-        """Write the initial state of the run, end the outputs, and return how to restart."""
+        """Write the state that the run began with, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)
@@ -201,23 +199,22 @@ class RollBack:
             if back > 0:
                 good.again(simulation.advance, simulation.step + back)
             self._end_outputs()
-        words = f". Begin anew with {self.smaller}"
-        if path is None:
-            return words
-        name = os.path.relpath(path)
-        return (
-            f"{words}. The state before the first step of this run is in {name}; karamelo-py "
-            f"SCRIPT {self._options(name)} goes on from there, with such a step"
-        )
+        return self._resume(path)
 
-    def _options(self, file: str) -> str:
-        """Return the options to resume from a file, with the output options of this run."""
-        folder = os.path.relpath(self.hub.folder)
-        file, folder = (f'"{name}"' if " " in name else name for name in (file, folder))
-        return f"-restart {file}" + (f" -out {folder}" if folder != os.curdir else "")
+    def _resume(self, path: Path | None, remark: str = "") -> str:
+        """Write the command that resumes from a file, with outputs where this run has them.
+
+        A shell takes the remark for a comment.
+        """
+        if path is None:
+            return ""
+        names = self.hub.record.script, os.path.relpath(path), os.path.relpath(self.hub.folder)
+        script, file, folder = (f'"{name}"' if " " in name else name for name in names)
+        out = f" -out {folder}" if folder != os.curdir else ""
+        return f"karamelo-py {script} -restart {file}{out}" + (remark and f"  # {remark}")
 
     def _keep_good(self, status: int) -> str:
-        """Return to the last good state, write it, end the outputs, and return how to resume."""
+        """Return to the last good state, write it, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
         grown, path = not energy.grown_little(simulation), None
@@ -239,12 +236,8 @@ class RollBack:
         if simulation.step < step:
             present.give(self.hub)  # their files are unchanged, with later rows
         self._end_outputs()
-        if path is None:
-            return ""
-        name = os.path.relpath(path)
-        which = "The state from before energy grew" if grown else "The last good state"
         change = OTHER_LOAD_STEPS if simulation.implicit else SMALLER_STEP
-        return f". {which} is in {name}; {GOES_ON.format(self._options(name), change)}"
+        return self._resume(path, f"{'before energy grew; ' * grown}with {change}")
 
     def _write_before_growth(self, end: int) -> Path | None:
         """Return to the last state before step `end` without an energy gain, and write it."""

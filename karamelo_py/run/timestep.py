@@ -265,9 +265,10 @@ def stable_step(hub: Hub, simulation: Any, limit: float) -> float:
 def own_step_instead(hub: Hub, command: str = "") -> str:
     """Return the fix for a step that is too large, by the command that set it."""
     if command == "set_dt" or (not command and hub.update.fixed_dt is not None):
-        return f"set_dt({own_step(hub, hub.simulation):.3g}) or less, or leave set_dt out"
+        return f"set_dt({own_step(hub, hub.simulation):.3g}) or less, or remove set_dt"
     share = own_step(hub, hub.simulation) / hub.simulation.limit_moving
-    return f"dt_factor({share:.3g}) or less, or leave dt_factor out"
+    given = hub.update.dt_factor is not None
+    return f"dt_factor({share:.3g}) or less" + ", or remove dt_factor" * given
 
 
 def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:

@@ -291,11 +291,13 @@ class Hub:
     ) -> None:
         """Tell the user of something that may not be meant; not during a rehearsal.
 
-        The `code` names the kind of a trouble for programs, `cause` what is known to lead to it.
+        The `code` names the kind of a trouble for programs, `cause` its likely cause.
         """
         if not self.rehearsing:
             self.record.warn(message, hint, place or self.place, code, cause)
-            text = render_message("warning", message, place or self.place, expected, hint)
+            text = render_message(
+                "warning", message, place or self.place, expected, hint, code=code, cause=cause
+            )
             self.warned.append((self.update.time, text))
             self.console.warn(text)
 

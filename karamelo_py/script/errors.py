@@ -81,9 +81,10 @@ class ScriptError(Exception):
     statements: list = field(default_factory=list)
     # The name in a formula, or the column, that nothing answers to.
     unknown: str | None = None
-    # The kind of a trouble of a run, for programs, and what is known to lead to it.
+    # The kind of a trouble of a run, for programs; its likely cause; the command that resumes.
     code: str = ""
     cause: str = ""
+    resume: str = ""
     # Whether the statement it belongs to is known: nothing outside of it may add to it.
     complete: bool = False
 
@@ -102,7 +103,10 @@ class ScriptError(Exception):
 
         Further mistakes of the script follow.
         """
-        text = render_message("error", self.sentence, self.place, self.expected, self.hint)
+        physics = {"code": self.code, "cause": self.cause, "resume": self.resume}
+        text = render_message(
+            "error", self.sentence, self.place, self.expected, self.hint, **physics
+        )
         for place in self.included:
             text += f"\n{place.file}:{place.line}: the script above is included here"
         return "\n\n".join([text, *(error.render() for error in self.others)])
@@ -114,15 +118,24 @@ def render_message(
     place: Place | None = None,
     expected: str | None = None,
     hint: str | None = None,
+    *,
+    code: str = "",
+    cause: str = "",
+    resume: str = "",
 ) -> str:
-    """Lay out an error or a warning (`kind`) as it is shown to the user."""
+    """Lay out an error or a warning (`kind`) as it is shown to the user.
+
+    With a `code` it is a message of physics: likely cause, fix, and the command that resumes.
+    """
     lines = [f"{kind}: {message}"]
     if place is not None:
         lines = [f"{place.file}:{place.line}:{place.column}: {lines[0]}", *_marked(place)]
     if expected:
         lines.append(f"expected: {expected}")
-    if hint:
+    if hint and not code:
         lines.append(f"hint: {hint}")
+    physics = {"likely cause": cause, "fix": (code and hint) or "", "resume": resume}
+    lines += [f"  {name}: {text}" for name, text in physics.items() if text]
     return "\n".join(lines)
 
 

@@ -67,7 +67,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
                 say(f"               most of it for fix {most.style} '{most.id}'")
     if simulation.moves:
         why = unknown_work(hub)
-        say(f"energy         {not_watched(why) if why else 'is watched'}")
+        say(f"energy         {not_watched(why) if why else 'is monitored'}")
     say(f"threads        {simulation.threads}")
     say(f"set-up         {set_up:.2g} s from the start of the program on, beside compiling")
     say("")

@@ -1,6 +1,6 @@
 """The watch over a scene's energy: its limits, and the causes of a gain or loss."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.diagnosis.trouble import Trouble, when
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
@@ -21,7 +22,7 @@ WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
 def not_watched(why: str) -> str:
-    return f"is not watched: nobody adds up the work of {why}"
+    return f"is not monitored: the work of {why} is not tracked"
 
 
 def unknown_work(hub: Hub) -> str:
@@ -54,11 +55,11 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
-    """Name the likeliest known cause of an energy gain in such a scene, and its fix."""
+    """Find the likely cause of a gain of energy (empty where none is known) and its fix."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
-    functions = f"{method.basis_name} functions"
+    basis = f"a {method.basis_name} basis"
     moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
     if simulation.implicit:
         return _gain_of_implicit_steps(hub)
@@ -67,62 +68,61 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if share > 1 + 1e-9:
         return (
-            f"the step is {share:.3g} times the stable one",
-            "leave set_dt and dt_factor out, or make them smaller",
+            f"time step is {share:.3g} x the stability limit",
+            timestep.own_step_instead(hub),
         )
     if update.boundary == "reflect" and simulation.bounces:
-        pressed = "points that the edge of the domain puts back, while their neighbours press on"
-        return pressed, "nodes held by fix velocity_nodes along walls in place of boundary(reflect)"
+        pressed = "points pressed against an edge of the domain with boundary(reflect)"
+        return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
     courant, _ = timestep.own_step_of_waves(hub, still=False)
     # For undeformed bodies: later they may be softer.
     fastest = timestep.fastest_wave(simulation)
     across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
     if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
-        alone = " of a point that has its nodes for itself" * (courant == timestep.lone_point(hub))
+        alone = " of an isolated point" * (courant == timestep.lone_point(hub))
         return (
-            f"the step is {simulation.dt / borne:.3g} times the stable one{alone} when nothing has "
-            f"moved yet, {borne:.4g}",
-            f"set_dt({timestep.USUAL * borne:.3g}) or less, or leave set_dt out",
+            f"time step is {simulation.dt / borne:.3g} x the stability limit{alone} in the "
+            f"undeformed state ({borne:.4g})",
+            f"set_dt({timestep.USUAL * borne:.3g}) or less, or remove set_dt",
         )
     if moves and jumps and update.transfer.inverts_spread:
-        return f"{transfer} with {functions} in the updated frame", f"FLIP, or {smooth}"
+        return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
     gradients = SceneFacts(hub, simulation, simulation.time).moments
     if jumps and gradients and not hasattr(update.transfer, "alpha"):
-        return f"{transfer} with linear functions grows where a body moves through the grid", smooth
+        return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
-        return "averaged volumes (F-bar) in the updated frame", "leave anti_volumetric_locking out"
+        return "F-bar in the updated frame", "remove anti_volumetric_locking"
     if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
         points = " with one point per cell" if timestep.sparse(hub) else ""
         return (
-            f"points that cross cells: {transfer}, {functions} and {scheme}{points} at "
-            f"{share:.2g} of the stable step",
+            f"points crossing cells: {transfer} and {scheme} with {basis}{points} at "
+            f"{share:.2g} x the stability limit",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
-    if moves and simulation.points.largest(swelling)[0] > 1.5:  # too much for a cell
-        return "points that are further apart than a cell (numerical fracture)", WHOLE
+    if moves and simulation.points.largest(swelling)[0] > 1.5:  # what a cell cannot hold
+        return "points more than a cell apart (numerical fracture)", WHOLE
     said = SceneFacts(hub, simulation, simulation.time).advice("gain")
     fed = max(said, key=lambda one: one.share, default=None)
     if fed is not None and fed.share > 0:
         return fed.reason, fed.cure
     if moves and jumps:
-        return f"points that cross cells: the gradients of {functions} jump", smooth
+        return f"points crossing cells: the gradient of {basis} is discontinuous", smooth
     if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
-        return "a step that is too large", f"{_step_of(hub, simulation, 0.3)} or less"
-    return "no cause that is known to do that", "another basis, transfer or scheme to compare with"
+        return "time step too large", f"{_step_of(hub, simulation, 0.3)} or less"
+    return "", "compare with another basis, transfer or scheme"
 
 
 def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
     method, smaller = hub.update.method, "smaller steps (set_dt)"
     if method.fields_per_solid:
-        return "contact, which pushes back in one step what came in another", smaller
+        return "contact that opens and closes from step to step", smaller
     if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
-        functions = f"{method.basis_name} functions"
         return (
-            f"points that cross cells: the gradients of {functions} jump",
+            f"points crossing cells: the gradient of a {method.basis_name} basis is discontinuous",
             f"quadratic-spline, method tlmpm, or {smaller}",
         )
-    return "steps that strain or turn points much at once", smaller
+    return "large strains or rotations within a step", smaller
 
 
 def _step_of(hub: Hub, simulation: Any, share: float) -> str:
@@ -137,36 +137,25 @@ def swelling(points: PointTable) -> np.ndarray:
 
 
 def has_grown(simulation: Any) -> bool:
-    """Return True if the watch has measured a spurious energy gain."""
+    """Judge, by looks at it, that energy shows a spurious gain."""
     clock = simulation.control.clock[0]
     return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
 
-class Imbalance(NamedTuple):
-    """An unexplained gain or loss of energy: the message, and its likely cause."""
-
-    message: str
-    hint: str
-    code: str
-    cause: str
-
-
-def words_of_growth(hub: Hub, simulation: Any) -> Imbalance | None:
-    """Describe a spurious energy gain, with its fix; None if there is none."""
+def words_of_growth(hub: Hub, simulation: Any) -> Trouble | None:
+    """Describe a spurious gain of energy; None where there is none."""
     clock = simulation.control.clock[0]
     if not has_grown(simulation):
         return None
-    cause, cure = cause_of_gain(hub, simulation)
+    cause, fix = cause_of_gain(hub, simulation)
+    gain, since = clock.grown, "since the start"
     if clock.windows >= TOLD:
-        steps = "ten" if simulation.implicit else "hundred"
-        much = f"{100 * clock.growth:.2g} % of the largest so far in the last {steps} steps"
-    else:
-        much = f"{100 * clock.grown:.2g} % of the largest so far since the start"
+        gain, since = clock.growth, f"in the last {10 if simulation.implicit else 100} steps"
     message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: energy comes from nowhere, "
-        f"{much} (kinetic + stored + dissipated - work). Known to do that here: {cause}"
+        f"energy balance: spurious gain of {100 * gain:.2g} % of the largest energy {since} "
+        f"({when(simulation)})"
     )
-    return Imbalance(message, cure, "energy-gain", cause)
+    return Trouble(message, fix, "energy-gain", cause)
 
 
 def blends(transfer: Any) -> bool:
@@ -197,62 +186,62 @@ def share_lost(simulation: Any) -> float:
     return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
 
 
-def words_of_loss(hub: Hub, simulation: Any, within: float) -> Imbalance | None:
-    """Describe a loss above `within` that no choice explains, with its fix; else None."""
+def words_of_loss(hub: Hub, simulation: Any, within: float) -> Trouble | None:
+    """Describe a loss above `within` that no chosen damping explains; else None."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
     lost = share_lost(simulation)
     if lost <= within or taken_by(hub):
         return None
-    cause, cure = cause_of_loss(hub)
+    cause, fix = cause_of_loss(hub)
     message = (
-        f"step {simulation.step}, time {simulation.time:.6g}: energy is lost, {100 * lost:.2g} % "
-        f"of the largest so far since the first step (kinetic + stored + dissipated - work). Known "
-        f"to do that here: {cause}"
+        f"energy balance: spurious loss of {100 * lost:.2g} % of the largest energy since the "
+        f"first step ({when(simulation)})"
     )
-    return Imbalance(message, cure, "energy-loss", cause)
+    return Trouble(message, fix, "energy-loss", cause)
 
 
 def cause_of_loss(hub: Hub) -> tuple[str, str]:
+    """Find the likely cause of a loss of energy and its fix."""
     update, method = hub.update, hub.update.method
     if update.scheme.traits.damps:
         name = registry.name_of("scheme", type(update.scheme))
-        return f"scheme {name}, which damps what vibrates", "scheme(musl)"
+        return f"scheme {name} damps vibrations", "scheme(musl)"
     if found := collides(hub):
         return found
     if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
         return (
-            f"points that cross cells, where the gradients of {method.basis_name} "
-            "functions jump, and velocity differences within a cell",
+            f"points crossing cells (the gradient of a {method.basis_name} basis is "
+            "discontinuous), and velocity differences within a cell",
             "quadratic-spline, or method tlmpm for a solid",
         )
     if update.scheme.traits.implicit:
         return (
-            "vibrations and turns that cells and steps do not resolve",
-            "finer cells, smaller steps",
+            "vibrations or rotations that cells and time steps do not resolve",
+            "finer cells, or a smaller time step",
         )
     if method.frame.moves:
         return (
-            "waves and fronts that the cells do not resolve: the grid does not see velocity "
-            "differences within a cell",
+            "waves and fronts that the cells do not resolve (the grid does not see velocity "
+            "differences within a cell)",
             "finer cells, TPIC or APIC, or method tlmpm for a solid",
         )
     return "waves that the cells do not resolve", "finer cells"
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Describe collisions that dissipate energy, with their fix; None without such collisions."""
+    """Describe inelastic collisions, with their fix; None where there are none."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
-            "contact that undoes penetrations within a step: of such impulses the grid carries "
-            "only what it sees, the less the shorter the step",
+            "contact that removes penetrations within one step: the grid carries only the part of "
+            "such impulses that it resolves, less with a shorter time step",
             "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
         )
     if hub.update.method.fields_per_solid:
         return (
             "collisions: nodes of a surface lose their velocity of approach",
-            "finer cells, of which collisions take less",
+            "finer cells, which reduce the loss in a collision",
         )
     return None
 

@@ -1,7 +1,7 @@
 """Troubles of a run: found and explained, with the formula that gives no number."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +12,12 @@ from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.points.laws import by_rates
 from karamelo_py.run.diagnosis import energy
+from karamelo_py.run.diagnosis.trouble import Trouble, when
 from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 DOUBTED_UNITS = "units of "  # begins the names of warnings that doubt them
@@ -25,60 +26,59 @@ LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
 
-class Trouble(NamedTuple):
-    """Trouble of a run, what can be done, and the line of the script at fault, if known.
+def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Trouble:
+    """Find what went wrong in a step.
 
-    Its `code` is the kind for programs; `cause` is what is known to lead to it.
+    `smaller` says which step to take instead of one that was too large from the start of the run.
     """
-
-    message: str
-    hint: str
-    place: Place | None = None
-    code: str = ""
-    cause: str = ""
-
-
-def trouble(hub: Hub, simulation: Any, status: int) -> Trouble:
-    """Find what went wrong in a step, and what can be done."""
     if status == ABOVE_LIMIT:
-        return Trouble(*_above_limit(hub, simulation), hub.update.dt_place, "step-above-limit")
+        return _above_limit(hub, simulation)
     if status == SHRUNK:
-        return Trouble(*_shrunk(hub, simulation), code="step-collapsed")
-    too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
+        return _shrunk(hub, simulation)
+    smaller, too_large = _smaller_step(hub, simulation, smaller), _is_too_large(simulation)
     if status in (GAINED, HEATED):
         found = (_gained if status == GAINED else _heated)(hub, simulation)
-        return found._replace(hint=_smaller_step(hub, simulation)) if too_large else found
-    if simulation.implicit and simulation.load_steps.failure:
-        message = simulation.load_steps.failure
-        hint = "smaller load steps; beyond the load that a body bears there is no equilibrium"
-        when = f"step {simulation.step + 1}, time {simulation.time:.6g}"
-        return Trouble(f"{when}: {message}", hint, code="no-equilibrium")
-    found = _wrong_point(hub, simulation)
-    found = found._replace(
-        message=f"step {simulation.step + 1}, time {simulation.time:.6g}: {found.message}"
-    )
-    if found.place is None and energy.has_grown(simulation):
-        cause, cure = energy.cause_of_gain(hub, simulation)
-        message = f"{found.message}, after energy had come from nowhere. "
-        return found._replace(
-            message=f"{message}Known to do that here: {cause}",
-            hint=_smaller_step(hub, simulation) if too_large else cure,
-            cause=cause,
-        )
+        found = found._replace(fix=smaller) if too_large else found
+    elif simulation.implicit and simulation.load_steps.failure:
+        message = f"{simulation.load_steps.failure} ({when(simulation, 1)})"
+        fix = "smaller load steps; above the limit load there is no equilibrium"
+        return Trouble(message, fix, "no-equilibrium")
+    else:
+        found = _wrong_point(hub, simulation, smaller)
+        seen = f" after a spurious energy gain ({when(simulation, 1)})"
+        if found.place is None and energy.has_grown(simulation):
+            cause, fix = energy.cause_of_gain(hub, simulation)
+            fix = smaller if too_large else fix
+            found = found._replace(message=found.message + seen, fix=fix, cause=cause)
+        else:
+            found = found._replace(message=f"{found.message} ({when(simulation, 1)})")
+    if found.place is None and not found.cause and (too_large or simulation.above_limit()):
+        return found._replace(cause=_above_limit_as_cause(hub, simulation))
     return found
 
 
-def _when(simulation: Any) -> str:
-    return f"step {simulation.step}, time {simulation.time:.6g}"
+def _is_too_large(simulation: Any) -> bool:
+    """Tell whether the step was above the stability limit from the start of the run."""
+    return not simulation.control.clock[0].watch_limit and not simulation.implicit
 
 
-def _above_limit(hub: Hub, simulation: Any) -> tuple[str, str]:
+def _above_limit_as_cause(hub: Hub, simulation: Any) -> str:
+    update = hub.update
+    if step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of:
+        return "time step above the stability limit (see the warning)"
+    # The limit of a state that went wrong says nothing of the step of a good one.
+    here = "" if _is_too_large(simulation) else f" {simulation.limit:.4g}"
+    return f"time step {simulation.dt:.4g} above the stability limit{here}"
+
+
+def _above_limit(hub: Hub, simulation: Any) -> Trouble:
     speed, fastest = simulation.points.largest(_speeds)
     message = (
-        f"{_when(simulation)}: the step {simulation.dt:g} is above the stable limit, which has "
-        f"fallen to {simulation.limit:.4g} ({named(hub, fastest)} moves at {speed:.4g})"
+        f"time step {simulation.dt:g} is above the stability limit, which has fallen to "
+        f"{simulation.limit:.4g}: {named(hub, fastest)} moves at {speed:.4g} ({when(simulation)})"
     )
-    return message, own_step_instead(hub)
+    fix, place = own_step_instead(hub), hub.update.dt_place
+    return Trouble(message, fix, "step-above-limit", place=place)
 
 
 def _speeds(points: PointTable) -> np.ndarray:
@@ -86,50 +86,51 @@ def _speeds(points: PointTable) -> np.ndarray:
 
 
 def _gained(hub: Hub, simulation: Any) -> Trouble:
-    clock, when = simulation.control.clock[0], _when(simulation)
+    clock = simulation.control.clock[0]
     if not np.isfinite(clock.balance):
         _, first = simulation.points.largest(
             lambda points: 1.0 * ~np.isfinite(points.particle("ienergy"))
         )
-        message = f"{when}: energy is no number any more; "
-        message += f"the first point whose state is none is {named(hub, first)}"
-        hint = "look at the parameters of its material, and at what acts on it from Python"
-        return Trouble(message, hint, code="not-a-number")
+        message = (
+            f"energy is not a number; the first point with a state that is not a number is "
+            f"{named(hub, first)} ({when(simulation)})"
+        )
+        fix = "check the parameters of its material, and fixes in Python that act on it"
+        return Trouble(message, fix, "not-a-number")
     given = abs(clock.first_balance) + clock.supplied
-    cause, cure = energy.cause_of_gain(hub, simulation)
-    times = (clock.balance - clock.first_balance) / given if given > 0 else np.inf
+    cause, fix = energy.cause_of_gain(hub, simulation)
+    gain = clock.balance - clock.first_balance
+    much = f"{gain / given:.3g} x" if given > 0 else f"{gain:.3g} more than"
     message = (
-        f"{when}: {times:.3g} times the energy that there was at the start and that loads have "
-        "brought has come from nowhere (kinetic + stored + dissipated - work). Known to do that "
-        f"here: {cause}"
+        f"energy balance: {much} the initial energy and applied work has appeared "
+        f"({when(simulation)})"
     )
-    return Trouble(message, cure, code="energy-gain", cause=cause)
+    return Trouble(message, fix, "energy-gain", cause)
 
 
 def _heated(hub: Hub, simulation: Any) -> Trouble:
     clock = simulation.control.clock[0]
     share = clock.last_dt / clock.heat_limit
-    message = f"{_when(simulation)}: "
-    if share > 1:
-        message += f"the step is {share:.3g} times the stable one of conduction, and "
-    message += (
-        f"temperatures have come to be between {clock.T_low:.6g} and {clock.T_high:.6g}, where "
-        f"initial state, fixes and sources allow {clock.coldest:.6g} to "
-        f"{clock.hottest + clock.own_heat:.6g}"
+    message = (
+        f"temperatures are between {clock.T_low:.6g} and {clock.T_high:.6g}; initial state, fixes "
+        f"and sources allow {clock.coldest:.6g} to {clock.hottest + clock.own_heat:.6g} "
+        f"({when(simulation)})"
     )
-    hint = own_step_instead(hub) if share > 1 else _smaller_step(hub, simulation)
-    return Trouble(message, hint, code="temperature")
+    if share > 1:
+        cause = f"time step is {share:.3g} x the stability limit of conduction"
+        return Trouble(message, own_step_instead(hub), "temperature", cause)
+    return Trouble(message, _smaller_step(hub, simulation), "temperature")
 
 
-def _shrunk(hub: Hub, simulation: Any) -> tuple[str, str]:
+def _shrunk(hub: Hub, simulation: Any) -> Trouble:
     (speed, fastest), (volume, widest) = map(simulation.points.largest, (_speeds, energy.swelling))
     message = (
-        f"{_when(simulation)}: the stable step has fallen to {simulation.limit:.3g}, less than a "
-        f"millionth of the first ({named(hub, fastest)} moves at {speed:.3g}, {named(hub, widest)} "
-        f"has {volume:.3g} times its volume)"
+        f"the stability limit of the time step has fallen to {simulation.limit:.3g}, less than a "
+        f"millionth of the first: {named(hub, fastest)} moves at {speed:.3g}, "
+        f"{named(hub, widest)} has {volume:.3g} x its initial volume ({when(simulation)})"
     )
-    smaller = _smaller_step(hub, simulation)
-    return message, f"something went wrong before: look at the dumps; {smaller}"
+    fix = f"look at earlier dumps for what went wrong before; {_smaller_step(hub, simulation)}"
+    return Trouble(message, fix, "step-collapsed")
 
 
 def _first_wrong(simulation: Any) -> tuple | None:
@@ -147,22 +148,19 @@ def _first_wrong(simulation: Any) -> tuple | None:
     return number, old, new, points.v[:, p], int(points.grid[p])
 
 
-def _wrong_point(hub: Hub, simulation: Any) -> Trouble:
-    """Find what is wrong with the first point that went wrong, and what can be done."""
+def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
+    """Find what is wrong with the first point that went wrong; `smaller` is a step to take."""
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
-        hint = (
-            "look at the fixes that act on heat: a formula that gives NaN, or heat without bounds"
-        )
+        hint = "check fixes that act on heat: a formula that gives NaN, or heat without bounds"
         return no_number(hub, simulation, "the temperature of a point is not a number", hint)
     if not wrong:
-        return Trouble("a point went wrong", "use a smaller step", code="point")
+        return Trouble("a point went wrong", "a smaller time step", "point")
     number, old, place, v, grid = min(wrong, key=lambda one: one[0])
     d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
     old, new = old[:d], place[:d]
-    smaller = _smaller_step(hub, simulation)
     if not np.isfinite(old).all():
-        hint = f"look for a formula that gives NaN; {smaller}"
+        hint = f"look for a formula that gives NaN; else {smaller}"
         return no_number(hub, simulation, f"{name} has no position (NaN)", hint)
     if not np.isfinite(new).all() or not np.isfinite(v).all():
         what = f"{name} at {_place(old)} gets a velocity that is not a number"
@@ -170,48 +168,46 @@ def _wrong_point(hub: Hub, simulation: Any) -> Trouble:
         return no_number(hub, simulation, what, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     move = float(np.abs(new - old).max()) / h
-    unstable = f"the run is unstable: {smaller}"
+    unstable = smaller
     if move > ABSURD:
-        unstable = f"look at loads, stresses and velocities, and at their units; else {smaller}"
+        unstable = f"check loads, stresses and velocities, and their units; else {smaller}"
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         if move > ABSURD:
             what = (
                 f"{name} at {_place(old)} moves by {move:.3g} cells in one step, out of the domain"
             )
-            return Trouble(what, unstable, code="point-lost")
+            return Trouble(what, unstable, "point-lost")
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
             what = f"{name} at {_place(old)} is thrown out of the domain"
-            return Trouble(what, smaller, code="point-lost")
+            return Trouble(what, smaller, "point-lost")
         loose = _loose(simulation, number, old, LOOSE * h)
-        why = f", come loose from its solid ({APART}: numerical fracture)," if loose else ""
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
         return Trouble(
-            f"{name}{why} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
+            f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
-            "make the domain larger, hold the point back with fix velocity_nodes at the wall, let "
-            f"it go with boundary(delete), or, if it should not have got there, {smaller}{keep}",
-            code="left-domain",
-            cause="a point has come loose from its solid (numerical fracture)" if loose else "",
+            "a larger domain, fix velocity_nodes at the wall, or boundary(delete); if the point "
+            f"should not have got there, {smaller}{keep}",
+            "left-domain",
+            f"point separated from its solid: numerical fracture ({APART})" if loose else "",
         )
     if move > 1:
         what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
-        return Trouble(what, unstable, code="moves-too-far")
+        return Trouble(what, unstable, "moves-too-far")
     if any(simulation.points.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
-        instead = f", {plain} in the place of {tangled}" if tangled in ("Q4", "H8") else ""
+        instead = f", {plain} instead of {tangled}" if tangled in ("Q4", "H8") else ""
         return Trouble(
             f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
-            f"finer points, so that the corners of a domain move more alike{instead}, or method "
-            f"tlcpdi, whose domains keep their shape; or {smaller}",
-            code="tangled",
+            f"more points per cell{instead}, method tlcpdi, or {smaller}",
+            "tangled",
         )
     law = solid_with(hub, number).material.law
     other = ", or a law that resists the compression (neo-hookean)" if by_rates(law) else ""
     return Trouble(
         f"{name} at {_place(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid{other}",
-        code="inside-out",
+        "inside-out",
     )
 
 
@@ -239,32 +235,23 @@ def _is_tangled(simulation: Any, place: np.ndarray, grid: int) -> bool:
     return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
 
 
-def _step_was_told(hub: Hub) -> bool:
-    update = hub.update
-    return step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of
-
-
-def _smaller_step(hub: Hub, simulation: Any) -> str:
-    """Say how to take a smaller step, and that the present one is too large where it is.
+def _smaller_step(hub: Hub, simulation: Any, instead: str = "") -> str:
+    """Say how to take a smaller step, with the step to take `instead` where it is known.
 
     Where units are doubted they come first: what follows from them no step mends.
     """
     if doubted := [name for name in hub.update.warned_of if name.startswith(DOUBTED_UNITS)]:
-        return f"look at the {doubted[0]}, as the warning says"
+        units = f"check the {doubted[0]} (see the warning)"
+        return f"{units}, then {instead}" if instead else units
+    if instead:
+        return instead
     if simulation.implicit:
         inertia = simulation.hub.update.scheme.traits.inertia
-        return "use a smaller step (set_dt)" if inertia else "use more load steps, smaller ones"
-    if not simulation.control.clock[0].watch_limit:
-        return "the step is too large" + ", as the warning says" * _step_was_told(hub)
+        return "a smaller time step (set_dt)" if inertia else "more and smaller load steps"
     if simulation.above_limit():
-        if _step_was_told(hub):
-            return f"the step is too large, as the warning says; {own_step_instead(hub)}"
-        return (
-            f"the step {simulation.dt:.4g} is above the stable limit {simulation.limit:.4g}: "
-            "set_dt to less, or leave set_dt and dt_factor out"
-        )
+        return own_step_instead(hub)
     fixed = hub.update.fixed_dt is not None
-    return "use a smaller step (set_dt)" if fixed else "use a smaller dt_factor"
+    return "a smaller time step (set_dt)" if fixed else "a smaller dt_factor"
 
 
 def _first_bad(simulation: Any) -> tuple | None:
@@ -318,10 +305,10 @@ def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]
 
 
 def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
-    """Tell the trouble with what is NaN, and the first fix whose formula gives NaN or infinity."""
+    """Make the trouble for what is NaN, and the first fix whose formula gives NaN or infinity."""
     found = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not found:
-        return Trouble(message, hint, code="not-a-number")
+        return Trouble(message, hint, "not-a-number")
     (which, k, _), value, x = min(found, key=lambda one: one[0])
     fix = list(hub.fixes.values())[which]
     formula = list(formulas_of(tuple(vars(fix).values())))[k]
@@ -331,8 +318,8 @@ def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
         f"{message}: fix {fix.id} gets {what}{where} from {formula.text}",
         "a formula that is a number at all times and places of the run, such as by max(a, b) or "
         "if(condition, a, b)",
-        fix.place,
         "not-a-number",
+        place=fix.place,
     )
 
 
@@ -342,7 +329,7 @@ def refuse_endless_speeds(hub: Hub, simulation: Any) -> None:
         what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
         hint = "look for a formula that gives NaN or infinity, such as a division by zero"
         found = no_number(hub, simulation, what, hint)
-        raise ScriptError(found.message, place=found.place, hint=found.hint, code=found.code)
+        raise ScriptError(found.message, place=found.place, hint=found.fix, code=found.code)
 
 
 def _place(x: np.ndarray) -> str:

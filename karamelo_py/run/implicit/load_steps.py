@@ -332,7 +332,7 @@ class LoadSteps:
         if not np.all(np.isfinite(numbers)):
             hint = "look for a formula that gives NaN, such as a division by zero"
             found = no_number(self.simulation.hub, self.simulation, message, hint)
-            raise self._error(found.message, found.hint, found.place)
+            raise self._error(found.message, found.fix, found.place)
 
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
         """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
