@@ -388,7 +388,7 @@ def test_a_tangled_domain_ends_the_run(run_interpreted):
     script = block("ulcpdi, FLIP, linear, 1, Q4", wild, "run(50)").replace("2, 100", "2, 1")
     result = run_interpreted(script, status=1)
     assert "tangled" in result.err
-    assert "R4 in the place of Q4" in result.err
+    assert "R4 instead of Q4" in result.err
 
 
 @pytest.mark.parametrize("method, message", [

@@ -373,8 +373,8 @@ def test_a_turn_about_the_long_axis_is_told(run_interpreted, ppc, told):
     [
         (1, "scheme(usf)", "a turn: a body turns by about 0.2 rad"),
         (0, "", "a drift through the grid, at 0.4"),
-        (0, "scheme(usavg)", "no cause that is known"),
-        (0, "scheme(usavg)\ndt_factor(0.9)", "a step that is too large"),
+        (0, "scheme(usavg)", ""),
+        (0, "scheme(usavg)\ndt_factor(0.9)", "time step too large"),
     ],
 )
 def test_what_a_body_gains_energy_from(turn, more, cause):
@@ -384,7 +384,8 @@ def test_what_a_body_gains_energy_from(turn, more, cause):
     words = {**QUIET, "method": "ulmpm, FLIP, ugimp, 1", "u": v, "more": more}
     hub = _checked(**words)
     hub.values.set("time", 2.0)
-    assert cause in cause_of_gain(hub, hub.simulation)[0]
+    found = cause_of_gain(hub, hub.simulation)[0]
+    assert cause in found and bool(cause) == bool(found)
 
 
 def _checked(**words: object) -> Hub:
@@ -577,7 +578,7 @@ def test_velocities_that_are_no_numbers_at_the_start_are_refused(run_interpreted
     assert f"from {formula}" in said
 
 
-TOO_LARGE = "the step 0.1 of set_dt is above the stable limit"
+TOO_LARGE = "time step 0.1 of set_dt is above the stability limit"
 
 
 @pytest.mark.parametrize("command", ["run", "check"])

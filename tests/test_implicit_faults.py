@@ -69,7 +69,7 @@ def test_a_failed_step_is_not_kept(run_script):
     """The last state between steps is in a file, which a run of smaller steps goes on from."""
     words = "-var", "basis", "quadratic-spline"
     result = run_script(BEYOND.replace("pull_x", "hold_x"), *words, status=1)
-    assert "The last good state is in" in result.err and " of the load step" in result.err
+    assert "  # with smaller load steps" in result.err and " of the load step" in result.err
     (file,) = result.folder.glob("last_good.*.h5")
     steps = int(file.name.split(".")[1])
     assert 1 <= steps < 4

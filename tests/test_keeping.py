@@ -35,7 +35,7 @@ def log_of(folder, values, notes=()):
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
 
 
-GROWN = {"kind": "warning", "text": "step 9: energy comes from nowhere", "cause": "a cause"}
+GROWN = {"kind": "warning", "text": "step 9: spurious energy gain", "cause": "a cause"}
 LOST = {"kind": "error", "text": "point 1"}
 
 

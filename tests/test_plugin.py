@@ -514,7 +514,7 @@ GROWING = f"run(15){LATE}run(15)"
 @pytest.mark.parametrize("cut", few(("run(30)", GROWING), GROWING))
 def test_a_field_of_nodes_and_its_column(state_interpreted, run_interpreted, tmp_path, cut):
     """Free flight: all nodes that the body has come over know its speed, exactly."""
-    assert "not watched" not in run_interpreted(FLYING + "run(0)", folder="watched").out
+    assert "not monitored" not in run_interpreted(FLYING + "run(0)", folder="watched").out
     goes_on(run_interpreted, FLYING + cut)
     rows = np.loadtxt(tmp_path / "whole" / "n.30.LAMMPS", skiprows=11, ndmin=2)
     _, _, x, y, _, peak, mass = rows.T

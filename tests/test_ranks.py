@@ -200,11 +200,11 @@ FAILING = {
         2, "fix(v, velocity_nodes, all, -100*(x0-0.35), 0)", "set_dt(0.02)", "run(5)",
         size=(0.1, 0.2),
     ),
-    'last_good.5.h5" -out "of 1" goes on from there, with such a step': block(
+    'last_good.5.h5" -out "of 1" \n': block(
         2, "fix(v, initial_velocity_particles, all, 0.4*sin(30*x0), 0)", "set_dt(0.002)", "run(5)",
         "set_dt(0.04)", "run(500)", size=LOW,
     ),
-    "the stable limit, which has fallen to": block(1, *LARGE_STEPS, size=(0.2,)).replace(
+    "the stability limit, which has fallen to": block(1, *LARGE_STEPS, size=(0.2,)).replace(
         "0, 1.2", "0, 120"
     ),
     "domain of point": block(
@@ -219,7 +219,7 @@ FAILING = {
 
 
 # What is told of a step that has become too large is in test_failures.py, too.
-LARGE = "the stable limit, which has fallen to", "less than a millionth of the first"
+LARGE = "the stability limit, which has fallen to", "less than a millionth of the first"
 
 
 @pytest.mark.parametrize("says", few(FAILING, *(says for says in FAILING if says not in LARGE)))

@@ -1,12 +1,16 @@
 """run.json: the facts of a run as data, which the terminal prints and studies read."""
 
+import ast
 import json
 import re
 from pathlib import Path
 
 import pytest
 
+from karamelo_py.language import registry, rules
 from karamelo_py.output.console import show
+from karamelo_py.run.advice import known_failures
+from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS
 
 PAGE = Path(__file__).parent.parent / "docs" / "run-record.md"
 SCENE = """
@@ -76,3 +80,62 @@ def test_every_field_is_on_the_page(part, run_interpreted):
     }[part]
     page = PAGE.read_text("utf-8")
     assert not [name for name in fields if f"| `{name}` |" not in page]
+
+
+def codes_in_the_code() -> set[str]:
+    """Codes that are given to errors and warnings, as constants: keyword, or third of a Trouble."""
+    found = []
+    for path in Path(known_failures.__file__).parents[2].rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Call):
+                given = [word.value for word in node.keywords if word.arg == "code"]
+                given += node.args[2:3] * (getattr(node.func, "id", "") == "Trouble")
+                found += [one.value for one in given if isinstance(one, ast.Constant)]
+    return {code for code in found if code}
+
+
+def codes_of_known_failures() -> set[str]:
+    for family in registry.families():
+        for name in registry.names(family):
+            registry.find(family, name)
+    told = [
+        name
+        for (kind, part), some in rules._rules.items()
+        if kind == "failure" and part.__module__.startswith("karamelo_py.")
+        for _, name, *_ in some
+    ]
+    told += [f"{DOUBTED_UNITS}velocities", f"{DOUBTED_UNITS}material 'm'"]
+    return {rules.code_of(name) for name in told}
+
+
+def test_every_code_is_on_the_page():
+    page = PAGE.read_text("utf-8").partition("| code | trouble |")[2]
+    table, _, names = page.partition("Known failures")
+    assert set(re.findall(r"^\| `([\w-]+)` \|", table, re.M)) == codes_in_the_code()
+    listed = re.findall(r"`([\w-]+)`", names)
+    assert listed == sorted(codes_of_known_failures())
+
+
+def test_a_known_failure_has_a_code(run_interpreted):
+    """The code is the name in kebab case, also where the name has names of the script."""
+    text = SCENE.format(speed=1e4).replace("run(3)\n    run(2)", "set_dt(1e-9)\n    run(1)")
+    result = run_interpreted(text)
+    (note,) = [one for one in record(result)["messages"] if one["text"].startswith("units of")]
+    assert note["code"] == "units-of-velocities"
+    assert f"  fix: {note['hint']}\n" in result.err
+
+
+def test_an_error_of_physics_has_cause_fix_and_the_command_that_resumes(run_interpreted):
+    """A step of 3 times the limit: the cause once, on a line of its own and in the record."""
+    text = SCENE.format(speed="0.1*x").replace("run(3)\n    run(2)", "dt_factor(3)\n    run(200)")
+    result = run_interpreted(text, status=1)
+    (error,) = [one for one in record(result)["messages"] if one["kind"] == "error"]
+    lines = result.err.partition("error: ")[2].splitlines()
+    assert lines[0] == error["text"] and error["cause"] not in error["text"]
+    assert re.search(r" \(step \d+, t = [\d.e-]+\)$", error["text"])
+    names = {"likely cause": "cause", "fix": "hint", "resume": "resume"}
+    assert lines[-3:] == [f"  {name}: {error[field]}" for name, field in names.items()]
+    command = error["resume"].partition("  #")[0].split()
+    assert command[0] == "karamelo-py" and command[1].endswith("in.script")
+    smaller = text.replace("dt_factor(3)\n    run(200)", "run(5)")
+    assert run_interpreted(smaller, *command[2:]).log.Step[-1] == 5

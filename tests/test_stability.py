@@ -67,8 +67,8 @@ def test_failures_have_reasons(folder):
     assert main(["stability", "in.bar", *words]) == 0
     table = pandas.read_csv(folder / "map.csv")
     assert list(table["class"]) == ["stable", "failed"]
-    assert table["reason"][1] == "energy from nowhere"
-    assert "the step is 3 times the stable one" in table["message"][1]
+    assert table["reason"][1] == "spurious energy gain"
+    assert "likely cause: time step is 3 x the stability limit" in table["message"][1]
 
 
 def test_runs_too_short_to_show_growth_are_not_called_stable(folder, capsys):
@@ -202,7 +202,7 @@ def test_words_are_rows_and_what_loses_energy_is_damped(folder, capsys):
     assert classes["FLIP"] == ["stable"] * 4 + ["failed"]  # to 2 h/c, as above
     assert classes["PIC"][:3] == ["damped"] * 3
     run = table[table["run"] == "yes"]
-    assert set(run["reason"][run["class"] == "damped"]) == {"energy is lost"}
+    assert set(run["reason"][run["class"] == "damped"]) == {"spurious energy loss"}
     done = run[run["class"] == "stable"]
     assert list(done["err"]) == pytest.approx(list(0.01 * done["factor"]))
     said = (folder / "map.svg").read_text(encoding="utf-8")

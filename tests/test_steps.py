@@ -44,10 +44,12 @@ def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted, basis, factor):
     result = run_interpreted(script.replace("FLIP, linear", f"FLIP, {basis}"))
     step = H / SPEED
     assert result.log.dt == pytest.approx(np.full(4, factor * step), rel=1e-9)
-    warned = f"the step {factor * step:.4g} of dt_factor is above the stable limit {step:.4g}"
+    warned = f"time step {factor * step:.4g} of dt_factor is above the stability limit {step:.4g}"
     warns = factor > 1 and basis != "cubic-spline"
-    assert (warned in result.err) == warns == ("stable limit" in result.err)
-    follows = "the run may blow up" if basis == "linear" else "at rest up to {:.4g} is stable"
+    assert (warned in result.err) == warns == ("stability limit" in result.err)
+    follows = (
+        "the run may become unstable" if basis == "linear" else "up to {:.4g} is stable at rest"
+    )
     assert (follows.format(1.25 * step) in result.err) == warns
     own = {"linear": 0.9, "quadratic-spline": 0.9 * 1.25, "cubic-spline": 0.9 * 1.4}[basis]
     said = re.search(r"^  own dt +([\d.e-]+)", result.out, re.M)
@@ -56,11 +58,11 @@ def test_a_body_at_rest_steps_at_its_wave_speed(run_interpreted, basis, factor):
 
 def test_what_a_hint_recommends_is_not_warned_of(run_interpreted):
     """Of cubic splines the program bears 1.4 h/c in moving bodies, and so it judges `set_dt`."""
-    asked, step = re.compile(r"hint: set_dt\((\S+)\)"), H / SPEED
+    asked, step = re.compile(r"fix: set_dt\((\S+)\)"), H / SPEED
     scene = block(2, f"set_dt({1.45 * step})", LOG, "run(1)")
     scene = scene.replace("FLIP, linear", "FLIP, cubic-spline")
     said = run_interpreted(scene).err
-    assert f"is above the stable limit {1.4 * step:.4g}" in said
+    assert f"is above the stability limit {1.4 * step:.4g}" in said
     recommended = scene.replace(f"set_dt({1.45 * step})", f"set_dt({asked.search(said)[1]})")
     result = run_interpreted(recommended)
     share = re.search(r"set_dt; (\S+) of the stable step", result.out)
@@ -73,7 +75,7 @@ def test_a_later_step_of_the_script_is_named_as_it_is_taken(run_interpreted):
     result = run_interpreted(block(2, *lines, transfer="FLIP quadratic", ppc=1))
     step = H / SPEED
     assert result.log.dt[[0, -1]] == pytest.approx([0.9 * 1.25 * step, 1.1 * step], rel=1e-6)
-    assert f"the step {1.1 * step:.4g} of dt_factor is above the stable limit {step:.4g}" in (
+    assert f"time step {1.1 * step:.4g} of dt_factor is above the stability limit {step:.4g}" in (
         result.err
     )
     assert "dt_factor(0.9) or less" in result.err

@@ -137,7 +137,7 @@ def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: 
     """Take up to `count` steps, as far as the end time; say why it stopped.
 
     Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
-    SHRUNK (the stable step has become next to nothing), GAINED (energy from nowhere), HEATED
+    SHRUNK (the stable step has become next to nothing), GAINED (spurious energy gain), HEATED
     (temperatures that no source explains) or SORT: the points must be sorted before one can have
     left the surroundings of its tile. When that is depends on the points only, never on where a run
     is interrupted.

@@ -19,6 +19,7 @@ material. Two names mean more: ``place``, the place in the script that is marked
 fix, the material or the method), and ``share``, of noise how much it takes of what a body bears.
 """
 
+import re
 from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any, NamedTuple
@@ -34,6 +35,17 @@ class Advice(NamedTuple):
     cure: str
     share: float = inf
     place: Any = None
+
+    @property
+    def code(self) -> str:
+        """The kind for programs: the name in kebab case, without the names of the script."""
+        return code_of(self.name)
+
+
+def code_of(name: str) -> str:
+    """Write a known failure as a code: ``shocks of material 'm'`` is shocks-of-material."""
+    words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
+    return "-".join(re.findall(r"\w+", words.lower()))
 
 
 _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
@@ -57,7 +69,7 @@ def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
 
 
 def gain(part: type, *, when: When, cause: str, cure: str) -> None:
-    """Declare how a part feeds energy, told where energy comes from nowhere."""
+    """Declare a likely cause of a spurious energy gain by a part, and its fix."""
     _rules.setdefault(("gain", part), []).append((when, "", cause, cure))
 
 

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run import timestep
@@ -138,5 +139,6 @@ def words_at_end(scene: Any) -> dict[str, str]:
             f"{CROSSING}: matter has moved through {words}, and lost {much}",
             place=hub.update.method.place,
             hint=CURE,
+            code=code_of(CROSSING),
         )
     return {"stress": f"matter moved through {words}: lost {much}"}

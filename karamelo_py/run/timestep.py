@@ -232,11 +232,12 @@ def what_follows(hub: Hub, simulation: Any, step: float) -> str:
     borne = _borne(hub, simulation)
     if step <= borne:
         return (
-            f" of bodies that cross cells, which gain energy; at rest up to {borne:.4g} is stable"
+            " of bodies that move through the grid (spurious energy gain); up to "
+            f"{borne:.4g} is stable at rest"
         )
     if step <= LOST * borne:
-        return ": the run may blow up, by where points lie in the cells, and be stopped then"
-    return ": the run will most likely blow up, and be stopped then"
+        return ": the run may become unstable, depending on where points lie in their cells"
+    return ": the run will most likely become unstable"
 
 
 def own_step_instead_of(hub: Hub, simulation: Any) -> float | None:

@@ -196,6 +196,8 @@ class Launch:
             last = outcome.complaint.rstrip().splitlines()[-1:]
             outcome.status, outcome.code = "failed", error.get("code", "")
             outcome.reason = error.get("text") or [*last, "ended without a message"][0].strip()
+            if "cause" in error:
+                outcome.reason += f"; likely cause: {error['cause']}"
             if "points" not in facts and outcome.code not in _NOT_ITS_OWN + _NOT_OF_SCRIPT:
                 outcome.status = "refused"
                 hint = error.get("hint", "")

@@ -15,7 +15,7 @@ from karamelo_py.kernels.watch import WITHIN, growth
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
-_OWN = re.compile(r"^(\w+: )?step \d+, time [^:]*: | at \([^)]*\)| \(through[^)]*\)")
+_OWN = re.compile(r"^\w+: (?=point)| at \([^)]*\)| \((through|step \d+, t =)[^)]*\)")
 _POINT = re.compile(r"point \d+ of solid '[^']*'")
 
 

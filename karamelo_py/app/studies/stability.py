@@ -1,6 +1,5 @@
 """karamelo-py stability: where a script is stable, where its energy grows, where it fails."""
 
-import re
 import textwrap
 from argparse import ArgumentParser
 from collections import Counter
@@ -26,8 +25,8 @@ from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
-Maps where a script is stable over one or two of its variables: stable, damped (energy is lost),
-growing (energy comes from nowhere; both as the program itself finds by kinetic + stored +
+Maps where a script is stable over one or two of its variables: stable, damped (spurious energy
+loss), growing (spurious energy gain; both as the program itself finds by kinetic + stored +
 dissipated energy less the work of loads, or as a log column exceeds a bound), left (a point left
 the domain, which tells nothing of the step), short (too few steps to see whether energy grows), or
 failed, with the reason. A mistake of the script
@@ -42,8 +41,8 @@ errors.
 """
 Cell = tuple[int, int]
 UNKNOWN = -1
-FROM_NOWHERE = "energy comes from nowhere"  # what the program says of growth
-LOST = "energy is lost"
+GAINED = "spurious energy gain"
+LOST = "spurious energy loss"
 CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")  # classes of steps that are borne
 UNTOLD = ("left", "short")  # of steps that nothing is known of
@@ -66,7 +65,7 @@ REASONS = {
     "step-collapsed": "stable step collapsed",
     "step-above-limit": "step above the limit",
     "tangled": "domain of a point tangled",
-    "energy-gain": "energy from nowhere",
+    "energy-gain": GAINED,
     "temperature": "temperature out of bounds",
 }
 
@@ -174,8 +173,7 @@ def in_short(row: Mapping[str, Any], code: str) -> str:
         return "too long"
     if code in REASONS:
         return REASONS[code]
-    cause = re.sub(r"^(run\w*: )?step \d+, time [^:]+: ", "", str(row["reason"]))
-    return textwrap.shorten(cause, 60, placeholder=" …")
+    return textwrap.shorten(str(row["reason"]), 60, placeholder=" …")
 
 
 class Map:
@@ -264,7 +262,7 @@ class Map:
             if runs and "energy_unwatched" in runs[0]:
                 found["unwatched"] = not_watched(runs[0]["energy_unwatched"]).removeprefix("is ")
             change = (found["growth"] or 1.0) - 1
-            grows = FROM_NOWHERE if "energy-gain" in codes or change > watch.WITHIN else ""
+            grows = GAINED if "energy-gain" in codes or change > watch.WITHIN else ""
             falls = LOST if "energy-loss" in codes or change < -watch.WITHIN else ""
         if not done:
             # A domain that is too small tells nothing of the step.

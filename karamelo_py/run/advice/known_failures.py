@@ -45,6 +45,7 @@ def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
             "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
             hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
             "load, in front of it",
+            code="nothing-moves",
         )
 
 
@@ -84,7 +85,7 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
             "heat capacities, lengths and times may be mixed"
         )
         hint = "an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385"
-    hub.warn(f"{about} {end_time:.6g}" + (f": {why}" if why else ""), hint=hint)
+    hub.warn(f"{about} {end_time:.6g}" + (f": {why}" if why else ""), hint=hint, code="many-steps")
 
 
 def mixed_units(hub: Hub, simulation: Any) -> str:
@@ -142,24 +143,24 @@ def warn_about_steps(
             continue
         name = timestep.step_by_script(step.fixed_dt, step.dt_factor)
         command = name.split()[0]
-        words = f"the step {asked:.4g} of {command} is "
+        words = f"time step {asked:.4g} of {command} is "
         hint = timestep.own_step_instead(hub, command)
         if asked > BORNE * of_heat and not step.halves:
-            words += f"{asked / of_heat:.3g} times the stable one of conduction: "
-            words += "temperatures would swing"
+            words += f"{asked / of_heat:.3g} x the stability limit of conduction: "
+            words += "temperatures would oscillate"
             if step is present:
                 raise ScriptError(words, place=step.place, hint=hint, code="step-above-limit")
         elif limit == of_heat:
-            words += f"above the stable limit {limit:.4g} of conduction; "
-            words += f"beyond {BORNE:g} times that temperatures swing"
+            words += f"above the stability limit {limit:.4g} of conduction; "
+            words += f"temperatures oscillate above {BORNE:g} x this limit"
         else:
-            words += f"above the stable limit {stable:.4g}"
+            words += f"above the stability limit {stable:.4g}"
             words += timestep.what_follows(hub, simulation, asked)
             if step.fixed_dt and asked > MIXED * stable:
                 words += f"; {mixed_units(hub, simulation)}"
                 hint = f"{UNITS}. If they are as they should be, {hint}"
         if hub.update.first_time(name) or (again and step is present):
-            hub.warn(words, place=step.place, hint=hint)
+            hub.warn(words, place=step.place, hint=hint, code="step-above-limit")
     hub.later.clear()
 
 
@@ -209,7 +210,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     one = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.limit)
     if one and timestep.ruling_limit(simulation) == "end" and hub.update.first_time("one step"):
         words = f"one step covers the whole run, where one of {simulation.limit:.3g} is stable"
-        hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS)
+        hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS, code="one-step")
     if scene.waves > 0 and timestep.blows_up(hub, simulation):
         scene.duration = 0.0  # it never comes so far
     warn_about_steps(hub, simulation, halves)
@@ -227,7 +228,8 @@ def warn_about_factor(hub: Hub) -> None:
         hub.warn(
             "dt_factor has no effect: load steps are those of set_dt, or 1",
             place=update.dt_place,
-            hint="set_dt(...) in its place",
+            hint="set_dt(...) instead",
+            code="dt-factor-ignored",
         )
 
 
@@ -252,6 +254,7 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
             place=loads[0].place,
             hint="a formula of time, which each load step adds set_dt or 1 to: times time/40 in "
             "run(40); or run(1)",
+            code="loads-at-once",
         )
 
 
@@ -264,7 +267,7 @@ def _tell(hub: Hub, said: Iterable[Advice]) -> None:
     for one in said:
         if hub.update.first_time(one.name):
             place = one.place or hub.update.method.place
-            hub.warn(f"{one.name}: {one.reason}", place=place, hint=one.cure)
+            hub.warn(f"{one.name}: {one.reason}", place=place, hint=one.cure, code=one.code)
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
@@ -300,6 +303,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
             f"a step moves points by {step:.2g} at most, and in single precision positions have "
             f"a spacing of {spacing:.2g}: motion will be lost to rounding",
             hint="precision(double), or a domain around the origin",
+            code="single-precision",
         )
     elif spacing > 1e-3 * s.hub.domain.h:
         far, apart = x / s.hub.domain.h, spacing / s.hub.domain.h
@@ -307,6 +311,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
             f"points lie up to {far:.3g} cells from the origin, where positions in single "
             f"precision have a spacing of {apart:.2g} cells: slow motion will be lost",
             hint="precision(double), or a domain around the origin",
+            code="single-precision",
         )
 
 
@@ -340,9 +345,11 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
                 f"fix {fix.style} '{fix.id}' acts on nodes that no point reaches: {NOTHING_THERE}",
                 place=fix.place,
                 hint="a region that reaches into the body",
+                code="out-of-reach",
             )
     for group in hub.groups.values():
         if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
             group.awaits_solids = False
             hint = "nodes belong to the solids here: fix contact/surface makes walls beside them"
-            hub.warn(f"group '{group.id}' holds no nodes; {NOTHING_THERE}", group.place, hint)
+            said = f"group '{group.id}' holds no nodes; {NOTHING_THERE}"
+            hub.warn(said, group.place, hint, code="no-nodes")
