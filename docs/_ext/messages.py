@@ -57,7 +57,8 @@ CAUSES = {
     "words_of_loss": "warning",
     "cause_of_gain": "cause of a gain of energy",
     "_gain_of_implicit_steps": "cause of a gain of energy",
-    "_cause_of_loss": "cause of a loss of energy",
+    "cause_of_loss": "cause of a loss of energy",
+    "collides": "cause of a loss of energy",
 }
 # Page, its title, what it is about, and the modules whose messages it has: the first that fits.
 PAGES = (
@@ -128,13 +129,14 @@ class _Reader:
             elif isinstance(node, ast.Return) and PAIRS.search(self.module):
                 pair = node.value
                 if isinstance(pair, ast.Tuple) and len(pair.elts) == 2:
-                    inside = next(n for n in self._above(node) if isinstance(n, ast.FunctionDef))
-                    kind = CAUSES.get(inside.name, "error")
+                    kind = CAUSES.get(self._inside(node).name, "error")
                     yield from self._made(node, kind, pair.elts[0], None, pair.elts[1])
 
     def _of_call(self, node: ast.Call) -> Iterator[Message]:
         kind, *where = CALLS[self._name(node.func)]
         text, expected, hint = (self._argument(node, one) for one in where)
+        if self._name(node.func) == "Trouble":
+            kind = CAUSES.get(self._inside(node).name, kind)
         if self._name(node.func) == "render_message":
             kind = self._texts(node.args[0], node)[0]
         if text is None or HOLE in kind:
@@ -179,6 +181,10 @@ class _Reader:
         while node in self.parents:
             node = self.parents[node]
             yield node
+
+    def _inside(self, node: ast.AST) -> ast.FunctionDef:
+        """The function that a statement is in."""
+        return next(one for one in self._above(node) if isinstance(one, ast.FunctionDef))
 
     def _told_by(self, node: ast.AST) -> str:
         module = f"karamelo_py.{self.module.replace('/', '.')}"
