@@ -80,11 +80,11 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     steps
         Exact number of steps.
     on_trouble
-        ``stop``, or ``halve``. With ``halve`` the run goes back to its last good state and halves
-        the step, at most five times, and says so. It does so where a point goes wrong, where
-        energy grows spuriously (a warning without ``halve``), and where the step gets unstable.
-        Log, dumps, curves and computes go back too, and are written again. Points that leave the
-        domain without a gain of energy stop the run (see `boundary`).
+        ``stop``, or ``halve``. With ``halve`` the run returns to its last good state and halves the
+        step, at most five times, with a message. This happens when a point fails, when energy
+        appears that no load supplied (a warning without ``halve``), and when the step becomes
+        unstable. Log, dumps, curves and computes are rewound too. Points that leave the domain
+        without an energy gain stop the run (see `boundary`).
 
     Example
     -------

@@ -357,7 +357,7 @@ def look_before(i, fate, s):
 
 
 def look_behind(i, fate, s):
-    """Look at the energy; the run ends at a large spurious gain."""
+    """Check the energy; the run ends at a spurious gain."""
     clock = s.control.clock[0]
     if clock.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return

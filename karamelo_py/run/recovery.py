@@ -128,7 +128,7 @@ class RollBack:
         self.returns = 0
 
     def _halve_step(self, found: Trouble | None = None, status: int = DONE) -> bool:
-        """Go back to the last good state with half the step, where the script asks for that."""
+        """Return to the last good state with half the step, if the script allows it."""
         hub, simulation = self.hub, self.simulation
         if not self.halve or self.halvings == HALVINGS:
             return False
