@@ -124,7 +124,7 @@ FAILURES = {
 def test_a_failure_is_told_and_its_cure_is_not(run_interpreted, name, fails, cured):
     said = run_interpreted(SCENE.format(**(QUIET | fails))).err
     assert f"warning: {name}: " in said
-    assert "hint: " in said
+    assert "fix: " in said
     cure = run_interpreted(SCENE.format(**(QUIET | cured)), command="check")
     assert f"{name}: " not in cure.err
 
@@ -523,7 +523,7 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     said = run_interpreted(scene, command="check").err
     told_of = "gives all nodes around 36 points of this group another vx: this fix decides how"
     assert (told_of in said) == told and ("another v" in said) == told
-    assert ("hint: nodes that these points do not see" in said) == told
+    assert ("fix: nodes that these points do not see" in said) == told
 
 
 @pytest.mark.parametrize(("rho", "told"), [("2", False), ("2e-9", True)])
@@ -599,7 +599,7 @@ def test_a_large_step_of_a_later_run_is_told_before_the_first(
     """Cells of 0.1, and waves of sqrt((K + 4 G/3) / rho) = 8.2: 0.012 is stable."""
     text = block(2, "set_dt(0.01)", "set_output(1)", *lines)
     result = run_interpreted(text, command=command)
-    assert result.err.count("the step ") == told
+    assert result.err.count("time step ") == told
     assert (TOO_LARGE in result.err) == told
     # The line that asks for the step is marked.
     assert ("| set_dt(0.1)" in result.err) == told
@@ -651,7 +651,7 @@ def test_the_pressure_that_linear_functions_lose_is_told_before_the_run(
     said = run_interpreted(plates(**numbers), command="check").err
     assert (CROSSING in said) == told
     if told:
-        assert "hint: cpgimp or quadratic-spline instead of linear, with FLIP 0.99" in said
+        assert "fix: cpgimp or quadratic-spline instead of linear, with FLIP 0.99" in said
     if not numbers:  # u = v/2 through 2 L/c - as long as the run, 1.2 L/U - in cells of 40 um
         assert "move at 250 through 3.5 cells" in said
 

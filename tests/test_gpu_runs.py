@@ -115,7 +115,7 @@ def test_goes_on_from_a_file(run_interpreted, scene):
 
 WRONG = [
     "fix g gets NaN from sqrt(0.02 - time)", "leaves the domain at (1.2", "is turned inside out",
-    'last_good.5.h5" -out "of 1" \n',
+    'last_good.5.h5" -out "of 1"\n',
 ]  # fmt: skip
 
 

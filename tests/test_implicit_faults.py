@@ -371,7 +371,7 @@ def test_a_point_that_leaves_is_told_of_load_steps(run_script):
     """The domain comes first; no word about a stable step, which load steps do not have."""
     text = patch(HELD.replace("1e-4", "0.1")).replace("run(4)", "run(8)")
     said = run_script(text, status=1).err
-    assert "leaves the domain" in said and "more load steps" in said and "dt_factor" not in said
+    assert "leaves the domain" in said and "smaller load steps" in said and "dt_factor" not in said
 
 
 def test_a_transfer_without_a_part_is_told_first(run_interpreted):

@@ -200,7 +200,7 @@ FAILING = {
         2, "fix(v, velocity_nodes, all, -100*(x0-0.35), 0)", "set_dt(0.02)", "run(5)",
         size=(0.1, 0.2),
     ),
-    'last_good.5.h5" -out "of 1" \n': block(
+    'last_good.5.h5" -out "of 1"\n': block(
         2, "fix(v, initial_velocity_particles, all, 0.4*sin(30*x0), 0)", "set_dt(0.002)", "run(5)",
         "set_dt(0.04)", "run(500)", size=LOW,
     ),
