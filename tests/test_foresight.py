@@ -417,7 +417,9 @@ def test_rules_that_ask_for_concrete_styles_stand_beside_these():
         concrete = {
             alias.asname or alias.name
             for node in ast.walk(tree)
-            if isinstance(node, ast.ImportFrom) and PART.match(node.module or "")
+            if isinstance(node, ast.ImportFrom)
+            and PART.match(node.module or "")
+            and not node.module.endswith(".traits")
             for alias in node.names
         }
         asked = (n.args[1] for n in ast.walk(tree) if isinstance(n, ast.Call) and is_query(n))
