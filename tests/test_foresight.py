@@ -233,6 +233,13 @@ def test_each_failure_is_told_once(run_interpreted):
         ("noise of a drift", "ulmpm, FLIP, linear, 1", "dt_factor(0.4)", 60, False),
         ("noise of a drift", "ulmpm, FLIP, linear, 1", "dt_factor(50)", 400, False),  # blows up
         ("noise of a drift", "ulmpm, FLIP, quadratic-spline, 1", "scheme(usavg)", 9000, False),
+        (
+            "noise of a drift",
+            "ulmpm, FLIP, quadratic-spline, 1",
+            "dt_factor(0.9)\nscheme(usl)",
+            400,
+            False,
+        ),
         ("noise of a drift", "ulmpm, APIC, quadratic-spline", "dt_factor(0.9)", 400, False),
         ("noise of a drift", "tlmpm, FLIP, quadratic-spline, 1", "dt_factor(0.9)", 400, False),
     ],

@@ -281,3 +281,21 @@ def test_pixels_voxels_and_numbers_of_elements(type_, d, tmp_path):
     (tmp_path / "a.vtu").write_text(text)
     for group in (3, "mat:3"):
         assert volume(tmp_path / "a.vtu", d, group) == pytest.approx(1, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.inp", CUBE + "*Assembly\n*SURFACE, TYPE=NODE, NAME=S\nI.NOPE, 1\n*End Assembly\n"),
+        ("a.inp", CUBE + "*ADD, SET=1\n1, 2\n*NUMBERS\n"),
+    ],
+)
+def test_keywords_that_mean_nothing_here_are_passed_over(name, text, tmp_path):
+    (tmp_path / name).write_text(text)
+    assert volume(tmp_path / name, 3) == pytest.approx(1, rel=1e-14)
+
+
+def test_a_line_that_is_cut_ends_in_a_message(tmp_path):
+    (tmp_path / "a.bdf").write_text("BEGIN BULK\nGRID,1\n")
+    with pytest.raises(ScriptError):
+        volume(tmp_path / "a.bdf", 3)

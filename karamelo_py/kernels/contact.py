@@ -356,7 +356,8 @@ def _excess_of(contact, kin, nodes, pair, where):
             if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
                 return 0.0
     last = abs(contact.touched[pair.n, pair.m // contact.stride])
-    if pair.wall and last > 0 and last == where.step - 1:
+    # Where three bodies meet, a pair is looked at again in the step that has touched already.
+    if pair.wall and last > 0 and last >= where.step - 1:
         return approach / size
     gap = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
     return approach / size - max(gap, 0.0) / where.dt

@@ -50,7 +50,8 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
         return inf
     solids = [s for s in hub.solids.values() if not can(s.material.law, constrained_velocity)]
     found = [_stable_share(hub, solid, grids) for solid in solids if solid.count]
-    return floor(1e4 * min(found, default=inf)) / 1e4 if found else inf
+    least = min(found, default=inf)
+    return floor(1e4 * least) / 1e4 if least < inf else inf
 
 
 def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:

@@ -19,8 +19,9 @@ class SchemeTraits(NamedTuple):
     # Stable step in h/c with two points per cell and direction, and with one.
     courant: tuple[float, float] = (1.0, 1.0)
     # Fractions of the stable step with which a drifting body conserves its energy, with 2 and 1
-    # points per cell: smooth gradients, gradients that jump, nodes within the cells.
-    keeping: tuple[tuple[float, float], ...] = ((USUAL, USUAL),) * 3
+    # points per cell: smooth gradients, gradients that jump, nodes within the cells. None: a drift
+    # feeds nothing.
+    keeping: tuple[tuple[float, float], ...] | None = None
     # Fraction of a step's strain that comes before the forces.
     strained_before: float = 0.0
     # The velocity of the moved points is mapped to the nodes once more.

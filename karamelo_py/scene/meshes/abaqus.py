@@ -8,7 +8,7 @@ Reference; CalculiX CrunchiX manual).
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -238,13 +238,13 @@ class _Deck:
         self.whole = self.scope = _Part()  # the assembly, or a deck without parts
         self.assembly: list[tuple[dict, str, str, list]] = []
         for keyword in _keywords(path):
-            reads: Any = getattr(self, f"_{keyword.name.lower().replace(' ', '_')}", None)
+            reads = _READ.get(keyword.name)
             if keyword.name in _REFUSED:
                 raise _wrong(keyword, "is not read", "the nodes and elements written out")
             if keyword.name in ("STEP",):
                 break
             if reads:
-                reads(keyword)
+                reads(self, keyword)
 
     # ---- the keywords that are read, one method each ----------------------------------------
 
@@ -469,6 +469,14 @@ class _Deck:
                         found.surfaces.setdefault(known, []).append(key)
 
 
+_READ: dict[str, Callable[[_Deck, _Keyword], None]] = {
+    "PART": _Deck._part, "END PART": _Deck._end_part, "INSTANCE": _Deck._instance,
+    "END INSTANCE": _Deck._end_instance, "SYSTEM": _Deck._system, "NODE": _Deck._node,
+    "NGEN": _Deck._ngen, "NFILL": _Deck._nfill, "ELEMENT": _Deck._element,
+    "ELGEN": _Deck._elgen, "NSET": _Deck._nset, "ELSET": _Deck._elset, "SURFACE": _Deck._surface,
+}  # fmt: skip
+
+
 def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool = False):
     """Look up the numbers `of` (n,) in a table; unknown ones are left out, or -1."""
     numbers, stands = table
@@ -531,7 +539,7 @@ class _Found:
         node_sets = {}
         for name, held in self.nodes.items():
             node_sets[name] = np.zeros(len(points), bool)
-            node_sets[name][np.concatenate(held)] = True
+            node_sets[name][np.concatenate([np.empty(0, np.int64), *held])] = True
         return Mesh(points, every, sets, node_sets, self.skipped)
 
 

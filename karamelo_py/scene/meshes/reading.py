@@ -134,7 +134,8 @@ def _refuse_systems(path: Path) -> None:
         for number, line in enumerate(file, 1):
             if line[:4].upper() == "GRID":
                 wide = 16 if line[:5].endswith("*") else 8
-                field = line.split(",")[2] if "," in line else line[8 + wide : 8 + 2 * wide]
+                fields = [*line.split(","), "", ""]
+                field = fields[2] if "," in line else line[8 + wide : 8 + 2 * wide]
                 if field.strip(" 0\n"):
                     raise _unreadable(
                         path,

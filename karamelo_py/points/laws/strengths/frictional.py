@@ -57,7 +57,6 @@ def share_of_average(strength, memory):
 
     Averaging multiplies waves by the factor a (1 for long waves, 0.1 to 0.5 for waves of two or
     three cells). Their stiffness in plastic flow is
-    0.5 for waves of two or three cells) have in plastic flow the stiffness
 
         (a - f (1 - b + b a)) (a - d) times a positive number,
 
