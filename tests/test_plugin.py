@@ -568,7 +568,7 @@ def test_a_part_declares_what_it_is_known_for(run_interpreted):
         said = run_interpreted(script, command=command).err
         assert said.count("warning: growing velocities: ") == 1
         assert "with smooth functions points at 0.002 are 1.5 times as fast after each step" in said
-        assert "hint: a factor of 1 at most" in said and "| method(" in said
+        assert "fix: a factor of 1 at most" in said and "| method(" in said
     assert "growing" not in run_interpreted(script.replace("1.5, 2,", "1, 2,")).err
 
 
