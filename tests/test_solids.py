@@ -483,3 +483,19 @@ def test_solids_in_contact_have_smooth_faces_where_these_lean():
         for region, leans in ((disk, True), (wedge, True), (block, False), (slab, False)):
             assert hub.solid(region.id, region).cut == (leaning and leans)
         assert hub.solid("whole", disk, points="regular").cut is False
+
+
+def test_a_half_space_has_no_volume_to_be_compared_with(run_interpreted):
+    """A leaning plane fills a part of the domain."""
+    result = run_interpreted(
+        """
+        method(ulmpm, FLIP, linear, 1)
+        dimension(2, 0, 4, 0, 4, 0.5)
+        region(slope, plane, 0, 2, -0.5, -0.8)
+        material(rock, linear, 1000, 1e6, 0.3)
+        solid(base, region, slope, 2, rock, 0.5)
+        fix(g, body_force, all, 0, -1)
+        """,
+        command="check",
+    )
+    assert "volume, and mass" not in result.err

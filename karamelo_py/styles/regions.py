@@ -222,6 +222,10 @@ class Plane(Primitive):
         {2: ("x", "y", "nx", "ny"), 3: ("x", "y", "z", "nx", "ny", "nz")},
     )
 
+    @property
+    def volume(self) -> None:
+        """A half-space has no volume; the domain cuts it anywhere."""
+
     def __init__(self, hub: Hub, *plane: Argument):
         given, exterior = region.split_exterior(plane)
         d = require_domain(hub).dimension
