@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 from going_on import same_files
+from test_contact_points import bodies
 
 # A block of clay between smooth plates: the limit load is 2 c times its width.
 BLOCK = """
@@ -142,3 +143,13 @@ def test_factor_of_safety(run_script, F, stands):
     assert (log.Time[-1] == 15) == stands
     if stands:
         assert np.diff(log.sunk)[-1] < 0.01 * (log.sunk[-1] - log.sunk[5])
+
+
+def test_contact_of_hertz_follows_the_moduli(run_interpreted):
+    """1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2 (Hertz 1882) with the moduli of each run."""
+    steps = "set_dt(1e-6)", "run(1)", "modify(material, m, E=1e3)", "run(1)"
+    lines = "log_modify(custom, step, c_x)", "set_output(1)", *steps
+    log = run_interpreted(bodies(-0.01, "contact/hertz, a, b", *lines, d=2, n=2, v=0)).log
+    force = dict(zip(log.Step, log.c_x, strict=True))
+    assert force[1] < 0
+    assert force[2] == pytest.approx(10 * force[1], rel=1e-6)  # the bodies are at rest

@@ -266,7 +266,7 @@ CLOCK = np.dtype(
         ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.clock
         ("heat_factor", np.float64),  # fraction of the stable step of conduction
         ("end_time", np.float64),
-        ("last_dt", np.float64),  # the last step; the present one at the start
+        ("last_dt", np.float64),  # the last step; 0 at the start and after load steps
         ("kick", np.float64),  # time that forces act: between the middles of the two steps
         ("first_kick", np.float64),  # kick of the first step, in steps
         ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock

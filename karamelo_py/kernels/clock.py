@@ -23,11 +23,12 @@ def step_size(s: Setup) -> Number:
 def last_step_size(s: Setup) -> Number:
     """Return dt of the previous step, for the velocity at the start of this one.
 
-    Before the first step there is none: the initial state already includes its strain. A very small
-    value is used, since strain rates are needed.
+    Before the first step, and after load steps, there is none: the state already includes its
+    strain. A very small value is used, since strain rates are needed.
     """
-    share = NEXT_TO_NOTHING if s.control.values[TIMESTEP] == 0 else 1.0
-    return real(share * s.control.clock[0].last_dt, s.nodes.sums[0, MASS])
+    last = s.control.clock[0].last_dt
+    least = NEXT_TO_NOTHING * s.control.values[DT]
+    return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
 
 def kick(s: Setup) -> Number:
@@ -66,7 +67,8 @@ def choose_dt(control: Control) -> None:
     The last two steps are shortened equally. If velocities are mapped or prescribed, impulses do
     not vanish with the step: in a very short last step, forces (impulses over dt) would be many
     times larger than before. Contact with a stiffness of m/dt^2 uses a whole step: loaded springs
-    that suddenly became stiffer would throw bodies back.
+    that suddenly became stiffer would throw bodies back. Load steps have no such springs, and no
+    velocities between steps: the first step after them begins anew, as in a new scene.
     """
     clock = control.clock[0]
     if clock.weight > 1:
@@ -89,13 +91,12 @@ def choose_dt(control: Control) -> None:
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
         dt = 0.5 * remaining
     control.values[DT] = dt
-    if control.values[TIMESTEP] == 0:
-        clock.last_dt = dt
-        clock.last_contact_dt = whole
-    clock.kick = 0.5 * (clock.last_dt + dt)
-    clock.contact_dt = max(whole, clock.last_contact_dt - FOLLOWING * dt)
-    clock.contact_kick = 0.5 * (clock.last_contact_dt + clock.contact_dt)
-    if control.values[TIMESTEP] == 0:
+    anew = clock.last_dt == 0
+    last, last_contact = (dt, whole) if anew else (clock.last_dt, clock.last_contact_dt)
+    clock.kick = 0.5 * (last + dt)
+    clock.contact_dt = max(whole, last_contact - FOLLOWING * dt)
+    clock.contact_kick = 0.5 * (last_contact + clock.contact_dt)
+    if anew:
         clock.kick *= clock.first_kick
         clock.contact_kick *= clock.first_kick
     if clock.kept_by_time > 0:

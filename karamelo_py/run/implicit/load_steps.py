@@ -222,6 +222,7 @@ class LoadSteps:
             control.values[TIME] = time
         found.inertia.end(found.u)
         finish(control)
+        control.clock[0].last_dt = 0.0  # an explicit step begins anew after load steps
         return found.iterations, found.residual
 
     def _conduct(self, hooks: Any, dt: float) -> None:

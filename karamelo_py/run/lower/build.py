@@ -58,7 +58,7 @@ class State(NamedTuple):
     grids: NamedTuple
     node_fields: dict[type, np.ndarray]  # the same of the nodes of these grids, (nodes, components)
     contact: NamedTuple  # how solids touch, with what it remembers
-    last_dt: float  # the step that the velocities belong to the middle of
+    last_dt: float  # the step that the velocities belong to the middle of, or 0
     last_contact_dt: float
     path: float  # how far points have gone
 

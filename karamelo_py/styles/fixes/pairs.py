@@ -39,11 +39,9 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 class PairContact(Fix):
     """Base of fixes for contact between the points of two solids.
 
-    With several processes, the first one searches for pairs among all points that may touch. The
-    `law` is the tag of :mod:`karamelo_py.points.bodies` for the force between two points.
+    With several processes, the first one searches for pairs among all points that may touch.
     """
 
-    law: NamedTuple
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = True
@@ -71,6 +69,13 @@ class PairContact(Fix):
         ranges = [(solid.first_id, solid.first_id + solid.count) for solid in self.solids]
         self._ranges = (*ranges[0], *ranges[1])
         self._reach = max(solid.h for solid in self.solids)
+
+    def law(self) -> NamedTuple:
+        """Return the tag of :mod:`karamelo_py.points.bodies` for the force between two points.
+
+        It is asked for in each step: constants of materials may change between runs.
+        """
+        raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
         """Find the touching pairs and apply their forces."""
@@ -146,7 +151,7 @@ class PairContact(Fix):
         x, v, grip = map(np.ascontiguousarray, np.split(of_all[:, 3:], [d, 2 * d], axis=1))
         bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), grip, n - int(second.sum()))
         times, cells = (step, dt, kick), pairs.cells_for(n)
-        pairs.push_apart(self.law, kin, bodies, cells, self._reach, *times, total)
+        pairs.push_apart(self.law(), kin, bodies, cells, self._reach, *times, total)
         force = np.empty((n, d + grip.shape[1]))
         force[order] = np.concatenate([bodies.force, bodies.grip], axis=1)
         ends = np.cumsum([len(one) for one in found])[:-1]
@@ -213,9 +218,9 @@ class ContactMinimizePenetration(PairContact):
         mu: Annotated[float, NonNegative] | None = None,
     ):
         super().__init__(hub, solid1, solid2)
-        self.law = MinimizePenetration(float(mu or 0.0))
-        judge_friction(hub, self.law.friction)
-        if self.law.friction > 0:
+        self.mu = float(mu or 0.0)
+        judge_friction(hub, self.mu)
+        if self.mu > 0:
             self.grip = grip_for(hub, Grip)
             self.point_fields = (*self.point_fields, self.grip)
         if mu is not None and hub.domain.dimension > 1:
@@ -227,6 +232,9 @@ class ContactMinimizePenetration(PairContact):
                 "and fix contact/surface where one of the two is rigid; leave mu out where "
                 "nothing slides",
             )
+
+    def law(self) -> MinimizePenetration:
+        return MinimizePenetration(self.mu)
 
 
 def plane_modulus(solid: Solid, argument: str) -> float:
@@ -277,8 +285,11 @@ class ContactHertz(PairContact):
                 "the force of Hertz is one of balls, and axisymmetric points are rings",
                 expected="fix contact/minimize_penetration, or a scene in 3D",
             )
-        moduli = (plane_modulus(solid1, "solid1"), plane_modulus(solid2, "solid2"))
-        self.law = Hertz(1 / sum(1 / modulus for modulus in moduli))
+        self.law()  # refuses materials without moduli
+
+    def law(self) -> Hertz:
+        named = zip(self.solids, ("solid1", "solid2"), strict=True)
+        return Hertz(1 / sum(1 / plane_modulus(*one) for one in named))
 
 
 class ContactFriction(Fix):
