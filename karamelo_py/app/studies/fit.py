@@ -80,7 +80,7 @@ class Observation:
         return (found - self.wanted) / (abs(self.wanted).max() or 1.0)
 
 
-class NoSlope(ScriptError):
+class NoDerivatives(ScriptError):
     """No derivative: runs on both sides failed."""
 
 
@@ -138,7 +138,7 @@ class Search:
     def slopes(self, share: np.ndarray, both: bool = False) -> np.ndarray:
         """Derivatives (n, variables) by differences: towards the middle, or over `both` sides.
 
-        NoSlope where the runs on both sides fail.
+        NoDerivatives where the runs on both sides fail.
         """
         moves = np.diag(np.where(share < 0.5, STEP, -STEP))
         first, *ahead = self.differences(share, *(share + moves))
@@ -151,7 +151,7 @@ class Search:
             done = sorted((at[k], tuple(off)) for at, off in points if np.isfinite(off).all())
             (low, below), (high, above) = done[0], done[-1]
             if low == high:
-                raise NoSlope(*list(self.failed.values())[-1].args)
+                raise NoDerivatives(*list(self.failed.values())[-1].args)
             columns.append((np.array(above) - below) / (high - low))
         return np.column_stack(columns)
 
@@ -166,7 +166,7 @@ class Search:
                 lambda share: self.differences(share)[0], start, jac=self.slopes,
                 bounds=(0, 1), max_nfev=most, ftol=ENOUGH, xtol=ENOUGH,
             )  # fmt: skip
-        except NoSlope:
+        except NoDerivatives:
             return None
         return End(found.x, found.fun, found.jac)
 
