@@ -69,6 +69,15 @@ def forget(array: np.ndarray) -> None:
     _arrays.pop(id(array), None)
 
 
+class Address(int):
+    """Address at which kernels call a Python function; the function lives as long as this number.
+
+    A tuple of arguments that has it can outlive whoever made it: its call is never to freed memory.
+    """
+
+    callback: Any
+
+
 class Plan(NamedTuple):
     """Describe how the words for arguments of some types are written."""
 
@@ -105,6 +114,9 @@ class ArgumentBuffer:
                 arrays = True
             elif kind is float or kind is int or kind is bool:
                 kinds.append(kind)
+                own.append(item)
+            elif kind is Address:
+                kinds.append(int)
                 own.append(item)
             elif issubclass(kind, tuple):
                 inner, held = self._of(item)

@@ -15,12 +15,13 @@ import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
+from weakref import WeakValueDictionary
 
 from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import cache, choices, code, compile_lock, machine, trace
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for, reader
+from karamelo_py.compiler.argument_buffer import Address, ArgumentBuffer, plan_for, reader
 from karamelo_py.compiler.choices import Choice
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import Failure, failure_at, noting
@@ -293,10 +294,10 @@ def noinline(function: Callable) -> Callable:
 
 # --- functions that kernels call by their address, and do not contain -----------------------------
 
-_uncompiled: dict[int, Callable] = {}
+# Interpreted; an `Address` keeps the function.
+_interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
 _numbers = itertools.count()  # of these
 _addresses: dict[tuple[Callable, types.Type, int], int] = {}
-_keep_alive: list = []
 
 
 def address_of(function: Callable, signature: types.Type) -> int:
@@ -314,19 +315,22 @@ def address_of(function: Callable, signature: types.Type) -> int:
     return _addresses[key]
 
 
-def address_of_python(function: Callable, signature: types.Type) -> int:
+def address_of_python(function: Callable, signature: types.Type) -> Address:
     """Give the address by which kernels call a function of Python, of whole numbers.
 
-    What is raised in it is raised again behind the kernel.
+    What is raised in it is raised again behind the kernel. Keep the `Address`, rather than an int
+    made of it, as long as kernels may call it.
     """
     if choices.INTERPRETED:
-        number = next(_numbers)
-        _uncompiled[number] = function
-        return number
-    count = len(signature.args) + 1  # the last one is for what it raises
-    made = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
-    _keep_alive.append(made)
-    return ctypes.cast(made, ctypes.c_void_p).value
+        callback: Any = functools.partial(function)  # a bound method would be gone at once
+        address = Address(next(_numbers))
+        _interpreted[int(address)] = callback
+    else:
+        count = len(signature.args) + 1  # the last one is for what it raises
+        callback = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
+        address = Address(ctypes.cast(callback, ctypes.c_void_p).value or 0)
+    address.callback = callback
+    return address
 
 
 def caller_of(signature: Any) -> Callable:
@@ -334,7 +338,7 @@ def caller_of(signature: Any) -> Callable:
     result, parameters = signature.return_type, signature.args
 
     if choices.INTERPRETED:
-        return lambda address, *arguments: _uncompiled[address](*arguments)
+        return lambda address, *arguments: _interpreted[address](*arguments)
 
     @intrinsic
     def by_address(address, *arguments):

@@ -1,6 +1,7 @@
 """Memory of fixes for the points held by friction: see `points.bodies.rub`."""
 
 from karamelo_py.compiler.fields import Field
+from karamelo_py.compiler.trace import one_at_a_time
 from karamelo_py.scene.hub import Hub
 
 
@@ -23,6 +24,7 @@ def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
     while globals().get(f"{kind.__name__}{k}") in taken:
         k += 1
     name = f"{kind.__name__}{k}"
-    if name not in globals():  # for cached kernels to find it
-        globals()[name] = type(name, (kind,), {"__module__": __name__})
-    return globals()[name]
+    with one_at_a_time:
+        if name not in globals():  # for cached kernels to find it
+            globals()[name] = type(name, (kind,), {"__module__": __name__})
+        return globals()[name]
