@@ -25,6 +25,7 @@ from karamelo_py.styles.fixes.grip import Grip, grip_for
 
 pytestmark = pytest.mark.xdist_group("surface")
 INDENT = "fix(dent, indent/minimize_penetration, all, sphere, 0.1, 0.45, 0.55, 0, 0, 0, 0, 0.2)"
+PRESSURE = "fix(p, edge_pressure, all, box, 5*time)"
 
 
 def touched(name="touch", bottom=0.0, top=0.3):
@@ -34,6 +35,7 @@ def touched(name="touch", bottom=0.0, top=0.3):
         f"region(base, block, 0, 1.2, {bottom}, {top})",
         f"fix({name}, contact/surface, all, base, 0.2)",
         INDENT,
+        PRESSURE,
         law="soft",
     )
 
@@ -41,10 +43,10 @@ def touched(name="touch", bottom=0.0, top=0.3):
 NO_FIXES = SimpleNamespace(fixes={})
 PLANE = "fix(p, contact/minimize_penetration/plane, body, 0.32, 0, 0, 1, 0, 0, 0.3)"
 SCENES = {
-    "contact/surface, and indent": touched(),
+    "contact/surface, indent and edge_pressure": touched(),
     "indent": block(2, INDENT),
     "plane": block(2, PLANE),
-    "edge_pressure": block(2, "fix(p, edge_pressure, all, box, 5*time)"),
+    "edge_pressure": block(2, PRESSURE),
     "edge_convection": slab("fix(wind, edge_convection, all, slab, 0.02, 200)", run=""),
     "body_force": block(2, "fix(g, body_force, all, 0, -1)"),
 }
