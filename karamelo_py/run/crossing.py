@@ -6,6 +6,7 @@ pressure falls by 10 to 35 % in each cell that stressed material moves through, 
 strain. GIMP and splines lose 0 to 0.3 %.
 """
 
+from collections.abc import Sequence
 from math import exp
 from typing import Any, NamedTuple
 
@@ -70,50 +71,70 @@ def _stressed(scene: Any) -> Any:
 
 
 def _struck(scene: Any) -> Any:
-    """Yield speed and duration of the material between two colliding solids while it is stressed.
+    """Yield speed and duration of stressed material for each solid that meets others, at most.
 
     From acoustic impedances (z = rho c) it moves at (z1 v1 + z2 v2)/(z1 + z2), until waves have
     gone through the thinner solid and returned.
     """
     solids = list(scene.hub.solids.values())
     bodies = [one for one in scene.motions if _is_solid(solids[one.number].material.law)]
-    z, c = {}, {}
-    for one in bodies:
-        solid = solids[one.number]
-        c[one.number] = timestep.elastic_speed(scene.simulation, solid)[0]
-        z[one.number] = c[one.number] / float(specific_volume(solid.material.law))
-    for a in bodies:
-        for b in bodies:
-            for k in range(scene.d):
-                begins = meeting(a, b, k, solids[a.number].h)
-                whole = z[a.number] + z[b.number]
-                if not (begins < scene.duration and whole > 0):
-                    continue
-                v = z[a.number] * a.velocity[k] + z[b.number] * b.velocity[k]
-                through = min(2 * _side(one, k, solids) / c[one.number] for one in (a, b))
-                yield abs(v) / whole, min(scene.duration - begins, through)
+    if not bodies:
+        return
+    laws = [solids[one.number].material.law for one in bodies]
+    c = np.array([timestep.elastic_speed(scene.simulation, solids[o.number])[0] for o in bodies])
+    z = c / np.array([float(specific_volume(law)) for law in laws])
+    boxes, sides = boxes_of(bodies), np.array([_sides(one, solids[one.number]) for one in bodies])
+    for a, one in enumerate(bodies):
+        begins = meetings(one, boxes, solids[one.number].h)
+        b, k = np.nonzero((begins < scene.duration) & (z[a] + z > 0)[:, None])
+        if not len(b):
+            continue
+        v = z[a] * one.velocity[k] + z[b] * boxes.velocity[b, k]
+        through = np.minimum(2 * sides[a, k] / c[a], 2 * sides[b, k] / c[b])
+        speeds = np.abs(v) / (z[a] + z[b])
+        lasting = np.minimum(scene.duration - begins[b, k], through)
+        longest = np.lexsort((speeds, speeds * lasting))[-1]
+        yield float(speeds[longest]), float(lasting[longest])
 
 
 def _is_solid(law: Any) -> bool:
     return not can(law, constrained_velocity)
 
 
-def _side(one: BodyMotion, k: int, solids: list) -> float:
-    """Return the length of a body in direction k: points lie inside it."""
-    return float(one.high[k] - one.low[k]) + 2 * float(solids[one.number].half_size[:, k].max())
+def _sides(one: BodyMotion, solid: Any) -> np.ndarray:
+    """Return the lengths (d,) of a body: points lie inside it."""
+    d = len(one.centre)
+    return one.high - one.low + 2 * solid.half_size[:, :d].max(axis=0)
 
 
-def meeting(a: BodyMotion, b: BodyMotion, k: int, h: float) -> float:
-    """Return when body a meets body b ahead of it in direction k; infinite if never."""
-    faster, gap = a.velocity[k] - b.velocity[k], b.low[k] - a.high[k] - h
-    if not faster > 0 or b.centre[k] <= a.centre[k]:
-        return np.inf
-    time = max(gap, 0.0) / faster
+class Boxes(NamedTuple):
+    """The boxes around n bodies, and their motion, arrays (n, d)."""
+
+    centre: np.ndarray
+    velocity: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def boxes_of(bodies: Sequence[BodyMotion]) -> Boxes:
+    return Boxes(*(np.array([getattr(one, name) for one in bodies]) for name in Boxes._fields))
+
+
+def meetings(one: BodyMotion, boxes: Boxes, h: float) -> np.ndarray:
+    """Return when a body meets each of the boxes ahead of it, (n, d): infinite if never."""
+    faster, gap = one.velocity - boxes.velocity, boxes.low - one.high - h
+    ahead = (faster > 0) & (boxes.centre > one.centre)
+    times = np.full(ahead.shape, np.inf)
+    n, k = np.nonzero(ahead)
+    time = np.maximum(gap[n, k], 0.0) / faster[n, k]
+    own_way, way = time[:, None] * one.velocity, time[:, None] * boxes.velocity[n]
     apart = np.maximum(
-        b.low + time * b.velocity - a.high - time * a.velocity,
-        a.low + time * a.velocity - b.high - time * b.velocity,
+        boxes.low[n] + way - one.high - own_way, one.low + own_way - boxes.high[n] - way
     )
-    return np.inf if (np.delete(apart, k) > 0).any() else time
+    apart[np.arange(len(n)), k] = 0
+    meets = ~(apart > 0).any(axis=1)
+    times[n[meets], k[meets]] = time[meets]
+    return times
 
 
 def measured(scene: Any) -> Crossing:

@@ -4,7 +4,6 @@ A node at which nearly all mass is light may feel a heavy point, whose stiffness
 for the node, the step is too long by sqrt(rho_heavy / rho_light).
 """
 
-from math import inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from karamelo_py.points.laws import specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion, rings
-from karamelo_py.run.crossing import meeting
+from karamelo_py.run.crossing import Boxes, boxes_of, meetings
 
 # c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two blocks that vibrate, with usl and
 # a linear basis, 1 to 3 points per cell: 3.2 and 5.9 break within 3000 steps, 1.9 does not.
@@ -41,24 +40,32 @@ def expected(scene: Any) -> Uneven:
     if not (scene.moves and scene.linear and scene.waves > 0 and lasting):
         return most
     solids = list(scene.hub.solids.values())
-    for a in scene.motions:
-        for b in scene.motions:
-            heavy, light = solids[a.number], solids[b.number]
-            lattices = {scene.method.lattice_of(scene.hub, solid) for solid in (heavy, light)}
-            laws = heavy.material.law, light.material.law
-            if a is b or len(lattices) > 1 or not all(map(rings, laws)):
-                continue
-            ratio = float(specific_volume(laws[1]) / specific_volume(laws[0]))
-            c = timestep.elastic_speed(simulation, heavy)[0]
-            courant = c * simulation.dt / heavy.h * sqrt(max(ratio, 1.0))
-            if ratio > 1 and courant > max(BREAKS, most.courant) and _touch(scene, a, b, heavy.h):
-                most = Uneven(heavy.id, light.id, ratio, courant)
+    bodies = [one for one in scene.motions if rings(solids[one.number].material.law)]
+    if not bodies:
+        return most
+    own = [solids[one.number] for one in bodies]
+    lattices = np.array([scene.method.lattice_of(scene.hub, solid) for solid in own])
+    volumes = np.array([float(specific_volume(solid.material.law)) for solid in own])
+    boxes = boxes_of(bodies)
+    for a, (one, heavy) in enumerate(zip(bodies, own, strict=True)):
+        ratio = np.where(lattices == lattices[a], volumes / volumes[a], 0.0)
+        if not ratio.max() > 1:
+            continue
+        c = timestep.elastic_speed(simulation, heavy)[0]
+        courant = c * simulation.dt / heavy.h * np.sqrt(np.maximum(ratio, 1.0))
+        near = np.flatnonzero((ratio > 1) & (courant > max(BREAKS, most.courant)))
+        near = near[_touch(scene, one, Boxes(*(of[near] for of in boxes)), heavy.h)]
+        if len(near):
+            b = near[courant[near].argmax()]
+            most = Uneven(heavy.id, own[b].id, float(ratio[b]), float(courant[b]))
     return most
 
 
-def _touch(scene: Any, a: BodyMotion, b: BodyMotion, h: float) -> bool:
-    """Tell whether bodies lie within a cell of each other, or meet before the run ends."""
-    if (np.maximum(a.low - b.high, b.low - a.high) < h).all():
-        return True
-    meets = (meeting(*pair, k, h) for pair in ((a, b), (b, a)) for k in range(scene.d))
-    return min(meets, default=inf) < scene.duration
+def _touch(scene: Any, one: BodyMotion, boxes: Boxes, h: float) -> np.ndarray:
+    """Return which bodies lie within a cell of one, or meet it before the run ends, (n,)."""
+    touching = (np.maximum(one.low - boxes.high, boxes.low - one.high) < h).all(axis=1)
+    # Reflected, what is behind lies ahead.
+    behind = one._replace(centre=-one.centre, velocity=-one.velocity, low=-one.high, high=-one.low)
+    others = Boxes(-boxes.centre, -boxes.velocity, -boxes.high, -boxes.low)
+    first = np.minimum(meetings(one, boxes, h), meetings(behind, others, h)).min(axis=1)
+    return touching | (first < scene.duration)
