@@ -1,6 +1,5 @@
 """Thin bodies, and bodies that begin next to each other, as rules judge them before a run."""
 
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -44,14 +43,21 @@ def parting(scene: Any) -> dict[str, Any] | None:
     free = [
         m for m in scene.motions if not can(solids[m.number].material.law, constrained_velocity)
     ]
-    for a, b in combinations(free, 2):
-        one, two = solids[a.number], solids[b.number]
-        gaps = np.maximum(two.lo - one.hi, one.lo - two.hi)
-        axis = int(np.argmax(gaps))
-        beside = np.delete(gaps + 0.5 * np.minimum(one.hi - one.lo, two.hi - two.lo), axis)
-        apart = (b.velocity - a.velocity)[axis] * np.sign(b.centre[axis] - a.centre[axis])
-        near = -1e-6 * h < gaps[axis] < (1 - 1e-6) * h and (beside <= 0).all()
-        if near and apart > 1e-6 * scene.waves:
-            cells = max(float(gaps[axis]) / h, 0.0)
-            return {"one": one.id, "two": two.id, "cells": cells, "speed": apart}
+    lo, hi = (np.array([getattr(solids[m.number], end) for m in free]) for end in ("lo", "hi"))
+    for a, body in enumerate(free[:-1]):
+        ahead = slice(a + 1, None)
+        gaps = np.maximum(lo[ahead] - hi[a], lo[a] - hi[ahead])
+        axes = gaps.argmax(axis=1)
+        across = gaps + 0.5 * np.minimum(hi[a] - lo[a], hi[ahead] - lo[ahead])
+        rows = np.arange(len(gaps))
+        across[rows, axes], widest = -np.inf, gaps[rows, axes]
+        near = (-1e-6 * h < widest) & (widest < (1 - 1e-6) * h) & (across <= 0).all(axis=1)
+        for k in np.flatnonzero(near):
+            other, axis = free[a + 1 + k], axes[k]
+            apart = other.velocity - body.velocity
+            speed = apart[axis] * np.sign(other.centre[axis] - body.centre[axis])
+            if speed > 1e-6 * scene.waves:
+                one, two = solids[body.number].id, solids[other.number].id
+                cells = max(float(widest[k]) / h, 0.0)
+                return {"one": one, "two": two, "cells": cells, "speed": speed}
     return None
