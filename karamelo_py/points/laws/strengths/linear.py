@@ -101,11 +101,6 @@ def _slows(strength, scene):
     }  # fmt: skip
 
 
-def _beside_walls(strength, scene):
-    flip = scene.kept > 0.999 and scene.moving_walls and _viscosity(strength, scene) > 0
-    return flip and {"place": scene.method.place}
-
-
 def _reaches(strength, scene):
     splines = not scene.hats and scene.basis.nodes_per_cell == 1
     moved = splines and scene.moving_walls and _viscosity(strength, scene) > 0
@@ -120,15 +115,6 @@ known_failure(
     reason="{scene.transfer_name} takes {pic:.2g} of velocities from the grid in each step, which "
     "is a kinematic viscosity of {added:.2g}: {more:.0f} % of that of the fluid, {nu:.2g}, comes "
     "on top of it",
-    cure=FOR_FLUIDS,
-)
-known_failure(
-    Viscous,
-    "velocities beside moving walls",
-    when=_beside_walls,
-    reason="a rigid solid moves next to a viscous fluid, and points that keep all of "
-    "their velocities ({scene.transfer_name} {scene.kept:g}) never take its speed: the force "
-    "between plates is right, velocities are wrong by 14 to 27 % of that of the plate",
     cure=FOR_FLUIDS,
 )
 known_failure(
