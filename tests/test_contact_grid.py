@@ -397,7 +397,7 @@ def test_solids_that_bring_no_nodes_to_a_group(run_interpreted):
     script = bars(0, method="tlmpm").replace("solid(a,", early)
     err = run_interpreted(script + "\nlog_modify(custom, step)\nrun(1)\nrun(1)").err
     assert err.count("group 'n' holds no nodes") == 1
-    assert "hint: nodes belong to the solids here: fix contact/surface makes walls" in err
+    assert "fix: nodes belong to the solids here: fix contact/surface makes walls" in err
 
 
 def test_glued_solids_share_a_field(run_interpreted):
