@@ -107,7 +107,7 @@ def _sides(one: BodyMotion, solid: Any) -> np.ndarray:
     return one.high - one.low + 2 * solid.half_size[:, :d].max(axis=0)
 
 
-class Boxes(NamedTuple):
+class BodyBoxes(NamedTuple):
     """The boxes around n bodies, and their motion, arrays (n, d)."""
 
     centre: np.ndarray
@@ -116,11 +116,13 @@ class Boxes(NamedTuple):
     high: np.ndarray
 
 
-def boxes_of(bodies: Sequence[BodyMotion]) -> Boxes:
-    return Boxes(*(np.array([getattr(one, name) for one in bodies]) for name in Boxes._fields))
+def boxes_of(bodies: Sequence[BodyMotion]) -> BodyBoxes:
+    return BodyBoxes(
+        *(np.array([getattr(one, name) for one in bodies]) for name in BodyBoxes._fields)
+    )
 
 
-def meetings(one: BodyMotion, boxes: Boxes, h: float) -> np.ndarray:
+def meetings(one: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
     """Return when a body meets each of the boxes ahead of it, (n, d): infinite if never."""
     faster, gap = one.velocity - boxes.velocity, boxes.low - one.high - h
     ahead = (faster > 0) & (boxes.centre > one.centre)

@@ -11,7 +11,7 @@ import numpy as np
 from karamelo_py.points.laws import specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion, rings
-from karamelo_py.run.crossing import Boxes, boxes_of, meetings
+from karamelo_py.run.crossing import BodyBoxes, boxes_of, meetings
 
 # c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two blocks that vibrate, with usl and
 # a linear basis, 1 to 3 points per cell: 3.2 and 5.9 break within 3000 steps, 1.9 does not.
@@ -54,18 +54,18 @@ def expected(scene: Any) -> Uneven:
         c = timestep.elastic_speed(simulation, heavy)[0]
         courant = c * simulation.dt / heavy.h * np.sqrt(np.maximum(ratio, 1.0))
         near = np.flatnonzero((ratio > 1) & (courant > max(BREAKS, most.courant)))
-        near = near[_touch(scene, one, Boxes(*(of[near] for of in boxes)), heavy.h)]
+        near = near[_touch(scene, one, BodyBoxes(*(of[near] for of in boxes)), heavy.h)]
         if len(near):
             b = near[courant[near].argmax()]
             most = Uneven(heavy.id, own[b].id, float(ratio[b]), float(courant[b]))
     return most
 
 
-def _touch(scene: Any, one: BodyMotion, boxes: Boxes, h: float) -> np.ndarray:
+def _touch(scene: Any, one: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
     """Return which bodies lie within a cell of one, or meet it before the run ends, (n,)."""
     touching = (np.maximum(one.low - boxes.high, boxes.low - one.high) < h).all(axis=1)
     # Reflected, what is behind lies ahead.
     behind = one._replace(centre=-one.centre, velocity=-one.velocity, low=-one.high, high=-one.low)
-    others = Boxes(-boxes.centre, -boxes.velocity, -boxes.high, -boxes.low)
+    others = BodyBoxes(-boxes.centre, -boxes.velocity, -boxes.high, -boxes.low)
     first = np.minimum(meetings(one, boxes, h), meetings(behind, others, h)).min(axis=1)
     return touching | (first < scene.duration)
