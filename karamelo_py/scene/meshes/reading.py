@@ -218,6 +218,8 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
 
 def _reason(error: BaseException) -> str:
     """Word an exception in one line; where no format fits, meshio says so only in passing."""
-    if isinstance(error, SystemExit) or not str(error).strip():
+    said = str(error).strip()
+    foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
+    if isinstance(error, SystemExit) or foreign or not said:
         return "its content does not fit its ending"
     return f"{' '.join(str(error).split())} ({type(error).__name__})"
