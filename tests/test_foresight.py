@@ -831,7 +831,7 @@ def test_usl_next_to_a_much_lighter_solid_is_told(run_interpreted, told, numbers
     assert ("warning: light next to heavy: " in said) == told
     if not numbers:
         assert "solid 'heavy' is 100 times as dense as solid 'light'" in said
-        assert "hint: dt_factor(0.29)" in said
+        assert "fix: dt_factor(0.29)" in said
 
 
 @pytest.mark.full

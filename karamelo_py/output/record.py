@@ -65,12 +65,13 @@ class RunRecord:
 
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
         """Note which script this is, and the values that its variables were given."""
-        content = b""
+        of_content = None
         with suppress(OSError):
-            content = Path(file).read_bytes()
+            if Path(file).is_file():  # a pipe can be read once
+                of_content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.content["script"] = {
             "file": str(file),
-            "sha256": hashlib.sha256(content).hexdigest(),
+            "sha256": of_content,
             "variables": dict(variables),
         }
 
