@@ -49,6 +49,7 @@ def fitted(out):
     return {name: (float(value), float(half)) for name, value, half in cells if half != "–"}
 
 
+@pytest.mark.full
 def test_a_line_is_that_of_linear_regression(folder, capsys):
     """Value and range of 95 % by the normal equations; t(0.975, 19) = 2.0930 (any table)."""
     words = ["-var", "speed=1,5", "-var", "begin=1,3", "-var", "N=2", "-jobs", "1"]
@@ -70,6 +71,7 @@ def test_a_line_is_that_of_linear_regression(folder, capsys):
     assert list(pandas.read_csv("fit.csv").status) == ["done"] * len(pandas.read_csv("fit.csv"))
 
 
+@pytest.mark.full
 def test_numbers_are_matched(folder, capsys):
     """The centre at the end is 1.5 + 0.4 speed; one number tells nothing of its range."""
     words = ["-var", "speed=1,5", "-jobs", "1", "-match", "max:c_x=2.62"]
@@ -77,6 +79,7 @@ def test_numbers_are_matched(folder, capsys):
     assert re.search(r"^speed +2\.8 +–", capsys.readouterr().out, re.M)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -119,6 +122,7 @@ def test_searches_that_disagree_give_no_range(folder, capsys):
     assert "Inertia makes curves rough" in out and "load slowly" in out
 
 
+@pytest.mark.full
 def test_a_failed_run_is_a_bad_trial(folder, capsys):
     """From the middle (21) and from 0.8 of the range (33) the block leaves the domain."""
     words = ["-var", "speed=1,41", "-jobs", "1", "-match", "max:c_x=2.7"]

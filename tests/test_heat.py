@@ -89,7 +89,7 @@ def test_step_of_conduction(run_interpreted):
     result = run_interpreted(slab("dt_factor(1)", run="run(1)"))
     assert result.log.dt[0] == pytest.approx(1 / 10**2 / 4)
     warned = run_interpreted(slab("set_dt(0.01)", run="run(1)"))
-    assert "above the stable" in warned.err + warned.out
+    assert "above the stability limit" in warned.err + warned.out
 
 
 def test_heat_flux(run_interpreted):

@@ -23,7 +23,6 @@ from karamelo_py.points.laws import (
     specific_volume,
     wave_speed_squared,
 )
-from karamelo_py.points.laws.elastic import ElasticLaw
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
@@ -139,7 +138,7 @@ def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -
 def _shear_share(law: Any, kin: Any) -> float:
     """Return the shear modulus over that of waves in the bulk; 1/2 is without a Poisson's ratio."""
     strength = getattr(law, "strength", None)
-    G = law.G if isinstance(law, ElasticLaw) else shear_modulus(strength) if strength else inf
+    G = getattr(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
     return min(float(G / stiffness), 0.5)
 
