@@ -28,7 +28,7 @@ def flight(d, transfer, scheme, law):
     In the plane and in space through 1.3, by which all points come over an edge of cells.
     """
     one_point = d == 3
-    courant = {"usl": USL.courant[one_point]}.get(scheme, 1)
+    courant = {"usl": USL.traits.courant[one_point]}.get(scheme, 1)
     formulas = ", ".join(f"{v}*time" for v in VELOCITY[:d])
     return block(
         d,

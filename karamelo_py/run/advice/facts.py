@@ -177,7 +177,8 @@ class SceneFacts:
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
         dt = self.simulation.limit if getattr(self.transfer, "per_time", False) else 0.0
-        return PIC * (1 - self.kept) * self.hub.domain.h**2 / (dt or self.simulation.dt)
+        dt = dt or self.simulation.dt
+        return PIC * (1 - self.kept) * self.hub.domain.h**2 / dt if dt > 0 else 0.0
 
     @cached_property
     def moving_walls(self) -> bool:

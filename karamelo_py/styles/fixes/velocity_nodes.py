@@ -161,6 +161,7 @@ class VelocityNodes(Fix):
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
+        drags = drags and len(group.nodes) < hub.fields.node_count  # all nodes are no wall
         hooks = HOOKS["moves" if drags else self.bound]
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
         # Contact may move held nodes only as far as they give way.
