@@ -67,6 +67,7 @@ def test_nothing_is_written_elsewhere(run_interpreted, tmp_path):
     new = {path.relative_to(tmp_path) for path in set(tmp_path.rglob("*")) - before}
     assert {str(path) for path in new} == {
         "run", "run/in.script", "run/results", "run/results/log.mpm", "run/results/r.h5",
+        "run/results/run.json",
     }  # fmt: skip
 
 

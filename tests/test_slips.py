@@ -161,7 +161,7 @@ def test_loads_in_other_units(run_interpreted, line):
     """No larger domain holds what they drive out of it."""
     said = run_interpreted(block(2, line, "run(1)"), status=1).err
     assert "cells in one step, out of the domain" in said and "larger" not in said
-    assert "look at loads, stresses and velocities, and at their units" in said
+    assert "check loads, stresses and velocities, and their units" in said
 
 
 def test_two_methods(run_interpreted):
