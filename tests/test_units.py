@@ -69,4 +69,4 @@ def test_no_step_mends_units_that_were_doubted(run_interpreted):
     result = run_interpreted(script.replace("run(1)", thrown), status=1)
     assert "warning: units of " in result.err
     error = result.err[result.err.index("error: ") :]
-    assert "look at the units of " in error and "use a smaller dt_factor" not in error
+    assert "check the units of " in error and "a smaller dt_factor" not in error

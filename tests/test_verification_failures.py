@@ -332,7 +332,7 @@ def test_usl_has_a_stable_step_of_its_own(run_interpreted, ppc):
     That is stable for w dt < sqrt(2), where the other schemes have 2. One point per cell: w^2 h^2
     is at most 4 (2 lambda + 2 mu) / rho in the plane, stable below 0.59 h/c at nu = 0.3.
     """
-    above = (0.9 if ppc == 2 else 0.75) / USL.courant[ppc == 1]
+    above = (0.9 if ppc == 2 else 0.75) / USL.traits.courant[ppc == 1]
     assert "energy balance: " in shaken(run_interpreted, "usl", ppc, above, status=1)
     assert shaken(run_interpreted, "musl", ppc, 0.99) < 1.5
 
@@ -360,7 +360,7 @@ def test_usl_is_stable_at_the_default_step(run_interpreted, method, ppc):
 
 
 REASONS = {
-    "step": ("cells in one step", "the step is too large"),
+    "step": ("cells in one step", "time step above the stability limit"),
     "fold": ("inside out (det F <= 0)", "finer grid"),
     "lost": ("leaves the domain", "boundary(delete)"),
     "nan": ("not a number", "formula"),
@@ -372,7 +372,7 @@ def test_what_cannot_go_well_is_stopped(run, what):
     """Within 60 steps of the start, with step, point, place, cause, remedy and the last state."""
     result = run("blow_up", what=what, status=1)
     message = result.err[result.err.index("error: ") :]
-    for words in ("step ", "time ", "point ", "of solid 'bar' at ", *REASONS[what]):
+    for words in ("step ", "t = ", "point ", "of solid 'bar' at ", *REASONS[what]):
         assert words in message.replace("leaves the domain at", "at leaves the domain"), words
     [good] = result.folder.glob("last_good.*.h5")
     assert good.name in message
