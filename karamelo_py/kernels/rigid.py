@@ -50,12 +50,14 @@ def _impose(kin, nodes, rigid, dt, control, n):
     mass = nodes.sums[n, MASS]
     for k in range(d):
         velocity = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
-        impulse = 0.0
+        impulse = change = 0.0
         if mass > 0:
             impulse = velocity - nodes.update[n, k]
+            # From what the points brought: a fix may have held the node, and left no change.
+            change = velocity - nodes.sums[n, of_momentum(kin) + k] / mass
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity
-        nodes.update[n, of_change(kin) + k] += impulse
+        nodes.update[n, of_change(kin) + k] = change
         if counts(control.ranks, n):
             add_to(control.totals, WORK, float(mass * impulse * velocity))
 
