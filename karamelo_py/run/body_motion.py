@@ -246,17 +246,28 @@ def lag_of(s: Any) -> Lag:
 
 def held(s: Any, one: BodyMotion) -> np.ndarray:
     """Return the directions (d,) in which fixes hold nodes at a body, which then cannot drift."""
-    found, lattices = np.zeros(s.d, np.bool_), s.hub.lattices
-    lattice = lattices[s.method.lattice_of(s.hub, list(s.hub.solids.values())[one.number])]
+    found = np.zeros(s.d, np.bool_)
+    for fix, x in _fixes_at(s, one, _lattice(s, one)):
+        if len(x):
+            found |= [formula is not None for formula in fix.formulas[: s.d]]
+    return found
+
+
+def _lattice(s: Any, one: BodyMotion) -> Any:
+    """Return the lattice that a body uses."""
+    solid = list(s.hub.solids.values())[one.number]
+    return s.hub.lattices[s.method.lattice_of(s.hub, solid)]
+
+
+def _fixes_at(s: Any, one: BodyMotion, lattice: Any) -> Iterator[tuple[Any, np.ndarray]]:
+    """Yield each fix that prescribes velocities, and positions (n, d) of its nodes at a body."""
     for fix in s.hub.fixes.values():
         if not fix.prescribes_velocity:
             continue
         nodes = fix.group.nodes
         own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
         x = lattice.positions(nodes[own])[:, : s.d]
-        near = ((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)
-        found |= near.any() & np.array([formula is not None for formula in fix.formulas[: s.d]])
-    return found
+        yield fix, x[((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)]
 
 
 def pressed_evenly(s: Any, one: BodyMotion) -> bool:
@@ -264,19 +275,12 @@ def pressed_evenly(s: Any, one: BodyMotion) -> bool:
 
     It then fills a box. Each plate holds all nodes of one side in the direction across it.
     """
-    lattices, solid = s.hub.lattices, list(s.hub.solids.values())[one.number]
-    lattice = lattices[s.method.lattice_of(s.hub, solid)]
+    lattice, solid = _lattice(s, one), list(s.hub.solids.values())[one.number]
     box = (one.high - one.low + 2 * np.max(solid.half_size, axis=0)).prod()
     if s.hub.domain.axisymmetric or np.sum(solid.volume0) < (1 - 1e-6) * box:
         return False
     sides = set()
-    for fix in s.hub.fixes.values():
-        if not fix.prescribes_velocity:
-            continue
-        nodes = fix.group.nodes
-        own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
-        x = lattice.positions(nodes[own])[:, : s.d]
-        x = x[((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)]
+    for fix, x in _fixes_at(s, one, lattice):
         held = [k for k, formula in enumerate(fix.formulas[: s.d]) if formula is not None]
         if not len(x):
             continue
