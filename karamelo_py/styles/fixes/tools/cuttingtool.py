@@ -72,14 +72,17 @@ class CuttingTool(ToolFix):
         normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
 
+    def _depths(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
+        """Return the depths (n, 2) of points below both faces, and the normals (2, 2)."""
+        normals, tip = self._faces()
+        return (tip - points.position.astype(float)) @ normals.T, normals
+
     def depth_of(self, points: PointTable) -> np.ndarray:
         """Return the present depth (n,) of points in the tool, below the nearer face."""
-        normals, tip = self._faces()
-        return ((tip - points.position.astype(float)) @ normals.T).min(axis=1)
+        return self._depths(points)[0].min(axis=1)
 
     def forces(self, points: PointsView) -> np.ndarray:
-        normals, tip = self._faces()
-        depths = (tip - points.position.astype(float)) @ normals.T
+        depths, normals = self._depths(points)
         nearer = depths.argmin(axis=1)
         depth = np.maximum(depths.min(axis=1), 0)
         return (self.now(self.K) * self.stiffness(points) * depth)[:, None] * normals[nearer]
