@@ -197,8 +197,24 @@ def test_files_of_gmsh_as_gmsh_reads_them(tmp_path):
     (tmp_path / "c.msh").write_text(zero)
     with pytest.raises(ScriptError, match="has the number 0"):
         volume(tmp_path / "c.msh", 2)
-    (tmp_path / "a.msh.opt").write_text('SystemCall "touch ran";\n')
+    (tmp_path / "a.msh.opt").write_text(f'SystemCall "touch {tmp_path}/ran";\n')
     assert volume(tmp_path / "a.msh", 2) == 2
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize("ending", ["step", "brep"])
+def test_options_next_to_a_cad_file_run_nothing(ending, tmp_path):
+    gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / f"box.{ending}"))
+    finally:
+        gmsh.finalize()
+    (tmp_path / f"box.{ending}.opt").write_text(f'SystemCall "touch {tmp_path}/ran";\n')
+    assert volume(tmp_path / f"box.{ending}", 3) == pytest.approx(1, rel=1e-9)
     assert not (tmp_path / "ran").exists()
 
 

@@ -25,7 +25,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[Any]:
-    """Gmsh with the model in a file; models of the process that are open stay as they are."""
+    """Gmsh with the model in a file; open models of the process stay as they are."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -44,12 +44,27 @@ def _model(path: Path) -> Iterator[Any]:
             gmsh.finalize()
 
 
+@contextlib.contextmanager
+def alone(path: Path) -> Iterator[Path]:
+    """Yield a link to a file in an empty folder, or a copy.
+
+    Gmsh reads a file of options next to the file that it opens, and options may run programs.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        link = Path(folder) / path.name
+        try:
+            link.symlink_to(path)
+        except OSError:
+            shutil.copyfile(path, link)
+        yield link
+
+
 def _reason(error: BaseException, path: Path) -> str:
     return " ".join(str(error).split()).replace(str(path), path.name)
 
 
 def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh:
-    """Mesh the geometry in a file up to `dimension`, with edges up to `size` where it is given."""
+    """Mesh the geometry in a file up to `dimension`, with edges up to `size` if it is given."""
     try:
         with _model(path) as gmsh:
             if size:
@@ -86,20 +101,14 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 def read_by_gmsh(path: Path) -> Mesh:
     """The mesh in a file that Gmsh knows; its own complaint is raised as a ValueError."""
-    # Gmsh reads a file of options next to a mesh by itself, and options may run programs.
-    with tempfile.TemporaryDirectory() as folder:
-        alone = Path(folder) / path.name
+    with alone(path) as link:
         try:
-            alone.symlink_to(path)
-        except OSError:
-            shutil.copyfile(path, alone)
-        try:
-            with _model(alone) as gmsh:
+            with _model(link) as gmsh:
                 return _taken(gmsh, of_file=_Header(path))
         except NoGmsh:
             raise
         except Exception as error:
-            raise ValueError(_reason(error, alone)) from None
+            raise ValueError(_reason(error, link)) from None
 
 
 class _Header:

@@ -17,7 +17,7 @@ import numpy as np
 
 from karamelo_py.language.kinds import InputFile
 from karamelo_py.scene.meshes.abaqus import read_deck
-from karamelo_py.scene.meshes.by_gmsh import NoGmsh, mesh_geometry, read_by_gmsh
+from karamelo_py.scene.meshes.by_gmsh import NoGmsh, alone, mesh_geometry, read_by_gmsh
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.scene.meshes.obj import read_obj
@@ -68,9 +68,12 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
 
 @lru_cache(maxsize=2)
 def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int]) -> Mesh:
-    if path.suffix.lower() in (*GEOMETRIES, *CAD):
-        _refuse_what_is_no_cad(path)
+    if path.suffix.lower() in GEOMETRIES:  # it may include its neighbours
         mesh = mesh_geometry(path, dimension, size)
+    elif path.suffix.lower() in CAD:
+        _refuse_what_is_no_cad(path)
+        with alone(path) as link:
+            mesh = mesh_geometry(link, dimension, size)
     else:
         mesh = _by_content(path)
     if not len(mesh.points) or not sum(len(cells.nodes) for cells in mesh.cells):
