@@ -169,6 +169,7 @@ def load_path(
     duration
         Duration, by default 1, for rate-dependent laws. A segment with only a duration holds the
         point.
+
     Example
     -------
     load_path(pull, 100, exx=0.01, syy=0, szz=0)

@@ -251,6 +251,7 @@ def populate_cylindrical_coordinates(
         ID of the region. Points outside it are dropped.
     lattice
         In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: the centre, the outer radius, the number of rings,
+        the number of points in each ring, and the initial temperature. In 3D
         ``axis, c1, c2, R, lo, hi, Ndx, Ndr, Ndtheta, T0``: the word x, y or z, the centre in the
         other two directions (in the order x, y, z), the outer radius, the ends along the axis, the
         number of slices along it, and then as in 2D.

@@ -14,9 +14,8 @@ from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-_FAMILIES = {"Line": "line", "Triangle": "triangle", "Quadrilateral": "quad", "Point": "vertex",
-             "Tetrahedron": "tetra", "Hexahedron": "hexahedron", "Prism": "wedge",
-             "Pyramid": "pyramid"}  # fmt: skip
+# Names that differ from Gmsh's in more than a capital.
+_FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
 
 
 class NoGmsh(Exception):
@@ -119,13 +118,17 @@ class _Header:
     """
 
     def __init__(self, path: Path):
-        content = path.read_bytes()
-        names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", content[:1_000_000], re.S)
+        with path.open("rb") as file:
+            head = file.read(1_000_000)
+        names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", head, re.S)
         found = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
         self.names = {(int(dim), int(number)): name for dim, number, name in found}
         self.groups: dict[int, int] | None = None  # of elements, by their numbers
-        version = re.match(rb"\$MeshFormat\s+([12])\S* +0", content)
-        section = re.search(rb"\$ELM\s+\d+(.*?)\$END|\$Elements\s+\d+(.*?)\$End", content, re.S)
+        version = re.match(rb"\$MeshFormat\s+([12])\S* +0", head)
+        if not version and b"$NOD" not in head:
+            return
+        pattern = rb"\$ELM\s+\d+(.*?)\$END|\$Elements\s+\d+(.*?)\$End"
+        section = re.search(pattern, path.read_bytes(), re.S)
         if section and (section[1] or version):
             at = 2 if section[1] else 3  # number, type, [count of tags,] group
             rows = (line.split(None, at + 1) for line in (section[1] or section[2]).splitlines())

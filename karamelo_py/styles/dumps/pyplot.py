@@ -90,6 +90,7 @@ class PyPlot(Dump):
         true: a line around each solid, and around the regions, walls and rigid tools of fixes, such
         as contact/surface. In 3D tools are drawn by their edges and sections; hidden lines are
         light.
+
     Example
     -------
     dump(d3, all, pyplot, 100, picture.*.png, 500, 500, seq, vmin=0, vmax=2e5)

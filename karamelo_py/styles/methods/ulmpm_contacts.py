@@ -98,6 +98,7 @@ class ULMPMContacts(Method):
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
     for the material point method and application to stress propagation in granular material".
+
     See Also
     --------
     fix contact/friction, ulmpm
