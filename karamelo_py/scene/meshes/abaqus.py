@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
+from karamelo_py.scene.meshes.elements import SHAPES
 from karamelo_py.script.errors import ScriptError
 
 _MOST = 2**31  # bytes of a deck and of what it includes
@@ -38,10 +39,6 @@ _FAMILIES = {
     **{("flat", c): "triangle" for c in (3, 6)},
     **{("flat", c): "quad" for c in (4, 8, 9)},
     **{("line", c): "line" for c in (2, 3)},
-}
-_CORNERS = {
-    **{"line": 2, "triangle": 3, "quad": 4},
-    **{"tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8},
 }
 _TYPES = (
     ("solid", re.compile(r"(?:C|DC|AC|EC|PC|Q|F|DCC)?3D(\d+)\D?.*|SC([68])R\w*")),
@@ -230,6 +227,11 @@ def _kind(name: str) -> tuple[str, int] | None:
     return None
 
 
+def _into(sets: dict, name: str | None, what: np.ndarray | str) -> None:
+    if name:
+        sets.setdefault(name.upper(), []).append(what)
+
+
 class _Deck:
     def __init__(self, path: Path):
         self.path = path
@@ -241,7 +243,7 @@ class _Deck:
             reads = _READ.get(keyword.name)
             if keyword.name in _REFUSED:
                 raise _wrong(keyword, "is not read", "the nodes and elements written out")
-            if keyword.name in ("STEP",):
+            if keyword.name == "STEP":
                 break
             if reads:
                 reads(self, keyword)
@@ -264,9 +266,6 @@ class _Deck:
         )
         self.scope = part
 
-    def _end_instance(self, _: _Keyword) -> None:
-        self.scope = self.whole
-
     def _system(self, keyword: _Keyword) -> None:
         self.scope.system = _system(keyword)
 
@@ -278,15 +277,11 @@ class _Deck:
             raise _wrong(keyword, f"has the system '{kind}'", "R, C or S")
         numbers = table[:, 0].astype(np.int64)
         self._add_nodes(numbers, self.scope.system(known[kind](table[:, 1:])))
-        self._into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+        _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
         self.scope.numbers.append(numbers)
         self.scope.places.append(places)
-
-    def _into(self, sets: dict, name: str | None, what: np.ndarray | str) -> None:
-        if name:
-            sets.setdefault(name.upper(), []).append(what)
 
     def _ngen(self, keyword: _Keyword) -> None:
         if keyword.options.get("LINE", "").upper()[:1] in ("C", "P"):
@@ -296,20 +291,20 @@ class _Deck:
             ends = self._places(keyword, np.array([first, last]))
             part = (numbers - first) / max(last - first, 1)
             self._add_nodes(numbers, ends[0] + part[:, None] * (ends[1] - ends[0]))
-            self._into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+            _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _nfill(self, keyword: _Keyword) -> None:
         if {"BIAS", "SINGULAR"} & keyword.options.keys():
             raise _wrong(keyword, "with BIAS or SINGULAR is not read", "the nodes written out")
         for line in keyword.lines:
             low, high, count, step = (word.strip() for word in (line + ",,,").split(",")[:4])
-            a = self._numbers(keyword, self.scope.nodes, low)
-            b = self._numbers(keyword, self.scope.nodes, high)
+            a = self._numbers(self.scope.nodes, low)
+            b = self._numbers(self.scope.nodes, high)
             start, end = self._places(keyword, a), self._places(keyword, b)
             for k in range(1, int(count or 1)):
                 numbers = a + k * int(step or 1)
                 self._add_nodes(numbers, start + k / int(count) * (end - start))
-                self._into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+                _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _places(self, keyword: _Keyword, numbers: np.ndarray) -> np.ndarray:
         known, places = self.scope.table()
@@ -326,7 +321,7 @@ class _Deck:
             return
         table = _rows(keyword, kind[1] + 1)
         self.scope.elements.append(_Elements(name, table[:, 0], table[:, 1:]))
-        self._into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])
+        _into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])
 
     def _elgen(self, keyword: _Keyword) -> None:
         for row in _table(keyword, 2, 10).astype(np.int64):
@@ -342,7 +337,7 @@ class _Deck:
                     -1, nodes.shape[1]
                 )
             self.scope.elements.append(_Elements(type_, numbers[1:], nodes[1:]))
-            self._into(self.scope.groups, keyword.options.get("ELSET"), numbers)
+            _into(self.scope.groups, keyword.options.get("ELSET"), numbers)
 
     def _nset(self, keyword: _Keyword) -> None:
         self._set(keyword, self.scope.nodes, "NSET")
@@ -365,13 +360,13 @@ class _Deck:
             self.assembly.append((sets, name.upper(), instance, items))
             return
         for item in items:
-            self._into(sets, name, item)
+            _into(sets, name, item)
 
     def _surface(self, keyword: _Keyword) -> None:
         name = keyword.options.get("NAME", "").upper()
         if keyword.options.get("TYPE", "ELEMENT").upper() == "NODE":
             for line in keyword.lines:
-                self._into(self.scope.nodes, name, line.split(",")[0].strip().upper())
+                _into(self.scope.nodes, name, line.split(",")[0].strip().upper())
             return
         for line in keyword.lines:
             of, face = (word.strip().upper() for word in (line + ",").split(",")[:2])
@@ -379,7 +374,7 @@ class _Deck:
 
     # ---- sets by numbers ---------------------------------------------------------------------
 
-    def _numbers(self, keyword: _Keyword | None, sets: dict, name: str) -> np.ndarray:
+    def _numbers(self, sets: dict, name: str) -> np.ndarray:
         """The numbers (n,) in a set, or the one that is its name."""
         if name.lstrip("-").isdigit():
             return np.array([int(name)])
@@ -451,7 +446,7 @@ class _Deck:
             (body.part.groups, found.groups, found.numbers[body.name]),
         ):
             for name in sets:
-                at = _looked_up(numbered, self._numbers(None, sets, name))
+                at = _looked_up(numbered, self._numbers(sets, name))
                 for key in {name, f"{body.name}.{name}"} if body.name else {name}:
                     known.setdefault(key, []).append(at)
         self._add_surfaces(found, body)
@@ -471,7 +466,7 @@ class _Deck:
 
 _READ: dict[str, Callable[[_Deck, _Keyword], None]] = {
     "PART": _Deck._part, "END PART": _Deck._end_part, "INSTANCE": _Deck._instance,
-    "END INSTANCE": _Deck._end_instance, "SYSTEM": _Deck._system, "NODE": _Deck._node,
+    "END INSTANCE": _Deck._end_part, "SYSTEM": _Deck._system, "NODE": _Deck._node,
     "NGEN": _Deck._ngen, "NFILL": _Deck._nfill, "ELEMENT": _Deck._element,
     "ELGEN": _Deck._elgen, "NSET": _Deck._nset, "ELSET": _Deck._elset, "SURFACE": _Deck._surface,
 }  # fmt: skip
@@ -511,7 +506,7 @@ class _Found:
         cells, numbers = [], []
         for label, parts in self.blocks.items():
             family, count = _kind(label) or ("", 0)
-            name = family if count == _CORNERS[family] else f"{family}{count}"
+            name = family if count == len(SHAPES[family].corners) else f"{family}{count}"
             numbers.append(np.concatenate([n for n, _ in parts]))
             cells.append(
                 CellBlock(name, np.concatenate([nodes for _, nodes in parts]), label=label)
