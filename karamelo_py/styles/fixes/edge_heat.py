@@ -35,7 +35,7 @@ class EdgeHeat(OnEdge, HeatFix):
 
     def supply_heat(self, points: PointsView) -> None:
         """Give the points their heat, and publish the sum and the area."""
-        faces = self.faces_of(points.ids - 1)
+        faces = self.faces_at(points.ids - 1)
         x, known = faces.middle, self.hub.values
         heat = self.flows(points, faces, [f.evaluate_points(known, x, x) for f in self.formulas])
         points.heat_supply = points.heat_supply + heat

@@ -1,8 +1,9 @@
 """Fixes that load the edge of a region, through the faces of points there."""
 
 import itertools
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
                 area = area * middle[:, 0]
             ones = np.ones(len(rows), np.int64)
             found.append(Faces(ids[rows], axis * ones, sign * ones, area, middle))
-    return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+    return joined(found)
 
 
 class EdgePieces(NamedTuple):
@@ -69,6 +70,14 @@ class EdgePieces(NamedTuple):
     area: np.ndarray  # (m, d) times the outward normal
     length: np.ndarray  # (m,) area of a piece, with both sides of an edge
     middle: np.ndarray  # (m, d)
+
+
+Columns = TypeVar("Columns", Faces, EdgePieces)
+
+
+def joined(found: Sequence[Columns]) -> Columns:
+    """Join tables of faces, or of pieces, one after another."""
+    return type(found[0])(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
@@ -108,7 +117,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         kept = taker >= 0
         lengths = _lengths(region, x[kept], size / PARTS, area[kept])
         found.append(EdgePieces(ids[taker[kept]], area[kept], lengths, middle[kept]))
-    return EdgePieces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+    return joined(found)
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
@@ -150,7 +159,7 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
         radius = place[:, 0] if solid.domain.axisymmetric else 1.0
         signs, axes = np.sign(of_axis).astype(np.int64), np.full(len(some), axis)
         found.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * radius, place))
-    return Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+    return joined(found)
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
@@ -186,13 +195,13 @@ class OnEdge(Fix):
                     hint="the region that the solid fills: its points lie inside, at the edge",
                 )
 
-    def faces_of(self, ids: np.ndarray) -> Faces:
+    def faces_at(self, ids: np.ndarray) -> Faces:
         """Return the faces of the points in a view, by their rows there; results are cached."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
             known = faces._replace(point=before[faces.point])
-            found = Faces(*map(np.concatenate, zip(new, known, strict=True)))
+            found = joined([new, known])
             found = found.some(np.isin(found.point, ids))
             # Sum forces on a point in this order, whenever its faces were found.
             found = found.some(np.lexsort((found.sign, found.axis)))
@@ -222,11 +231,11 @@ class OnEdge(Fix):
             whole &= ~_of(solid, ids)
             found.append(faces.some(np.isin(faces.point, ids)))
         found.append(faces_on(self.hub, self.region, ids[whole]))
-        joined = Faces(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
-        loaded = joined.area > 0  # not the axis
+        faces = joined(found)
+        loaded = faces.area > 0  # not the axis
         if self.side is not None:
-            loaded &= 2 * joined.axis + (joined.sign > 0) == self.side
-        return joined.some(loaded)
+            loaded &= 2 * faces.axis + (faces.sign > 0) == self.side
+        return faces.some(loaded)
 
 
 class EdgeFix(OnEdge, PointForces):
@@ -241,7 +250,7 @@ class EdgeFix(OnEdge, PointForces):
         raise NotImplementedError
 
     def forces(self, points: PointsView) -> np.ndarray:
-        faces = self.faces_of(points.ids - 1)
+        faces = self.faces_at(points.ids - 1)
         force = np.zeros(points.position.shape)
         np.add.at(force, faces.point, self.loads(faces))
         return force
