@@ -9,6 +9,7 @@ import pytest
 
 from karamelo_py.language import registry, rules
 from karamelo_py.output.console import show
+from karamelo_py.output.record import RunRecord
 from karamelo_py.run.advice import known_failures
 from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS
 
@@ -57,6 +58,23 @@ def test_a_log_of_another_name_has_a_record_of_that_name(run_script):
     result = run_script(SCENE.format(speed=1), "-log", "b.csv")
     assert record(result, "b.run.json")["status"] == "finished"
     assert not (result.folder / "run.json").exists()
+
+
+def test_a_record_in_python_is_running_in_each_run_and_written_when_it_changes(tmp_path):
+    told = RunRecord()
+    told.path = tmp_path / "run.json"
+    for _ in range(2):
+        told.begin({"points": 1})
+        assert json.loads(told.path.read_text("utf-8"))["status"] == "running"
+        told.finish({"steps": 1})
+        told.end("finished")
+        assert json.loads(told.path.read_text("utf-8"))["status"] == "finished"
+    before = told.path.stat().st_ino, told.path.stat().st_mtime_ns
+    told.end("finished")
+    assert (told.path.stat().st_ino, told.path.stat().st_mtime_ns) == before
+    told.warn("a word", None, None)
+    told.end("finished")
+    assert json.loads(told.path.read_text("utf-8"))["messages"]
 
 
 def test_a_wrong_script_leaves_no_record_unless_one_is_asked_for(run_script):

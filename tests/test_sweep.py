@@ -66,6 +66,19 @@ def test_a_sweep_reads_a_state_that_lies_beside_its_script(folder, name):
 
 
 @pytest.mark.usefixtures("starts_are_cheap")
+def test_a_refused_variant_shows_its_error_without_earlier_warnings(folder):
+    no_edge = "region(far, block, 7, 8)\nfix(p, edge_pressure, all, far, 1)\n"
+    text = SCRIPT.replace("compute(c, center_of_mass", no_edge + "compute(c, kind_of_c")
+    (folder / "in.flight").write_text('kind_of_c = ""\n' + text, "utf-8")
+    wrong = {"kind_of_c": "center_of_mas"}
+    outcome = Launch(folder / "in.flight").run(wrong, folder / "case")
+    assert outcome.status == "refused" and "warning: no point of the group" in outcome.complaint
+    assert outcome.reason.endswith("; did you mean 'center_of_mass'?")
+    shown = case.Refused(wrong, outcome).render()
+    assert "unknown compute style" in shown.splitlines()[0] and "warning" not in shown
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-jobs", "2"]
     recorded = "v_x,mean:c_x,min:c_x,max:Step,when:c_x:1.575,way=max(max:c_x - first:c_x, 0)/N"

@@ -61,6 +61,7 @@ class RunRecord:
         self.content: dict[str, Any] = {"schema": SCHEMA, "status": "running"}
         self.runs: list[dict[str, Any]] = []
         self.messages: list[dict[str, Any]] = []
+        self._written: tuple[str, int] | None = None  # status and number of messages in the file
         self._begun = time.perf_counter()
 
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
@@ -82,6 +83,7 @@ class RunRecord:
 
     def begin(self, facts: Mapping[str, Any]) -> None:
         """Begin a run with what is known of it before its first step."""
+        self.content["status"] = "running"
         self.runs.append(dict(facts))
         self._write()
 
@@ -104,7 +106,8 @@ class RunRecord:
             self._note("error", error.sentence, error.place, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
-        if self.runs or self.is_asked_for:
+        # In Python each command ends so, and few change anything.
+        if (self.runs or self.is_asked_for) and self._written != (status, len(self.messages)):
             self._write()
 
     def _note(self, kind: str, text: str, place: Place | None, **optional: str | None) -> None:
@@ -116,6 +119,7 @@ class RunRecord:
     def _write(self) -> None:
         if self.path is None or folder_of_discarded() is not None:
             return
+        self._written = self.content["status"], len(self.messages)
         whole = {
             **self.content,
             "wall_s": time.perf_counter() - self._begun,
@@ -123,7 +127,7 @@ class RunRecord:
             "messages": self.messages,
             **surroundings(),
         }
-        with suppress(ScriptError):  # a full disk is told by whatever else is written
+        with suppress(ScriptError):  # whatever else is written reports a full disk
             write_whole(self.path, json.dumps(_finite(whole), indent=1, ensure_ascii=False) + "\n")
 
 

@@ -97,7 +97,8 @@ class Refused(ScriptError):
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
         lines = outcome.complaint.rstrip().splitlines()
-        first = next((k for k, line in enumerate(lines) if outcome.reason in line), 0)
+        text = error_of(record_of(outcome.folder)).get("text") or outcome.reason
+        first = next((k for k, line in enumerate(lines) if text in line), 0)
         self._whole = "\n".join([*lines[first:], f"this is the script with {worded(case)}"])
 
     def render(self) -> str:
