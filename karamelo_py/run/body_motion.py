@@ -244,22 +244,27 @@ def lag_of(s: Any) -> Lag:
     return most
 
 
+def sides(one: BodyMotion, solid: Any) -> np.ndarray:
+    """Return the lengths (d,) of a body: points lie inside it."""
+    return one.high - one.low + 2 * solid.half_size.max(axis=0)
+
+
 def held(s: Any, one: BodyMotion) -> np.ndarray:
     """Return the directions (d,) in which fixes hold nodes at a body, which then cannot drift."""
     found = np.zeros(s.d, np.bool_)
-    for fix, x in _fixes_at(s, one, _lattice(s, one)):
+    for fix, x in fixes_at(s, one, lattice_at(s, one)):
         if len(x):
             found |= [formula is not None for formula in fix.formulas[: s.d]]
     return found
 
 
-def _lattice(s: Any, one: BodyMotion) -> Any:
+def lattice_at(s: Any, one: BodyMotion) -> Any:
     """Return the lattice that a body uses."""
     solid = list(s.hub.solids.values())[one.number]
     return s.hub.lattices[s.method.lattice_of(s.hub, solid)]
 
 
-def _fixes_at(s: Any, one: BodyMotion, lattice: Any) -> Iterator[tuple[Any, np.ndarray]]:
+def fixes_at(s: Any, one: BodyMotion, lattice: Any) -> Iterator[tuple[Any, np.ndarray]]:
     """Yield each fix that prescribes velocities, and positions (n, d) of its nodes at a body."""
     for fix in s.hub.fixes.values():
         if not fix.prescribes_velocity:
@@ -275,12 +280,12 @@ def pressed_evenly(s: Any, one: BodyMotion) -> bool:
 
     It then fills a box. Each plate holds all nodes of one side in the direction across it.
     """
-    lattice, solid = _lattice(s, one), list(s.hub.solids.values())[one.number]
-    box = (one.high - one.low + 2 * np.max(solid.half_size, axis=0)).prod()
+    lattice, solid = lattice_at(s, one), list(s.hub.solids.values())[one.number]
+    box = sides(one, solid).prod()
     if s.hub.domain.axisymmetric or np.sum(solid.volume0) < (1 - 1e-6) * box:
         return False
-    sides = set()
-    for fix, x in _fixes_at(s, one, lattice):
+    pressed = set()
+    for fix, x in fixes_at(s, one, lattice):
         held = [k for k, formula in enumerate(fix.formulas[: s.d]) if formula is not None]
         if not len(x):
             continue
@@ -292,8 +297,8 @@ def pressed_evenly(s: Any, one: BodyMotion) -> bool:
         whole = (low <= one.low[along]).all() and (high >= one.high[along]).all()
         if not (any(ends) and whole):
             return False
-        sides.add((k, ends[0]))
-    return len(sides) >= 2 * s.d - 1
+        pressed.add((k, ends[0]))
+    return len(pressed) >= 2 * s.d - 1
 
 
 def _free_time(s: Any, one: BodyMotion) -> float:

@@ -16,7 +16,7 @@ from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion
+from karamelo_py.run.body_motion import BodyMotion, sides
 
 STRESSED = 0.1  # of the initial energy: less does not count as initial stress
 OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
@@ -83,14 +83,15 @@ def _struck(scene: Any) -> Any:
     laws = [solids[one.number].material.law for one in bodies]
     c = np.array([timestep.elastic_speed(scene.simulation, solids[o.number])[0] for o in bodies])
     z = c / np.array([float(specific_volume(law)) for law in laws])
-    boxes, sides = boxes_of(bodies), np.array([_sides(one, solids[one.number]) for one in bodies])
+    boxes = boxes_of(bodies)
+    lengths = np.array([sides(one, solids[one.number]) for one in bodies])
     for a, one in enumerate(bodies):
         begins = meetings(one, boxes, solids[one.number].h)
         b, k = np.nonzero((begins < scene.duration) & (z[a] + z > 0)[:, None])
         if not len(b):
             continue
         v = z[a] * one.velocity[k] + z[b] * boxes.velocity[b, k]
-        through = np.minimum(2 * sides[a, k] / c[a], 2 * sides[b, k] / c[b])
+        through = np.minimum(2 * lengths[a, k] / c[a], 2 * lengths[b, k] / c[b])
         speeds = np.abs(v) / (z[a] + z[b])
         lasting = np.minimum(scene.duration - begins[b, k], through)
         longest = np.lexsort((speeds, speeds * lasting))[-1]
@@ -99,12 +100,6 @@ def _struck(scene: Any) -> Any:
 
 def _is_solid(law: Any) -> bool:
     return not can(law, constrained_velocity)
-
-
-def _sides(one: BodyMotion, solid: Any) -> np.ndarray:
-    """Return the lengths (d,) of a body: points lie inside it."""
-    d = len(one.centre)
-    return one.high - one.low + 2 * solid.half_size[:, :d].max(axis=0)
 
 
 class BodyBoxes(NamedTuple):

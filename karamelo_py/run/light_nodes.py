@@ -90,8 +90,9 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
         limit *= 0.7
     if not near.any():
         return inf
-    # The mass is that of all points.
-    mass = sum(np.bincount(nodes(k), volume * weight(k), count) for k in pairs)
+    mass = filled  # of all points, not only of those near
+    if radius is not None:
+        mass = sum(np.bincount(nodes(k), volume * weight(k), count) for k in pairs)
     number = np.cumsum(seen) - 1
     at = np.stack([number[nodes(k)[near]] for k in pairs], axis=1)
     slopes = [np.stack([weight(k, i)[near] for k in pairs], 1) for i in range(kin.dimension)]
@@ -136,7 +137,7 @@ def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Any, kin: Any) -> float:
-    """Return the shear modulus over that of waves in the bulk; 1/2 is without a Poisson's ratio."""
+    """Return the shear modulus over the P-wave modulus: 1/2 (Poisson's ratio 0) at most."""
     strength = getattr(law, "strength", None)
     G = getattr(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
@@ -147,7 +148,7 @@ def _largest(operator: Any, shape: tuple[int, int]) -> float:
     """Find the largest eigenvalue of a symmetric operator by the iteration of Lanczos (1950)."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
-    basis, diagonal, beside = [q], [], []
+    basis, diagonal, off_diagonal = [q], [], []
     for _ in range(min(STEPS, q.size)):
         r = operator(basis[-1])
         diagonal.append(float((r * basis[-1]).sum()))
@@ -157,8 +158,9 @@ def _largest(operator: Any, shape: tuple[int, int]) -> float:
         size = sqrt((r * r).sum())
         if not size > 1e-9 * diagonal[0]:
             break
-        beside.append(size)
+        off_diagonal.append(size)
         basis.append(r / size)
     n = len(diagonal)
-    matrix = np.diag(diagonal) + np.diag(beside[: n - 1], 1) + np.diag(beside[: n - 1], -1)
+    off = off_diagonal[: n - 1]
+    matrix = np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1)
     return float(np.linalg.eigvalsh(matrix)[-1])

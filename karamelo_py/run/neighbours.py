@@ -22,8 +22,9 @@ def bent_row(scene: Any) -> dict[str, Any] | None:
     """Find a slender elastic body of one row of points that its weight bends between supports."""
     if scene.d == 1 or scene.simulation.implicit or scene.hub.domain.axisymmetric:
         return None
+    solids = list(scene.hub.solids.values())
     for one in scene.motions:
-        solid = list(scene.hub.solids.values())[one.number]
+        solid = solids[one.number]
         sides = solid.hi - solid.lo
         axis = int(np.argmin(sides))
         slender = sides.max() > max(SLENDER * sides[axis], 2 * solid.h)

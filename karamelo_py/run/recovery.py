@@ -51,10 +51,9 @@ class RollBack:
         read between any two steps (`looks_always`).
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks_always
-        too_large = not simulation.control.clock[0].watch_limit and not simulation.implicit
         # Said of the first state: a later one is ruined, and its limit with it.
         self.smaller = "a smaller time step" if ruined else own_step_instead(self.hub)
-        self.smaller *= too_large
+        self.smaller *= explain.is_too_large(simulation)
         # Deleted points would not come back.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
@@ -65,8 +64,7 @@ class RollBack:
 
     def before(self) -> None:
         """Store the present state if it is due and good; else note the memory of parts."""
-        watched = self.simulation.control.clock[0].watch_limit or self.simulation.implicit
-        if self.point.step == self.begun_at and not watched:
+        if self.point.step == self.begun_at and explain.is_too_large(self.simulation):
             return  # only the first state is good, and its rows are not rewound
         step = self.simulation.step
         # When states are stored must not depend on the speed of steps: runs return to them.

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion, yields
+from karamelo_py.run.body_motion import BodyMotion, fixes_at, lattice_at, sides, yields
 from karamelo_py.run.crossing import loses
 
 CELLS = 0.25  # of displacement at rest: with less, hardly a point crosses a cell
@@ -43,7 +43,7 @@ def expected(scene: Any) -> Settling:
         c = timestep.elastic_speed(scene.simulation, solid)[0]
         if yields(solid.material.law) or not (c > 0 and _clamped(scene, one, k)):
             continue
-        length = float(one.high[k] - one.low[k] + 2 * solid.half_size[:, k].max())
+        length = float(sides(one, solid)[k])
         carried = sum(other.mass for other in scene.motions if _rests(other, one, g, k, solid.h))
         if scene.duration * c < 4 * length:
             continue
@@ -62,16 +62,9 @@ def _rests(other: BodyMotion, one: BodyMotion, g: np.ndarray, k: int, h: float) 
 
 def _clamped(scene: Any, one: BodyMotion, k: int) -> bool:
     """Tell whether fixes hold nodes in direction k at one end of a body, and nowhere else."""
-    lattices, solid = scene.hub.lattices, list(scene.hub.solids.values())[one.number]
-    lattice = lattices[scene.method.lattice_of(scene.hub, solid)]
-    held = []
-    for fix in scene.hub.fixes.values():
-        if fix.prescribes_velocity and fix.formulas[k] is not None:
-            nodes = fix.group.nodes
-            own = (nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)
-            x = lattice.positions(nodes[own])[:, : scene.d]
-            near = ((x >= one.low - lattice.h) & (x <= one.high + lattice.h)).all(axis=1)
-            held.append(x[near, k])
+    lattice = lattice_at(scene, one)
+    at = fixes_at(scene, one, lattice)
+    held = [x[:, k] for fix, x in at if fix.formulas[k] is not None]
     places = np.concatenate(held) if held else np.zeros(0)
     if not len(places):
         return False

@@ -35,7 +35,7 @@ def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Troubl
         return _above_limit(hub, simulation)
     if status == SHRUNK:
         return _shrunk(hub, simulation)
-    smaller, too_large = _smaller_step(hub, simulation, smaller), _is_too_large(simulation)
+    smaller, too_large = _smaller_step(hub, simulation, smaller), is_too_large(simulation)
     if status in (GAINED, HEATED):
         found = (_gained if status == GAINED else _heated)(hub, simulation)
         found = found._replace(fix=smaller) if too_large else found
@@ -57,7 +57,7 @@ def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Troubl
     return found
 
 
-def _is_too_large(simulation: Any) -> bool:
+def is_too_large(simulation: Any) -> bool:
     """Tell whether the step was above the stability limit from the start of the run."""
     return not simulation.control.clock[0].watch_limit and not simulation.implicit
 
@@ -67,7 +67,7 @@ def _above_limit_as_cause(hub: Hub, simulation: Any) -> str:
     if step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of:
         return "time step above the stability limit (see the warning)"
     # The limit of a state that went wrong says nothing of the step of a good one.
-    here = "" if _is_too_large(simulation) else f" {simulation.limit:.4g}"
+    here = "" if is_too_large(simulation) else f" {simulation.limit:.4g}"
     return f"time step {simulation.dt:.4g} above the stability limit{here}"
 
 
