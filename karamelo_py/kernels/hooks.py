@@ -36,7 +36,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field, load_vector, store, vector
 from karamelo_py.compiler.tuples import flat, put_at
 from karamelo_py.kernels import arrays
-from karamelo_py.points.laws import jacobian, specific_volume
+from karamelo_py.kernels.visit import volume_of
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
@@ -133,15 +133,11 @@ def written(tag, what, p, found):
     """Write the results of a function of whole points; return the numbers that it publishes."""
 
 
-def _volume(what, law, state, p):
-    return what.points.mass[p] * specific_volume(law) * jacobian(law, what.kin, state)
-
-
 WORDS = {
     "mass": lambda what, law, state, p: what.points.mass[p],
     "velocity": lambda what, law, state, p: load_vector(what.kin, what.points.v, p),
     "position": lambda what, law, state, p: load_vector(what.kin, what.x, p),
-    "volume": _volume,
+    "volume": lambda what, law, state, p: volume_of(what.kin, what.points, law, state, p),
 }
 
 

@@ -13,10 +13,9 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.kernels.arrays import vector_at
-from karamelo_py.kernels.visit import state_at
+from karamelo_py.kernels.visit import state_at, volume_of
 from karamelo_py.points.bodies import NEW, MinimizePenetration, along, force_between, radius, rub
 from karamelo_py.points.kinematics import zero_vector
-from karamelo_py.points.laws import jacobian, specific_volume
 
 
 class TwoBodies(NamedTuple):
@@ -62,7 +61,7 @@ def _body(id, begin1, end1, begin2, end2):
 
 def _radius(kin, x, points, laws, p):
     law, state = state_at(kin, points, laws, p)
-    volume = points.mass[p] * specific_volume(law) * jacobian(law, kin, state)
+    volume = volume_of(kin, points, law, state, p)
     return radius(kin, float(volume), load_vector(kin, x, p))
 
 
@@ -225,6 +224,8 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total, contact):
     if not square > 0:
         return 0
     _add(kin, bodies, i, j, force, total)
+    if bodies.grip.shape[1] == 0:  # no friction
+        return 1
     none, mass = zero_vector(kin, 0.0), bodies.mass
     dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
     reduced = mass[i] * mass[j] / (mass[i] + mass[j])

@@ -17,7 +17,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.compiler.threads import Serial, by_threads
-from karamelo_py.points.kinematics import KINEMATICS
+from karamelo_py.points.kinematics import KINEMATICS, dot
 
 LEAF = 4  # faces
 CHUNK = 1024  # positions that a thread takes at a time
@@ -82,15 +82,12 @@ def _corner(kin, surface, i, k):
 def _from_line(a, b, x):
     """Square of the distance of `x` from a segment."""
     way, local = b - a, x - a
-    along = min(max(_dot(way, local) / max(way.squared(), TINY), 0.0), 1.0)
-    return (local - along * way).squared()
+    return (local - _share_along(way, local) * way).squared()
 
 
-def _dot(a, b):
-    found = a[0] * b[0]
-    for k in range(1, len(a)):
-        found = found + a[k] * b[k]
-    return found
+def _share_along(way, local):
+    """Return how far along a segment, from 0 to 1, it is nearest to a place."""
+    return min(max(dot(way, local) / max(way.squared(), TINY), 0.0), 1.0)
 
 
 def _cross(a, b):
@@ -102,9 +99,9 @@ def _cross(a, b):
 def _is_above(a, b, c, normal, size, x):
     """Tell whether `x` is above or below a triangle."""
     above = size > TINY
-    above = above and _dot(_cross(b - a, x - a), normal) >= 0
-    above = above and _dot(_cross(c - b, x - b), normal) >= 0
-    return above and _dot(_cross(a - c, x - c), normal) >= 0
+    above = above and dot(_cross(b - a, x - a), normal) >= 0
+    above = above and dot(_cross(c - b, x - b), normal) >= 0
+    return above and dot(_cross(a - c, x - c), normal) >= 0
 
 
 @point_function()
@@ -128,7 +125,7 @@ def _from_triangle(kin, surface, i, x):
     normal = _cross(b - a, c - a)
     size = normal.squared()
     if _is_above(a, b, c, normal, size, x):
-        height = _dot(x - a, normal)
+        height = dot(x - a, normal)
         return height * height / size
     return min(min(_from_line(a, b, x), _from_line(b, c, x)), _from_line(c, a, x))
 
@@ -178,7 +175,7 @@ def distance(kin, surface, x, reach):
 def _on_line(a, b, x):
     """Return the place on a segment that is nearest to `x`."""
     way = b - a
-    return a + min(max(_dot(way, x - a) / max(way.squared(), TINY), 0.0), 1.0) * way
+    return a + _share_along(way, x - a) * way
 
 
 @point_function()
@@ -202,7 +199,7 @@ def _place_on_triangle(kin, surface, i, x):
     normal = _cross(b - a, c - a)
     size = normal.squared()
     if _is_above(a, b, c, normal, size, x):
-        return x - _dot(x - a, normal) / size * normal
+        return x - dot(x - a, normal) / size * normal
     found, best = _on_line(a, b, x), _from_line(a, b, x)
     if _from_line(b, c, x) < best:
         found, best = _on_line(b, c, x), _from_line(b, c, x)

@@ -16,9 +16,9 @@ from karamelo_py.compiler.trace import one_at_a_time
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.surfaces import depth, slopes
+from karamelo_py.kernels.visit import volume_of
 from karamelo_py.points.bodies import along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
-from karamelo_py.points.laws import jacobian, specific_volume
 
 SOFT = 0.1  # share of a penetration that a step undoes where it stops the approach, too
 ASIDE = 0.05  # of the reach: where depths are compared
@@ -129,7 +129,7 @@ def touch_hook(tag: Callable) -> hooks.CompiledHook:
 
 @hooks.results.on(Touch)
 def _results_of_touch(tag, what, law, state, p, values, dt):
-    volume = what.points.mass[p] * specific_volume(law) * jacobian(law, what.kin, state)
+    volume = volume_of(what.kin, what.points, law, state, p)
     return force_of(tag, what, volume, p, values, dt)
 
 

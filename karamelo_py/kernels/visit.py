@@ -27,7 +27,7 @@ from karamelo_py.points.basis import blank, entry, support
 from karamelo_py.points.frames import DeformationGradient, scaled_increment
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import zero
-from karamelo_py.points.laws import deformation, initial_state
+from karamelo_py.points.laws import deformation, initial_state, jacobian, specific_volume
 from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
 
 
@@ -78,6 +78,11 @@ def state_at(kin: Tag, points: Points, laws: NamedTuple, p: Index) -> tuple:
     """Load the law of point `p` and its state."""
     law = law_at(points, laws, p)
     return law, load(points.state, p, initial_state(law, kin, points.mass[p]))
+
+
+def volume_of(kin: Tag, points: Points, law: Tag, state: tuple, p: Index) -> Number:
+    """Return the present volume of point `p`."""
+    return points.mass[p] * specific_volume(law) * jacobian(law, kin, state)
 
 
 def law_and_state(w: Work, p: Index) -> tuple:

@@ -1,6 +1,6 @@
 """Memory of fixes for the points held by friction: see `points.bodies.rub`."""
 
-from karamelo_py.compiler.fields import Field
+from karamelo_py.compiler.fields import Field, field
 from karamelo_py.compiler.trace import one_at_a_time
 from karamelo_py.scene.hub import Hub
 
@@ -15,6 +15,13 @@ class GripOfTool(Grip):
     """As `Grip`, with the last position (d) of the point at the tool."""
 
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
+
+
+def clear_grips(hub: Hub, grip: type[Grip]) -> None:
+    """Let all points go: the grips of a file belong to an earlier fix."""
+    for block in hub.simulation.setup.blocks:
+        if (held := field(block.points.fields, grip)) is not None:
+            held[:] = 0
 
 
 def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:

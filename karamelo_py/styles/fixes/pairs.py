@@ -21,7 +21,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.grip import Grip, grip_for
+from karamelo_py.styles.fixes.grip import Grip, clear_grips, grip_for
 
 SENT = 350  # bytes per point that are sent to the process that searches for pairs
 
@@ -84,8 +84,7 @@ class PairContact(Fix):
         rows = self._near(simulation)
         d, grips = kin.dimension, [field(block.points.fields, self.grip) for block in blocks]
         if self.grip is not None and not self.has_touched:
-            for grip in grips:
-                grip[:] = 0
+            clear_grips(self.hub, self.grip)
         self.has_touched = True
         if rows is not None:
             own = [self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)]

@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.rubbing import rub_points
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import PointsView
 from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.grip import GripOfTool, grip_for
+from karamelo_py.styles.fixes.grip import GripOfTool, clear_grips, grip_for
 from karamelo_py.styles.fixes.tools.base import ToolFix
 
 CLOSE = 0.5  # radii off the surface, within which bouncing points retain their grip
@@ -36,9 +35,7 @@ class StiffTool(ToolFix):
     def begin_to_touch(self) -> None:
         """Clear the grips of an earlier tool."""
         if self.grip is not None and not self.has_touched:
-            for block in self.hub.simulation.setup.blocks:
-                if (grip := field(block.points.fields, self.grip)) is not None:
-                    grip[:] = 0
+            clear_grips(self.hub, self.grip)
             self.has_touched = True
 
     def press(
