@@ -254,6 +254,20 @@ def _entering_corner(contact, kin, nodes, n, other, velocity):
 
 
 @noinline
+def _normal_of_led(contact, kin, nodes, n, other, velocity, known):
+    """Return the normal of a led body at node `n`, its scatter, and whether its corner is hollow.
+
+    `other` is the normal of the free body, which has the `velocity` relative to it.
+    """
+    normal, scatter = _normal(contact, kin, nodes, n, other)
+    hollow = known and scatter >= EDGE and _is_hollow(contact, kin, nodes, n, normal, other)
+    if hollow:
+        into = _entering_corner(contact, kin, nodes, n, other, velocity)
+        normal = -1.0 * into if dot(into, into) > 0 else normal
+    return normal, scatter, hollow
+
+
+@noinline
 def _pair_of(contact, kin, nodes, records, n, m, known):
     """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`.
 
@@ -262,30 +276,27 @@ def _pair_of(contact, kin, nodes, records, n, m, known):
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     like = zero_vector(kin, 0.0)
     relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
-    # Opposite faces that end next to each other tilt to opposite sides: the difference does not.
-    of_n, scatter_n = _normal(contact, kin, nodes, n, like)
-    of_m, scatter_m = _normal(contact, kin, nodes, m, like)
     led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
     hollow = False
     if led_n and not led_m:
-        of_n, scatter_n = _normal(contact, kin, nodes, n, of_m)
-        hollow = known and scatter_n >= EDGE and _is_hollow(contact, kin, nodes, n, of_n, of_m)
-        if hollow:
-            into = _entering_corner(contact, kin, nodes, n, of_m, -1.0 * relative)
-            of_n = -1.0 * into if dot(into, into) > 0 else of_n
+        of_m, scatter_m = _normal(contact, kin, nodes, m, like)
+        of_n, scatter_n, hollow = _normal_of_led(
+            contact, kin, nodes, n, of_m, -1.0 * relative, known
+        )
         if hollow or scatter_n < EDGE:
             of_m = 0.0 * of_m
     elif led_m and not led_n:
-        of_m, scatter_m = _normal(contact, kin, nodes, m, of_n)
-        hollow = known and scatter_m >= EDGE and _is_hollow(contact, kin, nodes, m, of_m, of_n)
-        if hollow:
-            into = _entering_corner(contact, kin, nodes, m, of_n, relative)
-            of_m = -1.0 * into if dot(into, into) > 0 else of_m
+        of_n, scatter_n = _normal(contact, kin, nodes, n, like)
+        of_m, scatter_m, hollow = _normal_of_led(contact, kin, nodes, m, of_n, relative, known)
         if hollow or scatter_m < EDGE:
             of_n = 0.0 * of_n
+    else:
+        of_n, scatter_n = _normal(contact, kin, nodes, n, like)
+        of_m, scatter_m = _normal(contact, kin, nodes, m, like)
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
+    # Opposite faces that end next to each other tilt to opposite sides: the difference does not.
     outward = of_n - of_m
     wall, yields = led_n != led_m, vector(kin, yielding)
     return NodePair(n, m, per_n, per_m, outward, scatter, yields, relative, wall, hollow)
