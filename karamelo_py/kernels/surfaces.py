@@ -301,9 +301,7 @@ def _place(kin, x, p):
 def _depths_of_some(kin, surface, x, reach, out, n):
     surface = at_hand(surface)
     for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
-        place = _place(kin, x, p)
-        found = distance(kin, surface, place, reach)
-        out[p] = found if encloses(kin, surface, place) else -found
+        out[p] = _depth_in_surface(surface, kin, _place(kin, x, p), reach)
 
 
 _depths = by_threads(_depths_of_some)
@@ -426,18 +424,12 @@ def _depth_in_convex(shape, kin, x, reach):
 
 
 @depth.on(Joined)
-def _depth_in_joined(shape, kin, x, reach):
-    found = depth(shape.parts[0], kin, x, reach)
-    for part in shape.parts[1:]:
-        found = max(found, depth(part, kin, x, reach))
-    return found
-
-
 @depth.on(Common)
-def _depth_in_common(shape, kin, x, reach):
+def _depth_in_parts(shape, kin, x, reach):
+    choose = max if isinstance(shape, Joined) else min
     found = depth(shape.parts[0], kin, x, reach)
     for part in shape.parts[1:]:
-        found = min(found, depth(part, kin, x, reach))
+        found = choose(found, depth(part, kin, x, reach))
     return found
 
 

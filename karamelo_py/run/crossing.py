@@ -77,10 +77,11 @@ def _struck(scene: Any) -> Any:
     gone through the thinner solid and returned.
     """
     solids = list(scene.hub.solids.values())
-    bodies = [one for one in scene.motions if _is_solid(solids[one.number].material.law)]
+    law_of = {number: solid.material.law for number, solid in enumerate(solids)}
+    bodies = [one for one in scene.motions if not can(law_of[one.number], constrained_velocity)]
     if not bodies:
         return
-    laws = [solids[one.number].material.law for one in bodies]
+    laws = [law_of[one.number] for one in bodies]
     c = np.array([timestep.elastic_speed(scene.simulation, solids[o.number])[0] for o in bodies])
     z = c / np.array([float(specific_volume(law)) for law in laws])
     boxes = boxes_of(bodies)
@@ -96,10 +97,6 @@ def _struck(scene: Any) -> Any:
         lasting = np.minimum(scene.duration - begins[b, k], through)
         longest = np.lexsort((speeds, speeds * lasting))[-1]
         yield float(speeds[longest]), float(lasting[longest])
-
-
-def _is_solid(law: Any) -> bool:
-    return not can(law, constrained_velocity)
 
 
 class BodyBoxes(NamedTuple):

@@ -57,7 +57,7 @@ class RunPage(Rhythmic):
         if hub.output.log.rows is None:
             hub.output.log.rows = []
         self._rows: list[Row] = []
-        self._paused = self._once = self._over = False
+        self._paused = self._once = False
         self._column, self._unwatched = "seq", ""
         self._ended, self._failed = "", ""  # how it did, and the message of an error
         self.server = Server(
@@ -94,11 +94,11 @@ class RunPage(Rhythmic):
         """
         server = self.server
         error = sys.exception()
-        self._ended = "stopped" if stopped or error is not None else "finished"
+        ended = "stopped" if stopped or error is not None else "finished"
         if isinstance(error, FAILURES):
-            self._ended, self._failed = "failed", rendered(error)
+            ended, self._failed = "failed", rendered(error)
             self.hub.warned.append((self.hub.update.time, self._failed))
-        self._over = True
+        self._ended = ended  # last: a page that asks meanwhile sees a run that goes on
         server.changed()
         server.flush()
         waits = waits and self.hub.console.terminal and not server.opened
@@ -157,7 +157,7 @@ class RunPage(Rhythmic):
             "flags": [{"time": time, "text": text} for time, text in self.hub.warned],
             "paused": self._paused,
             "unwatched": self._unwatched,
-            "over": self._over,
+            "over": bool(self._ended),
             "ended": self._ended,
             "failed": self._failed,
         }

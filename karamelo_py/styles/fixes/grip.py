@@ -3,6 +3,8 @@
 from karamelo_py.compiler.fields import Field, field
 from karamelo_py.compiler.trace import one_at_a_time
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+from karamelo_py.styles.fixes.formulas import judge_friction
 
 
 class Grip(Field):
@@ -17,13 +19,6 @@ class GripOfTool(Grip):
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
 
 
-def clear_grips(hub: Hub, grip: type[Grip]) -> None:
-    """Let all points go: the grips of a file belong to an earlier fix."""
-    for block in hub.simulation.setup.blocks:
-        if (held := field(block.points.fields, grip)) is not None:
-            held[:] = 0
-
-
 def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
     """Return a grip class that no other fix of the scene uses: a point may touch several."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
@@ -35,3 +30,29 @@ def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
         if name not in globals():  # for cached kernels to find it
             globals()[name] = type(name, (kind,), {"__module__": __name__})
         return globals()[name]
+
+
+class Gripping(Fix):
+    """Mix-in of fixes with friction that has a memory."""
+
+    remembers = ("has_touched",)
+    has_touched = False  # until then, the grips of a restart file belong to an earlier fix
+    kind_of_grip: type[Grip] = Grip
+    grip: type[Grip] | None = None
+    mu = 0.0
+
+    def rubs(self, hub: Hub, mu: float) -> None:
+        """Set a coefficient of friction."""
+        judge_friction(hub, mu)
+        self.mu = mu
+        if mu > 0:
+            self.grip = grip_for(hub, self.kind_of_grip)
+            self.point_fields = (*self.point_fields, self.grip)
+
+    def begin_to_touch(self) -> None:
+        """Clear the grips of an earlier fix."""
+        if self.grip is not None and not self.has_touched:
+            for block in self.hub.simulation.setup.blocks:
+                if (held := field(block.points.fields, self.grip)) is not None:
+                    held[:] = 0
+        self.has_touched = True

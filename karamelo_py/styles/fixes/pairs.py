@@ -21,7 +21,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.grip import Grip, clear_grips, grip_for
+from karamelo_py.styles.fixes.grip import Gripping
 
 SENT = 350  # bytes per point that are sent to the process that searches for pairs
 
@@ -36,7 +36,7 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
         )
 
 
-class PairContact(Fix):
+class PairContact(Gripping):
     """Base of fixes for contact between the points of two solids.
 
     With several processes, the first one searches for pairs among all points that may touch.
@@ -46,9 +46,6 @@ class PairContact(Fix):
     point_fields = (Force, WorkOfForces)
     point_by_point = True
     conserves = True  # apart from the work of the forces, which is summed
-    remembers = ("has_touched",)
-    has_touched = False  # until then, grips belong to an earlier fix
-    grip: type[Grip] | None = None
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))
@@ -83,9 +80,7 @@ class PairContact(Fix):
         kin, blocks = simulation.kin, simulation.setup.blocks
         rows = self._near(simulation)
         d, grips = kin.dimension, [field(block.points.fields, self.grip) for block in blocks]
-        if self.grip is not None and not self.has_touched:
-            clear_grips(self.hub, self.grip)
-        self.has_touched = True
+        self.begin_to_touch()
         if rows is not None:
             own = [self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)]
             last = float(simulation.control.clock[0].last_dt)
@@ -217,11 +212,7 @@ class ContactMinimizePenetration(PairContact):
         mu: Annotated[float, NonNegative] | None = None,
     ):
         super().__init__(hub, solid1, solid2)
-        self.mu = float(mu or 0.0)
-        judge_friction(hub, self.mu)
-        if self.mu > 0:
-            self.grip = grip_for(hub, Grip)
-            self.point_fields = (*self.point_fields, self.grip)
+        self.rubs(hub, float(mu or 0.0))
         if mu is not None and hub.domain.dimension > 1:
             hub.warn(
                 f"bodies that slide do not feel the friction {mu:g}: their surfaces are made of "

@@ -6,37 +6,18 @@ import numpy as np
 
 from karamelo_py.kernels.rubbing import rub_points
 from karamelo_py.points.kinematics import KINEMATICS
-from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import PointsView
-from karamelo_py.styles.fixes.formulas import judge_friction
-from karamelo_py.styles.fixes.grip import GripOfTool, clear_grips, grip_for
+from karamelo_py.styles.fixes.grip import GripOfTool, Gripping
 from karamelo_py.styles.fixes.tools.base import ToolFix
 
 CLOSE = 0.5  # radii off the surface, within which bouncing points retain their grip
 
 
-class StiffTool(ToolFix):
+class StiffTool(Gripping, ToolFix):
     """Base of tools that stop a point within a step, with friction."""
 
     impulsive = True
-    remembers = ("has_touched",)
-    has_touched = False  # until then, grips belong to an earlier tool
-    grip: type[GripOfTool] | None = None
-    mu = 0.0
-
-    def rubs(self, hub: Hub, mu: float) -> None:
-        """Set a coefficient of friction."""
-        judge_friction(hub, mu)
-        self.mu = mu
-        if mu > 0:
-            self.grip = grip_for(hub, GripOfTool)
-            self.point_fields = (*self.point_fields, self.grip)
-
-    def begin_to_touch(self) -> None:
-        """Clear the grips of an earlier tool."""
-        if self.grip is not None and not self.has_touched:
-            clear_grips(self.hub, self.grip)
-            self.has_touched = True
+    kind_of_grip = GripOfTool
 
     def press(
         self,
