@@ -85,7 +85,15 @@ def lambdas() -> int:
     )
 
 
+def long_signatures() -> int:
+    """Functions of kernels and points that take more than five arguments by their places."""
+    found = nodes(ast.FunctionDef, ast.Lambda)
+    own = (node.args for path, node in found if room_of(path) in ("kernels", "points"))
+    return sum(len(one.posonlyargs) + len(one.args) > 5 for one in own)
+
+
 COUNTS = {
+    "functions of kernels and points with more than five parameters": long_signatures,
     "point functions that are lambdas": lambdas,
     "functions named `_`": unnamed_functions,
     "names that several classes have": lambda: len(shared_class_names()),
