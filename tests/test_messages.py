@@ -1,73 +1,76 @@
-"""The pages of messages have every message that the program makes."""
+"""Codes of messages: data that `karamelo-py help CODE` and the pages of messages are made from."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 import test_script_errors as wrong
 
+from karamelo_py.app.cli import main
 from karamelo_py.language import registry, rules
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, codes
 
 ROOT = Path(__file__).parent.parent
-# They read the package once, in one process.
-pytestmark = pytest.mark.xdist_group("messages")
 
 
-@pytest.fixture(scope="module")
-def messages():
-    sys.path.insert(0, str(ROOT / "docs" / "_ext"))
-    try:
-        import messages
-    finally:
-        sys.path.pop(0)
-    return messages
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("energy-gain", "spurious gain of energy"),
+        ("unknown-name", "A name must be set above the line that reads it"),
+        ("points-that-cross-cells", "Fix: method tlmpm, or quadratic-spline"),
+        ("locking", "Fix: anti_volumetric_locking(true)"),
+    ],
+)
+def test_help_explains_a_code(capsys, code, said):
+    assert main(["help", code]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
 
 
-def test_messages_of_wrong_scripts_are_on_a_page(messages, tmp_path):
-    """Those of some 200 wrong scripts, each found by its own words."""
-    scripts = [text for text, *_ in (*wrong.SYNTAX, *wrong.NAMES, *wrong.VALUES, *wrong.LAMMPS)]
-    scripts += [wrong.SCENE + text for text, *_ in wrong.COMMANDS]
-    said = set()
-    for script in scripts:
-        with pytest.raises(ScriptError) as caught:
-            wrong.run(script, tmp_path)
-        said |= {error.message for error in (caught.value, *caught.value.others)}
-    assert len(said) > 100
-    listed = messages.messages()
-    missing = [one for one in said if not any(message.matches(one) for message in listed)]
-    assert missing == []
+@pytest.mark.parametrize(
+    ("script", "code", "name", "alike"),
+    [
+        ("a = (1", "syntax", None, None),
+        ("a = 1/0", "division-by-zero", None, None),
+        ("length = 1\na = lenght", "unknown-name", "lenght", "length"),
+        ("fxi(1)", "unknown-command", "fxi", None),
+        ("and = 1", "taken-name", "and", None),
+        ("x0 = 1\na = b\nb = 1", "used-before-defined", None, None),
+        ("time = 1", "taken-name", "time", None),
+        ("include(none.mpm)", "no-file", None, None),
+        (wrong.SCENE + "region(q, blok, 0, 1)", "unknown-style", "blok", None),
+        (wrong.SCENE + "fix(g, body_force, nobody, 0)", "unknown-ID", "nobody", None),
+        (wrong.SCENE + "region(q, sphere)", "arguments", None, None),
+        (wrong.SCENE + "set_dt(-1)", "argument", None, None),
+        (wrong.SCENE + "region(b, block, 0, 1, 0, 1)", "already-used", None, None),
+    ],
+)
+def test_mistakes_have_codes_and_fields(tmp_path, script, code, name, alike):
+    with pytest.raises(ScriptError) as caught:
+        wrong.run(script, tmp_path)
+    error = caught.value
+    assert (error.code, error.name, error.alike) == (code, name, alike)
+    assert codes()[code]["script"]
 
 
-def test_known_failures_are_on_a_page(messages):
-    """Each rule of advice that a part of the program declares."""
+def test_pages_are_written_from_the_data(tmp_path, monkeypatch):
+    """Every code, and each rule of advice that a part of the program declares."""
+    monkeypatch.syspath_prepend(ROOT / "docs" / "_ext")
+    import messages
+
+    messages.write_pages(tmp_path)
+    text = {path.stem: path.read_text("utf-8") for path in tmp_path.glob("*.md")}
+    index = (ROOT / "docs" / "messages" / "index.md").read_text("utf-8")
+    assert set(text) == set(re.findall(r"^generated/([\w-]+)$", index, re.M))
+    listed = re.findall(r"^## (\S+)$", text["run"] + text["script"], re.M)
+    assert sorted(listed) == sorted(codes())
     for family in registry.families():
         for name in registry.names(family):
             registry.find(family, name)
-    own = [
-        f"{name}: {reason}"
-        for (kind, part), told in rules._rules.items()
-        if kind == "failure" and part.__module__.startswith("karamelo_py.")
-        for _, name, reason, _ in told
-    ]
+    own = {
+        rules.code_of(name)
+        for part, name, *_ in rules.known_failures()
+        if part.__module__.startswith("karamelo_py.")
+    }
     assert len(own) > 20
-    listed = {message.text for message in messages.messages()}
-    assert {re.sub(r"\{[^{}]+\}", "…", text) for text in own} <= listed
-
-
-def test_a_message_that_is_not_made_is_not_found(messages):
-    said = "the moon is made of cheese"
-    assert not any(message.matches(said) for message in messages.messages())
-
-
-def test_pages_of_messages_are_written(messages, tmp_path):
-    messages.write_pages(tmp_path / "generated", tmp_path / "messages.js")
-    pages = {path.stem for path in (tmp_path / "generated").glob("*.md")}
-    assert pages == {page for page, *_ in messages.PAGES}
-    text = "".join(path.read_text("utf-8") for path in (tmp_path / "generated").glob("*.md"))
-    count = len(messages.messages())
-    assert text.count("\n## ") == count > 400
-    index = (ROOT / "docs" / "messages" / "index.md").read_text("utf-8")
-    assert pages == set(re.findall(r"^generated/([\w-]+)$", index, re.M))
-    assert (tmp_path / "messages.js").read_text("utf-8").count("generated/") == count
+    assert set(re.findall(r"^## (\S+)$", text["known-failures"], re.M)) == own

@@ -5,13 +5,12 @@ import json
 import re
 from pathlib import Path
 
-import pytest
-
-from karamelo_py.language import registry, rules
+from karamelo_py.language import rules
 from karamelo_py.output.console import show
 from karamelo_py.output.record import RunRecord
 from karamelo_py.run.advice import known_failures
 from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS
+from karamelo_py.script.errors import codes
 
 PAGE = Path(__file__).parent.parent / "docs" / "run-record.md"
 SCENE = """
@@ -87,51 +86,94 @@ def test_a_wrong_script_leaves_no_record_unless_one_is_asked_for(run_script):
     assert record(checked, "c.json")["runs"][0]["points"] == 16
 
 
-@pytest.mark.parametrize("part", ["top", "run", "message"])
-def test_every_field_is_on_the_page(part, run_interpreted):
-    found = record(run_interpreted(SCENE.format(speed=100).replace("run(3)", "run(300)"), status=1))
+FITS = {
+    "object": dict, "array": list, "string": str, "integer": int, "number": (int, float),
+    "boolean": bool, "null": type(None),
+}  # fmt: skip
+
+
+def misfits(schema, value, path="record"):
+    """List where a value does not fit a JSON schema of types, enums, objects and arrays."""
+    if "enum" in schema:
+        return [] if value in schema["enum"] else [path]
+    types = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
+    if not isinstance(value, tuple(FITS[one] for one in types)):
+        return [path]
+    if types == ["array"]:
+        parts = [(schema["items"], one, f"{path}[{k}]") for k, one in enumerate(value)]
+    elif properties := schema.get("properties"):
+        names = {*schema["required"]} - {*value} | {*value} - {*properties}
+        if names:
+            return [f"{path}.{name}" for name in sorted(names)]
+        parts = [(properties[name], one, f"{path}.{name}") for name, one in value.items()]
+    else:
+        return []
+    return [wrong for part in parts for wrong in misfits(*part)]
+
+
+IMPLICIT = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(1, 0, 1, 0.25)
+    region(r, block, 0, 1)
+    material(m, linear, 1, 100, 0)
+    solid(s, region, r, 1, m, 0.25)
+    region(w, block, -0.1, 0.1)
+    group(w, nodes, region, w, all)
+    fix(w, velocity_nodes, w, 0)
+    fix(g, body_force, all, time)
+    scheme(quasi-static)
+    run(2)
+"""
+
+
+def test_three_scenes_fit_the_schema_and_the_page_has_its_fields(run_interpreted):
+    """One that ends, one that fails, and load steps."""
+    schema = json.loads((PAGE.parent / "_static" / "run.schema.json").read_text("utf-8"))
     ended = record(run_interpreted(SCENE.format(speed=1), folder="ended"))
-    fields = {
-        "top": found,
-        "run": ended["runs"][0],
-        "message": found["messages"][-1],
-    }[part]
+    thrown = SCENE.format(speed=100).replace("run(3)", "run(300)")
+    failed = record(run_interpreted(thrown, status=1, folder="failed"))
+    loaded = record(run_interpreted(IMPLICIT, folder="loaded"))
+    assert [found["status"] for found in (ended, failed, loaded)] == [
+        "finished", "failed", "finished",
+    ]  # fmt: skip
+    assert [wrong for one in (ended, failed, loaded) for wrong in misfits(schema, one)] == []
+    (run,) = loaded["runs"]
+    assert run["steps"] == 2 and "stable_dt" not in run and run["path_cells"] is None
     page = PAGE.read_text("utf-8")
-    assert not [name for name in fields if f"| `{name}` |" not in page]
+    runs, messages = (schema["properties"][name]["items"] for name in ("runs", "messages"))
+    fields = [name for of in (schema, runs, messages) for name in of["properties"]]
+    assert [name for name in fields if f"| `{name}` |" not in page] == []
 
 
 def codes_in_the_code() -> set[str]:
     """Codes that are given to errors and warnings, as constants: keyword, or third of a Trouble."""
-    found = []
+    found = set()
     for path in Path(known_failures.__file__).parents[2].rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            given = []
             if isinstance(node, ast.Call):
                 given = [word.value for word in node.keywords if word.arg == "code"]
                 given += node.args[2:3] * (getattr(node.func, "id", "") == "Trouble")
-                found += [one.value for one in given if isinstance(one, ast.Constant)]
-    return {code for code in found if code}
+            elif isinstance(node, ast.Dict):
+                pairs = zip(node.keys, node.values, strict=True)
+                given = [v for k, v in pairs if getattr(k, "value", "") == "code"]
+            elif isinstance(node, ast.Assign):
+                names = getattr(node.targets[0], "elts", node.targets)
+                values = getattr(node.value, "elts", [node.value])
+                given = [
+                    v for n, v in zip(names, values, strict=False) if getattr(n, "id", "") == "code"
+                ]
+            found |= {one.value for one in given if isinstance(getattr(one, "value", 0), str)}
+    return found - {""}
 
 
-def codes_of_known_failures() -> set[str]:
-    for family in registry.families():
-        for name in registry.names(family):
-            registry.find(family, name)
-    told = [
-        name
-        for (kind, part), some in rules._rules.items()
-        if kind == "failure" and part.__module__.startswith("karamelo_py.")
-        for _, name, *_ in some
-    ]
-    told += [f"{DOUBTED_UNITS}velocities", f"{DOUBTED_UNITS}material 'm'"]
-    return {rules.code_of(name) for name in told}
+def test_every_code_is_explained():
+    assert {*codes()} == codes_in_the_code()
+    assert all(words["title"] and words["text"] for words in codes().values())
 
 
-def test_every_code_is_on_the_page():
-    page = PAGE.read_text("utf-8").partition("| code | trouble |")[2]
-    table, _, names = page.partition("Known failures")
-    assert set(re.findall(r"^\| `([\w-]+)` \|", table, re.M)) == codes_in_the_code()
-    listed = re.findall(r"`([\w-]+)`", names)
-    assert listed == sorted(codes_of_known_failures())
+def test_doubted_units_are_known_failures():
+    assert rules.code_of(f"{DOUBTED_UNITS}material 'm'") == "units-of-material"
 
 
 def test_a_known_failure_has_a_code(run_interpreted):
@@ -152,7 +194,8 @@ def test_an_error_of_physics_has_cause_fix_and_the_command_that_resumes(run_inte
     assert lines[0] == error["text"] and error["cause"] not in error["text"]
     assert re.search(r" \(step \d+, t = [\d.e-]+\)$", error["text"])
     names = {"likely cause": "cause", "fix": "hint", "resume": "resume"}
-    assert lines[-3:] == [f"  {name}: {error[field]}" for name, field in names.items()]
+    assert lines[-4:-1] == [f"  {name}: {error[field]}" for name, field in names.items()]
+    assert lines[-1] == f"  more: karamelo-py help {error['code']}"
     command = error["resume"].partition("  #")[0].split()
     assert command[0] == "karamelo-py" and command[1].endswith("in.script")
     smaller = text.replace("dt_factor(3)\n    run(200)", "run(5)")

@@ -111,7 +111,7 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("fix 1 all body_force 0 -9.81", "fix(n1, body_force, all, 0, -9.81)"),
         ("compute Ek all ke", "compute(Ek, kinetic_energy, all)"),
         ("units lj", "units(m, kg, s)"),
-        ("write_data end.dat", "write_restart(file)"),
+        ("write_data end.dat", "write_restart(end.dat)"),
         ("region(b, block, 0 1, 0, 1)", "is a comma missing in '0 1'?"),
         ("eos(e, shock, 7, K, 6, 0, 5, 4)", "eos(e, shock, 7, K, 6, 5, 4, 0, 0, 0, 0)"),
         ("eos(e, shock, 7, 6)", "eos(e, shock, rho0, K, c0, S, 0, 0, 0, 0, 0)"),

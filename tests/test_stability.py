@@ -54,9 +54,9 @@ def test_the_courant_limit_of_a_bar_is_found(folder, capsys):
     assert 2.0 <= edge < 2.15
     text = (folder / "map.svg").read_text(encoding="utf-8")
     assert text.startswith("<?xml") and "c dt/h (1)" in text
-    out = capsys.readouterr().out
+    out, err = capsys.readouterr()
     (runs,) = re.findall(r"(\d+) of 21 cells were run", out)
-    counted = re.findall(r"^run (\d+) of at most 21: ", out, re.M)
+    counted = re.findall(r"^run (\d+) of at most 21: ", err, re.M)
     assert counted == [str(k + 1) for k in range(int(runs))]
     assert int(runs) == (table["run"] == "yes").sum() > 3
     assert re.search(r"times the program's stable step, for \d\d steps: longer runs may show", out)
@@ -112,7 +112,7 @@ def test_an_interrupted_map_is_drawn_and_goes_on(folder, monkeypatch, capsys):
     assert (folder / "map.svg").exists()
     monkeypatch.setattr(Launch, "run", run)
     assert main(["stability", "in.bar", *words]) == 0
-    assert "run 1 of at most 2: factor=3" in capsys.readouterr().out
+    assert "run 1 of at most 2: factor=3" in capsys.readouterr().err
     assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "failed"]
 
 

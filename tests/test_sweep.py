@@ -195,7 +195,7 @@ def test_an_interrupted_sweep_goes_on(folder, capsys):
         SCRIPT.replace("run(steps)", "run(if(speed == 1e-9, 4, steps))"), encoding="utf-8"
     )
     process = subprocess.Popen(slow, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    assert process.stdout.readline().startswith("1/2  speed=1e-9")
+    assert process.stderr.readline().startswith("1/2  speed=1e-9")
     second = folder / "sweep" / "speed=2e-9,steps=4000000" / "log.mpm"
     until = time.monotonic() + 60
     while not second.exists() and time.monotonic() < until:

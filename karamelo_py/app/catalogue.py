@@ -6,11 +6,11 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 
-from karamelo_py.language import registry
+from karamelo_py.language import registry, rules
 from karamelo_py.language.help import Help, describe
 from karamelo_py.language.signature import Parameter
 from karamelo_py.output.console import Console
-from karamelo_py.script.errors import ScriptError, meant, table
+from karamelo_py.script.errors import ScriptError, codes, meant, table
 
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
@@ -93,22 +93,34 @@ def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
         )
     if _singular(name) in families():
         return print_styles([name])
+    if name in codes():
+        return _explain_code(name, codes()[name]["title"], codes()[name]["text"])
     # Of three words, and more, one may be too many.
     fewer = [" ".join(given[:k] + given[k + 1 :]) for k in range(len(given) * (len(given) > 2))]
     said = next(filter(_about, [name, *fewer]), name)
     found, related = _arguments(name), _about(said)
+    known = [words for _, *words in rules.known_failures() if rules.code_of(words[0]) == name]
+    for about, reason, cure in known[:1]:
+        _explain_code(name, f"known failure: {about}", f"{reason}.\n\nFix: {cure}")
     if found:
         _explain_argument(name, found)
     if related:
         page = _Page()
-        page.say("\nSee also" if found else f"Commands and styles about {said}", "bold")
+        page.say("\nSee also" if found or known else f"Commands and styles about {said}", "bold")
         page.rows([(f"{family} {style}", family, style) for family, style in related])
-    if found or related:
+    if found or related or known:
         return 0
     if len(given) > 1 and meant(given[0], families()):
         raise _unknown("family", given[0], families())
     names = {n for f in families() for n in registry.names(f)}
     raise _unknown("command or style", name, names.union(commands))
+
+
+def _explain_code(code: str, title: str, text: str) -> int:
+    page = _Page()
+    page.say(code, "bold")
+    page.paragraph(f"{title}\n\n{text}")
+    return 0
 
 
 def _family(word: str) -> str:
@@ -179,8 +191,9 @@ def _explain(family: str, name: str) -> int:
 
 def _about(word: str) -> list[tuple[str, str]]:
     """Find commands and styles by parts of their name, then by their summary, else their text."""
-    words = [part for part in word.split() if len(part) > 2] or [word]  # without a, of, ...
     topics = {like: topic for topic, alike in table()["topics"].items() for like in alike}
+    word = topics.get(word.lower(), word)
+    words = [part for part in word.split() if len(part) > 2] or [word]  # without a, of, ...
     sought = [re.escape(topics.get(part.lower(), part)) for part in words]
     begins = [re.compile(rf"(?<![^\W_]){part}", re.IGNORECASE) for part in sought]
     found: list[list[tuple[str, str]]] = [[], [], [], []]

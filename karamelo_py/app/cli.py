@@ -130,11 +130,11 @@ def _dispatch(arguments: list[str]) -> int:
     except SystemExit:  # argparse has shown what was asked for
         return 0
     except ScriptError as error:
-        if "are required" in error.message:  # what is missing may be misspelt
-            known = commands.choices[arguments[0]].options()
-            odd = [word for word in arguments if word[:1] == "-" and word not in known]
-            said = (f"{word}: {near}" for word in odd if (near := meant(word, known)))
-            error.hint = next(said, None)
+        # An option that is missing may be misspelt.
+        known = commands.choices[arguments[0]].options()
+        odd = [word for word in arguments if word[:1] == "-" and word not in known]
+        said = (f"{word}: {near}" for word in odd if (near := meant(word, known)))
+        error.hint = error.hint or next(said, None)
         raise
     if surplus:
         raise _surplus(arguments, surplus, commands.choices.get(arguments[0], parser))

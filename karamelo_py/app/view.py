@@ -150,7 +150,7 @@ def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
     try:
         yield
     except ScriptError as error:
-        if error.unknown and not (error.hint or "").startswith("did you mean"):
+        if error.code in ("unknown-name", "unknown-column") and error.alike is None:
             error.hint = "a log beside the dumps (log.mpm, log.csv) knows the values of its columns"
             if options.script is None:
                 error.hint += ", and --script FILE the groups, solids and variables of the run"

@@ -237,7 +237,13 @@ def plot(
     """
     plots = hub.output.plots
     if ID in plots:
-        raise ScriptError(f"plot ID '{ID}' is already used", argument="ID", expected="another ID")
+        raise ScriptError(
+            f"plot ID '{ID}' is already used",
+            argument="ID",
+            expected="another ID",
+            code="already-used",
+            kind="plot",
+        )
     curve = PlottedCurve(every, x, y, axis, scale, label)
     curve.place = hub.place
     plots.add(ID, curve)

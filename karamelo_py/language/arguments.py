@@ -109,8 +109,8 @@ class Argument:
         try:
             return script.evaluate(parse_expression(self._raw), self._raw)
         except ScriptError as error:
-            if name := error.unknown:
-                numbers = self.numbers()
+            if error.code == "unknown-name":
+                name, numbers = error.name or "", self.numbers()
                 others = ", ".join(numbers) or "none so far"
                 few = one_of(name, seeds)
                 known = f"{few}, or a number that the script has set ({others})"

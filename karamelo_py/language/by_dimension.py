@@ -80,6 +80,7 @@ class Forms:
             place=gap.place if gap else None if missing else arguments[len(names)].place,
             expected=self.line(dimension),
             hint=f"is a comma missing in '{gap.text}'?" if gap else hint,
+            code="arguments",
         )
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
@@ -121,6 +122,7 @@ class Forms:
             place=argument.place,
             expected=self.line(dimension),
             hint=meant(word, known) if word else None,
+            code="argument",
         )
 
 

@@ -44,7 +44,7 @@ def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptEr
     family = family or "command"
     package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
     hint = f"tell the author of {style}{more}"
-    error = ScriptError(f"{name}{package}: {what}", place=place, hint=hint)
+    error = ScriptError(f"{name}{package}: {what}", place=place, hint=hint, code="plug-in")
     error.complete = True
     return error
 

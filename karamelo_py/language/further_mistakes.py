@@ -88,7 +88,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     on, and of no use thereafter.
     """
     found = first.others
-    seen = {first.message, *(error.message for error in found)}
+    seen = {error.message: error for error in (first, *found)}
     passed_over: list[Statement] = []
     dependents = Dependents()
 
@@ -97,11 +97,11 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         # twice: the second of the two was meant to have another, which nobody knows. So it does
         # behind a command of another program that says by other names what one here makes.
         for one in (error, *error.others):
-            kinds = {kind for kind, again in map(_given_twice, seen) if again} | dependents.kinds
-            follows = any(one.message.startswith(f"unknown {kind} '") for kind in kinds)
+            twice = {other.kind for other in seen.values() if other.code == "already-used"}
+            follows = one.code == "unknown-ID" and one.kind in twice | dependents.kinds
             if one.message not in seen and not follows:
                 found.append(one)
-            seen.add(one.message)
+            seen[one.message] = one
         error.others = []
 
     wrong = interpreter.statement
@@ -130,12 +130,6 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     for error in misnamed(interpreter, passed_over, dependents.names):
         tell(error)
     return sorted(found, key=_order)[:MOST]
-
-
-def _given_twice(message: str) -> tuple[str, bool]:
-    """Read the kind that a message is about, and if it says that an ID was given twice."""
-    kind, found, _ = message.rpartition(" ID '")
-    return kind.rpartition(": ")[2], bool(found) and "' is already used" in message
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:

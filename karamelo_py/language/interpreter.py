@@ -276,7 +276,9 @@ class Interpreter:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
             word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # no L/20
-            if error.unknown and re.fullmatch(rf"{letters}([-/.]\w+)*[-/.]{letters}", word):
+            if error.code == "unknown-name" and re.fullmatch(
+                rf"{letters}([-/.]\w+)*[-/.]{letters}", word
+            ):
                 error.hint = f'a text stands in quotes: "{word}"'
             raise
         self.presets.follow(statement)

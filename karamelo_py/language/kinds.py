@@ -90,7 +90,8 @@ class InputFile:
         expected = "a file in the current folder or beside the script"
         hint = meant(here.name, [p.name for p in files])
         message = f"the file {name} {what}"
-        raise ScriptError(message, place=argument.place, expected=expected, hint=hint)
+        place, code = argument.place, "no-file"
+        raise ScriptError(message, place=place, expected=expected, hint=hint, code=code)
 
 
 class TableFile(InputFile):
@@ -194,14 +195,13 @@ def _to_number(hub: Any, argument: Argument) -> float:
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
     """Suggest for an unknown name no other that changes in a run, which is no number here."""
-    close = re.fullmatch(r"did you mean '(\w+)'\?", error.hint or "")
-    if not (error.unknown and close) or close[1] in CONSTANTS or "value" in argument.text:
+    name, alike, numbers = error.name or "", error.alike, argument.numbers()
+    if error.code != "unknown-name" or alike is None or "value" in argument.text:
         return
-    numbers = argument.numbers()
-    if close[1] not in numbers:
+    if alike not in (*CONSTANTS, *numbers):
         known = ", ".join(numbers) or "none so far"
         error.expected = f"a number, or a variable that is one ({known})"
-        error.hint = meant(error.unknown, numbers) or f"set it first: {error.unknown} = ..."
+        error.hint = meant(name, numbers) or f"set it first: {name} = ..."
 
 
 def _to_integer(hub: Any, argument: Argument) -> int:

@@ -48,7 +48,7 @@ class Presets(dict[str, str]):
             raw, node = parse_text(self[name], "-var " + name)
             return self._script.evaluate(node, raw)
         except ScriptError as error:
-            if error.message.startswith("division by zero"):
+            if error.code == "division-by-zero":
                 raise
             return self[name]
         finally:

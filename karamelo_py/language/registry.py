@@ -92,6 +92,7 @@ def find(family: str, name: str) -> Any:
         if len(entries) > 1:
             raise ScriptError(
                 f"{family} '{name}' is offered by two packages: {origin(family, name)}",
+                name=name,
                 expected="one package for each style",
                 hint="uninstall one of them (pip uninstall ...)",
             )
@@ -104,6 +105,7 @@ def find(family: str, name: str) -> Any:
             package, what = _origin(entry), f"{type(error).__name__}: {error}"
             raise ScriptError(
                 f"{family} '{name}' of {package} cannot be loaded: {what}",
+                name=name,
                 hint=f"reinstall or repair {package.split()[0]}; it names {entry.value}",
             ) from error
     return _loaded[key]
@@ -130,6 +132,9 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
         hint = f"'{name}' is a style of {' and of '.join(others)}"
     raise ScriptError(
         f"unknown {family if family == 'command' else family + ' style'} '{name}'",
+        code="unknown-style",
+        name=name,
+        kind=family,
         expected=one_of(name, names(family), family) if styles else f"no {family} is installed",
         hint=hint,
     )

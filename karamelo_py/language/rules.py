@@ -44,7 +44,7 @@ class Advice(NamedTuple):
 
 def code_of(name: str) -> str:
     """Write a known failure as a code: ``shocks of material 'm'`` is shocks-of-material."""
-    words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
+    words = re.sub(r"'[^']*'( and '[^']*')*", "", name)  # names of the script
     return "-".join(re.findall(r"\w+", words.lower()))
 
 
@@ -61,6 +61,14 @@ def known_failure(
     _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
     if cause:
         gain(part, when=when, cause=cause, cure=cure)
+
+
+def known_failures() -> Iterator[tuple[type, str, str, str]]:
+    """List the known failures of parts that are loaded: part, name, reason and cure."""
+    for (kind, part), some in _rules.items():
+        for _, *words in some if kind == "failure" else ():
+            name, reason, cure = (re.sub(r"\{[^{}]+\}", "…", text) for text in words)
+            yield part, name, reason, cure
 
 
 def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:

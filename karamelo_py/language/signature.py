@@ -285,7 +285,8 @@ def _bind(
         if missing:
             message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         place = gap.place if gap else surplus.place if surplus else None
-        raise ScriptError(message, place=place, expected=syntax(target, name), hint=hint)
+        form = syntax(target, name)
+        raise ScriptError(message, place=place, expected=form, hint=hint, code="arguments")
     for k, argument in enumerate(given):
         parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
         bound.setdefault(parameter.name, []).append(argument)
@@ -332,7 +333,8 @@ def _unknown_keyword(
         hint = f"arguments are given by position: leave out '{word} ='"
     known = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
     message = f"there is no argument to be given as '{word} = ...'"
-    return ScriptError(message, place=argument.place, expected=known, hint=hint)
+    place = argument.place
+    return ScriptError(message, place=place, expected=known, hint=hint, code="arguments", name=word)
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
@@ -388,23 +390,20 @@ def _misfit(
     if re.fullmatch(r"0\d\d", argument.text):  # of 1,000
         hint = "commas separate arguments: a million is 1e6 or 1000000"
     message, place = f"{which} must be {text}, not {unfit.got}", unfit.place or argument.place
-    return ScriptError(message, place=place, expected=text, hint=hint)
+    return ScriptError(message, place=place, expected=text, hint=hint, code="argument")
 
 
 def _guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
 ) -> Place | None:
-    """Find the place of the argument that an error names, or else of the word it quotes."""
+    """Find the place of the argument that an error names, or else of the word at fault."""
     if isinstance(error.argument, int) and error.argument < len(arguments):
         plain = [argument for argument in arguments if argument.keyword() is None]
         return (arguments if error.argument >= 0 else plain)[error.argument].place
     if isinstance(error.argument, str) and bound.get(error.argument):
         return bound[error.argument][0].place
-    for word in re.findall(r"'([^']+)'", error.message):
-        for argument in arguments:
-            if argument.text in (word, f'"{word}"'):
-                return argument.place
-    return None
+    words = (error.name, f'"{error.name}"')
+    return next((a.place for a in arguments if a.text in words), None)
 
 
 def _joined(expected: list[Parameter]) -> str:

@@ -50,6 +50,9 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
     known = commands if statement else [*FUNCTIONS, *commands]
     return ScriptError(
         f"unknown {what} '{name}'",
+        code="unknown-command",
+        name=name,
+        kind=what,
         place=place,
         expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
         hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, known),
@@ -83,29 +86,33 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
             hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
         )
     published = [value for value in script.hub.values.names() if value not in SEEDS]
+    hint, alike = _meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS])
     return ScriptError(
         f"unknown name '{name}'",
         place=place,
-        unknown=name,
+        code="unknown-name",
+        name=name,
+        alike=alike,
         expected=f"a variable that is set ({listed(script.variables)}), a value of a fix or a "
         f"compute ({listed(published)}), or x, y, z, x0, y0, z0, time, timestep, dt, PI",
-        hint=_meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS]),
+        hint=hint,
     )
 
 
-def _meant_by(script: Any, name: str, known: list[str]) -> str:
-    """Guess what a name in an expression stands for; the surest guess first."""
+def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None]:
+    """Guess what a name in an expression stands for: the hint, and the known name if it is one."""
     own, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
         alone = isinstance(own, Assignment) and own.right.code.strip() == name
-        return f'write "{name.lower()}", in quotes' if alone else f"write {int(name[0] in 'tT')}"
+        said = f'"{name.lower()}", in quotes' if alone else str(int(name[0] in "tT"))
+        return f"write {said}", None
     if re.match("[vcf]_", name):  # as in LAMMPS
         same = [n for n in known if n == name[2:]]
         same = same or [n for n in known if re.fullmatch(f"{re.escape(name[2:])}_[^_]+", n)]
         if same or name[2:] in energies:
-            return f"write {' or '.join(same)}" if same else energies[name[2:]]
+            return f"write {' or '.join(same)}" if same else energies[name[2:]], None
     if name.upper() in WORDS:
-        return f"write {name.upper()}"
+        return f"write {name.upper()}", None
     by_style = {
         item.style: "_".join(filter(None, (ID, item.published[0])))
         for _, ID, item in _publishing(script)
@@ -114,14 +121,14 @@ def _meant_by(script: Any, name: str, known: list[str]) -> str:
     close = "time" if name == "t" else nearest(name, known)
     close = close or by_style.get(nearest(name, by_style) or "")
     if close and not (name in energies and close in script.variables):  # Ek is no modulus E
-        return f"did you mean '{close}'?"
+        return f"did you mean '{close}'?", close
     if re.match("leq|geq", name):
-        return f"{name[:3]} stands in front of a bound in fix velocity_nodes only"
+        return f"{name[:3]} stands in front of a bound in fix velocity_nodes only", None
     makes = ("", "fix", "compute")
     later = {ID: line for _, kind, ID, line in _ahead(script) if kind in makes}
     if below := nearest(name, later):
-        return f"did you mean '{below}', which stands further down, in line {later[below]}?"
-    return energies.get(name) or f"set it first: {name} = ..."
+        return f"did you mean '{below}', which stands further down, in line {later[below]}?", None
+    return energies.get(name) or f"set it first: {name} = ...", None
 
 
 def _publishing(script: Any) -> Iterator[tuple[str, str, Any]]:
@@ -194,7 +201,8 @@ def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
         elif own and _needs(script, name, own):
             hint = f"'{own}' and '{name}' need each other: set one of them without the other"
         expected = f"a name that is known here; {where}"
-        return ScriptError(what, place=place, expected=expected, hint=hint)
+        code = "used-before-defined"
+        return ScriptError(what, place=place, expected=expected, hint=hint, code=code)
     return None
 
 
@@ -215,6 +223,8 @@ def check_name(name: str) -> None:
     other = f"{name}(...) calls it" if what == "a command" else instead("command", name)
     raise ScriptError(
         f"'{name}' is {what} and cannot be assigned",
+        code="taken-name",
+        name=name,
         expected="a name that is free",
         hint=f"{other}; or choose {free}" if other else f"choose {free}",
     )

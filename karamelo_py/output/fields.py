@@ -246,17 +246,18 @@ def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -
 def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
     """Make the error for a column that is none of the `known`; `where` it stands."""
     known = list(known)
-    error = unknown(message, name, known, unknown=name, **where)
+    error = unknown(message, name, known, code="unknown-column", **where)
     error.expected = one_of(name, known, page="docs/reference/columns.md")
     others = table()["columns"].items()
     quantity = next((columns for columns, words in others if name.lower() in words), "")
     if there := [column for column in quantity.split() if column in known]:
-        error.hint = f"did you mean {', '.join(there)}?"
+        error.hint, error.alike = f"did you mean {', '.join(there)}?", there[0]
     component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())
     if component is not None:
         i, j = sorted("xyz".find(axis) + 1 or int(axis) for axis in component.groups()[1:])
         tensor = "e" if component[1] in ("e", "eps", "strain") else "s"
-        error.hint = f"did you mean '{tensor}{i}{j}'?"
+        error.alike = f"{tensor}{i}{j}"
+        error.hint = f"did you mean '{error.alike}'?"
     if name[:2] in ("v_", "c_"):  # as in LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
     return error

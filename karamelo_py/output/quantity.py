@@ -41,6 +41,7 @@ class Quantity:
         if per_point:
             raise ScriptError(
                 f"'{name}' depends on {min(per_point)}, which differs from point to point",
+                name=name,
                 expected="a formula of time and of values of fixes and computes",
             )
 
@@ -55,9 +56,9 @@ class Quantity:
         except ScriptError as error:
             if error.place is None:
                 error.place = argument.place
-            if error.unknown == text:
+            if error.code == "unknown-name" and error.name == text:
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
-                if error.hint.startswith("set it first"):
+                if error.alike is None:
                     error.hint = meant(text, KEYWORDS) or error.hint
                 if text in hub.fields.particle_names():
                     error.hint = (

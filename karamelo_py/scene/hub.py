@@ -46,6 +46,8 @@ class Catalogue(dict):
             raise ScriptError(
                 f"{self.kind} ID '{ID}' is already used{where}",
                 argument="ID",
+                code="already-used",
+                kind=self.kind,
                 expected="another ID",
             )
 
@@ -61,6 +63,9 @@ class Catalogue(dict):
             hint = f"{self.kind} '{ID}' stands further down: move line {below} up"
         raise ScriptError(
             f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
+            code="unknown-ID",
+            name=ID,
+            kind=self.kind,
             expected=f"one of {', '.join(known)}" if known else f"no {self.kind} is defined yet",
             hint=hint,
         )

@@ -429,7 +429,9 @@ class PointsView(View):
         if attribute in ("position", "velocity") and k < d:
             lo, hi = hub.domain.lo[k], hub.domain.hi[k]
             if attribute == "position" and ((values < lo) | (values > hi)).any():
-                raise ScriptError(f"'{name}' is from {lo:g} to {hi:g}, the edges of the domain")
+                raise ScriptError(
+                    f"'{name}' is from {lo:g} to {hi:g}, the edges of the domain", name=name
+                )
             getattr(self, attribute)[:, k] = values
         elif kind is not None:
             self[kind][:, column] = values
@@ -437,6 +439,7 @@ class PointsView(View):
             if not all(can(elastic_law(part.block.laws), with_stress) for part in self._rows.parts):
                 raise ScriptError(
                     f"'{name}' follows from the deformation of a material of this scene",
+                    name=name,
                     expected="materials in rate form, such as linear or eos-strength",
                 )
             self.set_stress({name[1:]: values})
@@ -451,6 +454,7 @@ class PointsView(View):
         else:
             raise ScriptError(
                 f"'{name}' cannot be set: it follows from other columns",
+                name=name,
                 expected=f"{', '.join(AXES[:d])}, v{', v'.join(AXES[:d])}, s11 and the like, T, "
                 "or a column of a field of a part",
             )

@@ -79,10 +79,13 @@ class ScriptError(Exception):
     others: "list[ScriptError]" = field(default_factory=list)
     # Where the text of a script is wrong: the statements in which it is not.
     statements: list = field(default_factory=list)
-    # The name in a formula, or the column, that nothing answers to.
-    unknown: str | None = None
-    # The kind of a trouble of a run, for programs; its likely cause; the command that resumes.
+    # What kind of message it is (codes.toml). The word at fault, what kind of thing it names, and
+    # a known name that is like it.
     code: str = ""
+    name: str | None = None
+    kind: str = ""
+    alike: str | None = None
+    # Of a run that went wrong: the likely cause, and the command that resumes.
     cause: str = ""
     resume: str = ""
     # Whether the statement it belongs to is known: nothing outside of it may add to it.
@@ -125,17 +128,19 @@ def render_message(
 ) -> str:
     """Lay out an error or a warning (`kind`) as it is shown to the user.
 
-    With a `code` it is a message of physics: likely cause, fix, and the command that resumes.
+    With a `code` of a run it is a message of physics: likely cause, fix, the command that resumes.
     """
+    physics = bool(code) and not codes().get(code, {}).get("script")
     lines = [f"{kind}: {message}"]
     if place is not None:
         lines = [f"{place.file}:{place.line}:{place.column}: {lines[0]}", *_marked(place)]
     if expected:
         lines.append(f"expected: {expected}")
-    if hint and not code:
+    if hint and not physics:
         lines.append(f"hint: {hint}")
-    physics = {"likely cause": cause, "fix": (code and hint) or "", "resume": resume}
-    lines += [f"  {name}: {text}" for name, text in physics.items() if text]
+    further = {"likely cause": cause, "fix": hint if physics else "", "resume": resume}
+    further["more"] = f"karamelo-py help {code}" if physics and code in codes() else ""
+    lines += [f"  {name}: {text}" for name, text in further.items() if text]
     return "\n".join(lines)
 
 
@@ -194,8 +199,15 @@ def unknown(
 ) -> ScriptError:
     """Make the error for a `name` that is none of the `known`, `where` it stands."""
     known = list(known)
-    hint = meant(name, known) or hint
-    return ScriptError(message, expected=one_of(name, known), hint=hint, **where)
+    few = nearest_few(name, known)
+    return ScriptError(
+        message,
+        name=name,
+        alike=few[0] if few else None,
+        expected=one_of(name, known),
+        hint=meant(name, known) or hint,
+        **where,
+    )
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
@@ -233,6 +245,13 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
 def table() -> dict[str, Any]:
     """Read the table other_programs.toml; nothing needs it before something is wrong."""
     path = Path(__file__).with_name("other_programs.toml")
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@cache
+def codes() -> dict[str, dict[str, Any]]:
+    """Read codes.toml: what each code of a message means."""
+    path = Path(__file__).with_name("codes.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 

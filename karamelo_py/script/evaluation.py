@@ -148,7 +148,8 @@ def _impossible(
         literal = isinstance(guilty, syntax.NumberLiteral)
         what = "" if literal else f": {raw.code[guilty.start : guilty.end]} is 0"
         message, expected = f"division by zero{what}", "a number other than 0"
-        return ScriptError(message, place=mark(raw, guilty), expected=expected)
+        place, code = mark(raw, guilty), "division-by-zero"
+        return ScriptError(message, place=place, expected=expected, code=code)
     if isinstance(error, OverflowError):
         message = f"the result of {_spelled(operation, shown)} is too large"
         return ScriptError(message, place=mark(raw, node), expected="at most 1.8e308")

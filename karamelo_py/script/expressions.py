@@ -93,6 +93,7 @@ class Expression:
         if needed:
             raise ScriptError(
                 f"'{self.text}' depends on {min(needed)}, which differs from point to point",
+                name=self.text,
                 expected="a formula of time and of values of fixes and computes",
             )
         return _evaluate(self._term, values)

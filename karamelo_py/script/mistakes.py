@@ -8,7 +8,6 @@ import re
 from typing import Any, NamedTuple
 
 from karamelo_py.script.errors import instead, table
-from karamelo_py.script.lammps import line_of, with_name
 from karamelo_py.script.syntax import Mistake
 
 CLOSES_NOTHING = (
@@ -295,6 +294,7 @@ def _side_by_side(at: _Stop) -> Mistake:
     )
 
 
+_NAMED = ("region", "group", "fix", "compute", "dump", "unfix", "uncompute", "undump")
 NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
@@ -302,10 +302,11 @@ def _block_or_call(name: str, words: list[str]) -> str:
     """Write the line to stand instead of ``name word word``."""
     if name in table()["blocks"]:
         return NO_BLOCKS
-    if own := line_of(name, words):
-        return own
+    if name in _NAMED and words and re.fullmatch(r"\d\w*", words[0]):
+        words[0] = f"n{words[0]}"  # no ID here
     if other := table()["otherwise"].get(name) or instead("command", name):
-        return other
+        form = re.match(r"(\w+)\(\w+\)", other)
+        return f"{form[1]}({words[0]})" if form and len(words) == 1 else other
     if name in ("fix", "compute") and len(words) > 2:
         other = instead(name, words[2]) or ""
         style = other.removeprefix("the style ")
@@ -313,9 +314,10 @@ def _block_or_call(name: str, words: list[str]) -> str:
             return other
         if words[1] == "all" or other:  # LAMMPS has the group in front of the style
             words[1:3] = style or words[2], words[1]
+    if name == "dump" and len(words) > 2:
+        words[2] = (instead(name, words[2]) or words[2]).removeprefix("the style ")
     if name == "group" and words[1:2] == ["region"] and len(words) == 3:  # as in LAMMPS
         words = [words[0], "particles", *words[1:], "all"]
-    words = with_name(name, words)
     if all(re.fullmatch(r"[\w.*/+-]+|\"[^\"]*\"", word) for word in words):
         return f"arguments go in parentheses: {name}({', '.join(words)})"
     return f"arguments go in parentheses: {name}(...)"

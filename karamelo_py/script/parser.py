@@ -32,6 +32,7 @@ def read_script(path: Path) -> str:
         where = "" if parent.is_dir() else f": the folder {parent} does not exist"
         raise ScriptError(
             f"there is no file {path}{where}",
+            code="no-file",
             expected="the name of a script",
             hint=f"did you mean {parent / close[0]}?" if close else None,
         ) from None
@@ -119,6 +120,7 @@ def _statement(
     if not right.code.strip():
         raise ScriptError(
             f"nothing is assigned to '{name}'",
+            code="syntax",
             place=whole.place,
             expected="a number, a text in quotes or an expression after the =",
             hint=f"{name} = 1",
@@ -137,6 +139,7 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
             comma = parts[2 * k - 1 if after else 2 * k + 1]
             raise ScriptError(
                 f"{name}: argument {k + 1} is missing",
+                code="syntax",
                 place=source.place(*grammar.span(comma)),
                 expected=f"something {'after' if after else 'before'} this comma",
                 hint="leave the comma out, or write NULL where a component is not to be set",
@@ -145,6 +148,7 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
             bare = ", or the word without quotes" if single[1].isidentifier() else ""
             raise ScriptError(
                 f"{single[0]} stands in single quotes",
+                code="syntax",
                 place=source.place(*single.span()),
                 expected="texts stand in double quotes",
                 hint=f'write "{single[1]}"{bare}',

@@ -55,7 +55,8 @@ class Mistake(Exception):
     def error(self, source: Source, offset: int = 0) -> ScriptError:
         """Make it an error with a place."""
         place = source.place(offset + self.start, offset + self.end)
-        return ScriptError(self.message, place=place, expected=self.expected, hint=self.hint)
+        said = {"expected": self.expected, "hint": self.hint, "code": "syntax"}
+        return ScriptError(self.message, place=place, **said)
 
 
 # ---- expressions; start and end are offsets into the text of the expression ---------------------

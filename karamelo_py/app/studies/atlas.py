@@ -51,7 +51,6 @@ true: that they do is what it shows."""
 KEPT = "entry.json"
 SAID = "said.txt"
 PICTURES = (".png", ".svg")
-_RUN = re.compile(r"\d+/\d+  |run \d+ of at most |note: |drawn: ")
 
 
 @dataclass
@@ -247,13 +246,8 @@ def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
 
 
 def abridged(said: str) -> str:
-    """Keep all commands, and what the last one found: orders, edges, the table of a machine.
-
-    Runs one by one, and the way to them, are in the tables of the folder of work.
-    """
+    """Keep all commands, and what the last one printed: orders, edges, the table of a machine."""
     lines = [line.rstrip() for line in said.rstrip().splitlines()]
     commands = [line for line in lines if line.startswith("$ ")]
     last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
-    found = [line for line in lines[last + 1 :] if not _RUN.match(line)]
-    orders = next((k for k, line in enumerate(found) if line.startswith("orders, of")), 0)
-    return "\n".join([*commands, *found[orders:]])
+    return "\n".join([*commands, *lines[last + 1 :]])

@@ -201,8 +201,7 @@ class Launch:
                 outcome.reason += f"; likely cause: {error['cause']}"
             if "points" not in facts and outcome.code not in _NOT_ITS_OWN + _NOT_OF_SCRIPT:
                 outcome.status = "refused"
-                hint = error.get("hint", "")
-                outcome.reason += f"; {hint}" * hint.startswith("did you mean")
+                outcome.reason += f"; {error['hint']}" if "hint" in error else ""
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:

@@ -1,6 +1,5 @@
 """Runs judged by a log column, such as an energy, that should stay: a cell for each."""
 
-import re
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,12 +10,11 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import record_of, worded
 from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
+from karamelo_py.script.errors import codes
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
-_OWN = re.compile(r"^\w+: (?=point)| at \([^)]*\)| \((through|step \d+, t =)[^)]*\)")
-_POINT = re.compile(r"point \d+ of solid '[^']*'")
 
 
 class Kept(NamedTuple):
@@ -80,8 +78,9 @@ def look_at(
 
 
 def _general(note: Mapping[str, str]) -> str:
-    """The known cause in a warning or an error; without one its text, without what is its own."""
-    return note.get("cause") or _POINT.sub("a point", _OWN.sub("", note["text"]))
+    """The known cause in a warning or an error; else what its kind means, else its text."""
+    title = codes().get(note.get("code", ""), {}).get("title")
+    return note.get("cause") or title or note["text"]
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:

@@ -199,7 +199,7 @@ class _Display:
         done, of = self.progress
         number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
         line = ", ".join([_said(case), *numbers, f"{shown(found['seconds'])} s", ended(found)])
-        print(f"{number} {line}", flush=True)
+        print(f"{number} {line}", file=sys.stderr, flush=True)
 
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
         if self.bar.disable:
