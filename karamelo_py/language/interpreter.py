@@ -57,7 +57,7 @@ class Interpreter:
 
     @property
     def waits(self) -> bool:
-        """Tell if a script is in the midst of its statements."""
+        """Tell if a script is in the middle of its statements."""
         return bool(self.frames)
 
     def include(self, name: str) -> None:

@@ -27,7 +27,7 @@ def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
 class Record:
     """The statements that a script has done so far, in the order in which they were begun.
 
-    Commands that only say how a run goes on or what it writes (``may_differ``) are not in it. By
+    Commands that only say how a run continues or what it writes (``may_differ``) are not in it. By
     the number of a statement it has the `values` that its calls of value(...) gave.
     """
 
@@ -64,7 +64,7 @@ class Replay:
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
-        """Go on to the next statement, `text`; refuse another one than the first time."""
+        """Take the next statement, `text`; refuse another one than the first time."""
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]

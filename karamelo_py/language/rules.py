@@ -64,7 +64,7 @@ def known_failure(
 
 
 def known_failures() -> Iterator[tuple[type, str, str, str]]:
-    """List the known failures of parts that are loaded: part, name, reason and cure."""
+    """List the known failures of parts that are loaded: part, name, reason and fix."""
     for (kind, part), some in _rules.items():
         for _, *words in some if kind == "failure" else ():
             name, reason, cure = (re.sub(r"\{[^{}]+\}", "…", text) for text in words)

@@ -55,8 +55,8 @@ class Mistake(Exception):
     def error(self, source: Source, offset: int = 0) -> ScriptError:
         """Make it an error with a place."""
         place = source.place(offset + self.start, offset + self.end)
-        said = {"expected": self.expected, "hint": self.hint, "code": "syntax"}
-        return ScriptError(self.message, place=place, **said)
+        expected, hint = self.expected, self.hint
+        return ScriptError(self.message, place=place, expected=expected, hint=hint, code="syntax")
 
 
 # ---- expressions; start and end are offsets into the text of the expression ---------------------
