@@ -28,7 +28,8 @@ def save_state(request: dict) -> int:
     from comms import learn_at_random, together
     from states import final_columns, final_hub, final_state
 
-    from karamelo_py.run import access, tiles
+    from karamelo_py.output import fields
+    from karamelo_py.run import tiles
     from karamelo_py.run.checkpoint import arrays as storing
     from karamelo_py.run.mpi import partition, subdomain
     from karamelo_py.run.mpi.whole import Whole
@@ -44,7 +45,7 @@ def save_state(request: dict) -> int:
         tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 4, 2: 2, 3: 2}
     # One process has all points in a piece, several a few; files of HDF5 are the same then, too.
     piece = 16 if request["ranks"] > 1 else 1 << 17
-    access.PIECE = storing.PIECE = piece
+    fields.PIECE = storing.PIECE = piece
     hdf5.PIECE = 16
     try:
         folder = request["out"] and Path(request["out"])

@@ -2,19 +2,30 @@
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import known_to_laws
+from karamelo_py.compiler.fields import rows_of_points
+from karamelo_py.kernels.arrays import (
+    Block,
+    Points,
+    Setup,
+    arrays_of,
+    known_to_laws,
+    made_of,
+    some_of,
+)
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
-from karamelo_py.output.node_columns import BROUGHT, NodeFields
-from karamelo_py.output.point_table import PointTable, Rows, absent, declared_columns
+from karamelo_py.output.node_columns import NodeTable
+from karamelo_py.output.point_table import Part, PointTable, Rows, absent, declared_columns
 from karamelo_py.points.grid import Bounces
 from karamelo_py.points.laws import can, dissipated_energy, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
@@ -22,58 +33,172 @@ from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, one_of, table, unknown
 from karamelo_py.script.expressions import Expression
 
+LAST = 2**62  # above all numbers of points
 PIECE = 1 << 17  # points that are looked at together
 
 
 class Fields(PointTable):
-    """The points and nodes of the running scene: columns of all points, sums over them, names."""
+    """The points and nodes of a scene: all points as a table, in pieces, and sums over them; names.
 
-    def __init__(self, hub: Scene):
+    They are read from one `simulation`, or from the present arrays of the scene.
+    """
+
+    def __init__(self, hub: Scene, simulation: Any = None):
         self.hub = hub
+        self._own = simulation
         self._key: Any = None
         self._cache: dict[str, Any] = {}
 
     @property
+    def simulation(self) -> Any:
+        """The arrays of the scene."""
+        return self.hub.simulation if self._own is None else self._own
+
+    @property
+    def setup(self) -> Setup:
+        """The arrays that kernels take."""
+        return self.simulation.setup
+
+    @property
+    def comm(self) -> Any:
+        """The processes that have parts of the points."""
+        return self.simulation.comm
+
+    @property
     def _rows(self) -> Rows:
-        """All points; the cache of what was made of them is forgotten when they have gone on."""
-        simulation = self.hub.simulation
+        """All points; the cache of what was made of them is forgotten when they have moved."""
+        simulation = self.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
             self._key = key
             self._cache.clear()
-        return simulation.points.rows()
+        return self.rows()
 
-    def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """The points, so many at a time, by id; with `to_first` the first process gets them all."""
-        return self.hub.simulation.points.pieces(to_first=to_first)
-
-    @property
-    def node_count(self) -> int:
-        """Number of nodes."""
-        return sum(lattice.node_count for lattice in self.hub.lattices)
+    def rows(self) -> Rows:
+        """Return all points, in the order of their ids, for a table."""
+        simulation = self.simulation
+        setup, present = simulation.setup, simulation.present
+        parts = [Part(block, None, block.points.id) for block in setup.blocks]
+        comm = simulation.comm if simulation.comm.size > 1 else None
+        return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: Any) -> np.ndarray:
-        """Ids (0-based) of a particle group, without deleted points."""
-        return self.hub.simulation.points.members(group)
+        """List the ids (0-based) of a particle group, without deleted points."""
+        present = self.simulation.present
+        ids = np.arange(len(present)) if group.all else group.ids
+        return ids if present.all() else ids[present[ids]]
 
-    def energy(self, kind: str, group: Any) -> float:
-        """Energy of a particle group: kinetic (sum m v^2 / 2), stored or dissipated."""
-        return self.hub.simulation.points.total(kind, group)
+    def total(self, name: str, group: Any = None) -> float:
+        """Sum a quantity of `SUMMED` over all points, or over a group; without rounding."""
+        limbs = np.zeros((1, LIMBS), np.int64)
+        for block in self.setup.blocks:
+            values = SUMMED[name](self.setup, block)
+            if values is not None and not (group is None or group.all):
+                values = values[group.has(block.points.id)]
+            if values is not None:
+                add_all(limbs, 0, values)
+        return rounded(self.comm.allreduce(limbs)[0])
+
+    def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
+        """Yield the local points of a group in pieces: a block, and rows of it."""
+        for block in self.setup.blocks:
+            ids = block.points.id
+            for first in range(0, len(ids), PIECE):
+                rows = np.arange(first, min(first + PIECE, len(ids)))
+                if not (group is None or group.all):
+                    rows = rows[group.has(ids[rows])]
+                if len(rows):
+                    yield block, rows
+
+    def some(self, group: Any) -> Iterator[PointTable]:
+        """Yield the local points of a group in pieces, and finally an empty table."""
+        for block, rows in self.rows_of(group):
+            yield self._some(block, rows)
+        yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
+
+    def _some(self, block: Block, rows: np.ndarray) -> PointTable:
+        parts, ids = [Part(block, rows, slice(None))], block.points.id[rows]
+        return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
-        """Sums (k,) over the points of a part's group, rounded once: of processes and of one alike.
+        """Sum the terms of a part's method `name` over the points of its group; no rounding.
 
-        The method `name` of the part, a compute or fix as it stands in the scene, is called with
-        fields of some of the points after others, and `arguments`, and returns terms (k, n).
+        Called with tables of some of the points, and the `arguments`, it returns rows of terms
+        (k, n), or the number of sums, the sum (n,) of each term, and terms.
         """
-        return self.hub.simulation.points.added_up(part, name, *arguments)
+        limbs = np.empty((0, LIMBS), np.int64)
+        for some in self.some(part.group):
+            found = getattr(part, name)(some, *arguments)
+            count, rows, terms = found if isinstance(found, tuple) else (len(found), None, found)
+            if not len(limbs):
+                limbs = np.zeros((count, LIMBS), np.int64)
+            if rows is not None:
+                add_rows(limbs, rows, terms)
+                continue
+            for k in range(count):
+                add_all(limbs, k, np.ascontiguousarray(terms[k], float))
+        totals = self.comm.allreduce(limbs)
+        there = totals.any(axis=1)  # few of the thousands for a quantile
+        return np.array([rounded(t) if one else 0.0 for t, one in zip(totals, there, strict=True)])
+
+    def summed(self, terms: np.ndarray) -> np.ndarray:
+        """Sum local terms (n,) or (n, k) over all processes, rounded once."""
+        columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
+        limbs = np.zeros((len(columns), LIMBS), np.int64)
+        for k, column in enumerate(columns):
+            add_all(limbs, k, np.ascontiguousarray(column))
+        of_all = sum(self.comm.everyone("a total", limbs))
+        return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
-        """List what a method of a part says of fields of some points of its group after others.
+        """Collect the results of a part's method for its group, piece by piece."""
+        found = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
+        own = [one for one in found if one is not None]
+        return [one for of_rank in self.comm.allgather(own) for one in of_rank]
 
-        Which points are together, and their order, depends on processes and steps.
-        """
-        return self.hub.simulation.points.each(part, name, *arguments)
+    def seen(self, say: Callable, *arguments: Any) -> list:
+        """Collect a function's result for the points of each process."""
+        return self.comm.allgather(say(self.simulation, *arguments))
+
+    def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
+        """Return the largest value of a function of points, and the first point with it."""
+
+        def own() -> tuple[float, int]:
+            found = -inf, 0
+            for some in self.some(None):
+                values = of(some)
+                value = np.fmax.reduce(values, initial=-inf)
+                first = some.numbers[values == value].min(initial=LAST)
+                found = max(found, (float(value), -int(first)))
+            return found
+
+        value, number = max(self.comm.allgather(own()))
+        return value, -number
+
+    def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
+        """Yield all points in pieces; `to_first`: only to the first of several processes."""
+        s = self.setup
+        orders = [np.argsort(block.points.id) for block in s.blocks]
+        known = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
+        gather = self.comm.gather if to_first else self.comm.allgather
+        present = self.simulation.present
+        for first, end in ranges(len(present)):
+            blocks = [
+                some_of(block, order[slice(*np.searchsorted(ids, (first, end)))])
+                for block, order, ids in zip(s.blocks, orders, known, strict=True)
+            ]
+            if self.comm.size > 1:
+                own = [[array for _, array in arrays_of(block.points)] for block in blocks]
+                found = gather(own)
+                if found is None:
+                    continue
+                blocks = [
+                    block._replace(points=_joined(block.points, parts))
+                    for block, parts in zip(blocks, zip(*found, strict=True), strict=True)
+                ]
+            parts = [Part(block, None, block.points.id - first) for block in blocks]
+            ids = np.arange(first, end)
+            yield PointTable(self.hub, Rows(s, parts, ids, present[first:end]))
 
     def particle_names(self) -> list[str]:
         """Names that `particle` knows."""
@@ -106,20 +231,37 @@ class Fields(PointTable):
         present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
         return absent(node_columns.COLUMNS, present)
 
-    def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeFields]:
-        """Fields of all nodes, of which `names` are asked for, so many at a time, see `pieces`."""
-        brought = [name for name in names if name in BROUGHT]
-        for rows in self.hub.simulation.nodes.pieces(brought, to_first=to_first):
-            yield NodeFields(self.hub, rows)
+    def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeTable]:
+        """Fields of all nodes, of which `names` are asked for, in pieces, see `pieces`."""
+        return self.simulation.nodes.pieces(names, to_first=to_first)
+
+    @property
+    def node_count(self) -> int:
+        """Number of nodes."""
+        return sum(lattice.node_count for lattice in self.hub.lattices)
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
         """The number of nodes with mass, and the last of them."""
-        return self.hub.simulation.nodes.occupied()
+        return self.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
         """A field of all nodes, (n,); nodes without mass are at rest."""
         return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
+
+
+def ranges(count: int) -> Iterator[tuple[int, int]]:
+    """Yield the begin and end of consecutive pieces of `count` items."""
+    return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
+
+
+def _joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
+    """Join points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
+    count = sum(part[0].shape[-1] for part in parts)
+    made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    for array, same in zip(made, zip(*parts, strict=True), strict=True):
+        np.concatenate(same, axis=-1, out=array)
+    return made_of(points, made)
 
 
 def _kinetic(s: Any, block: Any) -> np.ndarray:

@@ -17,35 +17,27 @@ from karamelo_py.output.point_table import AXES, declared_columns, volumes_befor
 from karamelo_py.points.laws import can, constrained_velocity
 
 
-class NodeRows(NamedTuple):
-    """The nodes with numbers from `first` to before `end`: their rows in the arrays of nodes."""
+class NodeTable(NamedTuple):
+    """Columns of some nodes with consecutive numbers; nodes without mass are at rest."""
 
-    first: int
-    end: int
+    hub: Scene
+    ids: np.ndarray
     kin: Any
-    arrays: dict[str, np.ndarray]  # by name, as in a file to go on from
+    arrays: dict[str, np.ndarray]  # by name, as in a restart file
     brought: dict[str, np.ndarray]  # sums over the points that were asked for (`BROUGHT`)
     loaded: dict[str, int]  # number of nodes with mass that each fix acts on, by ID
-
-
-class NodeFields:
-    """Named fields of some nodes, one number after another; nodes without mass are at rest."""
-
-    def __init__(self, hub: Scene, rows: NodeRows):
-        self.hub, self.rows = hub, rows
-        self.ids = np.arange(rows.first, rows.end)
 
     def node(self, name: str) -> np.ndarray:
         """Return a field of the nodes, (n,)."""
         if name == "T" and self.hub.update.thermal:
-            mass = self.rows.arrays["heat/sums"][:, MASS]
-            return np.where(mass > 0, self.rows.arrays["heat/velocity"][:, 0], 0.0)
+            mass = self.arrays["heat/sums"][:, MASS]
+            return np.where(mass > 0, self.arrays["heat/velocity"][:, 0], 0.0)
         if (show := COLUMNS.get(name)) is not None:
             return show(self)
         if name in (shown := declared_columns(self.hub, "node_fields")):
             kind, k = shown[name]
-            array = self.rows.arrays.get(f"nodes/{fields.name_of(kind)}")
-            if array is not None and k < kind.shape(self.rows.kin):
+            array = self.arrays.get(f"nodes/{fields.name_of(kind)}")
+            if array is not None and k < kind.shape(self.kin):
                 return array[:, k].astype(float)
         return np.zeros(len(self.ids))
 
@@ -69,7 +61,7 @@ def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
     return found
 
 
-def mask(nodes: NodeFields) -> np.ndarray:
+def mask(nodes: NodeTable) -> np.ndarray:
     """Karamelo's bits: 1 for all nodes, 2 for those of the first group, 4 of the second, ..."""
     bits = np.ones(len(nodes.ids))
     for k, group in enumerate(nodes.hub.groups.values(), 1):
@@ -78,13 +70,13 @@ def mask(nodes: NodeFields) -> np.ndarray:
     return bits
 
 
-def _among(members: np.ndarray, nodes: NodeFields) -> np.ndarray:
+def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
     """Find the nodes that are among ascending numbers."""
-    first, end = nodes.rows.first, nodes.rows.end
-    return members[slice(*np.searchsorted(members, (first, end)))] - first
+    first = nodes.ids[0]
+    return members[slice(*np.searchsorted(members, (first, nodes.ids[-1] + 1)))] - first
 
 
-def kind_of_node(axis: int, nodes: NodeFields) -> np.ndarray:
+def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
     """Karamelo's type of a node along one axis.
 
     Splines: -2 and -1 at the lower edge and beside it, 2 and 1 at the upper one, 0 within.
@@ -104,16 +96,16 @@ def kind_of_node(axis: int, nodes: NodeFields) -> np.ndarray:
     return found
 
 
-def load(axis: int, nodes: NodeFields) -> np.ndarray:
+def load(axis: int, nodes: NodeTable) -> np.ndarray:
     """Add up the loads of fixes on nodes, and on points, whose weights bring them to the nodes."""
-    hub, rows = nodes.hub, nodes.rows
-    out = rows.brought[f"b{AXES[axis]}"].copy()
+    hub = nodes.hub
+    out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
         return out
     mass, place = nodes.node("mass"), nodes.positions()
     dt = float(hub.values.array[TIME + 2])
-    momentum = rows.arrays["nodes/sums"][:, of_momentum(rows.kin) + axis]
-    for ID, count in rows.loaded.items():
+    momentum = nodes.arrays["nodes/sums"][:, of_momentum(nodes.kin) + axis]
+    for ID, count in nodes.loaded.items():
         fix = hub.fixes[ID]
         if fix.formulas[axis] is None:
             continue
@@ -127,11 +119,11 @@ def load(axis: int, nodes: NodeFields) -> np.ndarray:
     return out
 
 
-def of_vector(name: str, first: Callable, axis: int, nodes: NodeFields) -> np.ndarray:
+def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.ndarray:
     """Return a component of a vector, which begins at ``first(kin)`` in an array of nodes."""
     if axis >= nodes.hub.domain.dimension:
         return np.zeros(len(nodes.ids))
-    component = nodes.rows.arrays[name][:, first(nodes.rows.kin) + axis]
+    component = nodes.arrays[name][:, first(nodes.kin) + axis]
     return np.where(nodes.node("mass") > 0, component, 0.0)
 
 
@@ -144,7 +136,7 @@ def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, 
 
 
 # Columns of every scene; those with None only some scenes have, in others they are 0.
-COLUMNS: dict[str, Callable[[NodeFields], np.ndarray] | None] = {
+COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(
         [grid.first for grid in nodes.hub.lattices], nodes.ids, side="right"
@@ -153,10 +145,10 @@ COLUMNS: dict[str, Callable[[NodeFields], np.ndarray] | None] = {
     **vector("v*", "velocity"),
     **vector("v*_update", "update"),
     **vector("f*", "sums", of_force),
-    "mass": lambda nodes: nodes.rows.arrays["nodes/sums"][:, MASS].astype(float),
-    "vol": lambda nodes: nodes.rows.brought["vol"],
+    "mass": lambda nodes: nodes.arrays["nodes/sums"][:, MASS].astype(float),
+    "vol": lambda nodes: nodes.brought["vol"],
     "mask": mask,
-    "rigid": lambda nodes: (nodes.rows.brought["rigid"] > 0) * 1.0,
+    "rigid": lambda nodes: (nodes.brought["rigid"] > 0) * 1.0,
     "T": None,
     **{f"b{axis}": partial(load, k) for k, axis in enumerate(AXES)},
     **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},

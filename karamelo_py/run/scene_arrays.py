@@ -18,9 +18,10 @@ from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
 from karamelo_py.kernels.totals import WORK, add_to
+from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
-from karamelo_py.run.access import NodesByNumber, PointsById
+from karamelo_py.run.access import NodesByNumber
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.lower.build import State, check_scene, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
@@ -69,7 +70,7 @@ class SceneArrays:
         self.hub = hub
         self.comm: SerialComm = hub.settings.comm
         comm = self.comm
-        self.points = PointsById(self)
+        self.points = Fields(hub, self)
         self.nodes = NodesByNumber(self.points)
         self.key = scene_key(hub)
         self.count = sum(s.count for s in hub.solids.values())

@@ -219,6 +219,7 @@ class Hub:
         self.fields = Fields(self)
         self.functions: dict[str, Any] = {}  # in Python, that a program has given
         self.running: Any = None  # the run in progress
+        self._fits_run: Any = None  # the last one that found the arrays to fit the scene
         self.runs: list[dict[str, float]] = []  # published values at the end of each so far
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []  # times and messages, for those who watch
@@ -239,8 +240,12 @@ class Hub:
 
     @property
     def simulation(self) -> Any:
-        """The arrays of the scene as it is now, made when first asked for."""
-        if self._simulation is None or not self._simulation.fits(self):
+        """The arrays of the scene as it is now, made when first asked for; a run changes none."""
+        run, known = self.running, self._simulation
+        if known is not None and run is not None and run is self._fits_run:
+            return known
+        self._fits_run = run
+        if known is None or not known.fits(self):
             engine = registry.find("engine", self.settings.engine)
             with attributed(self):
                 self._simulation = engine(self, self._simulation)

@@ -392,20 +392,12 @@ def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
     return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
 
 
-def sized(points: Points, count: int, *, anew: bool = False) -> Points:
-    """Give points of this kind, so many: `points`, where they are as many, if not `anew`."""
-    if points.mass.size == count and not anew:
+def sized(points: Points, count: int) -> Points:
+    """Return arrays for `count` points of this kind; `points` itself if the number is the same."""
+    if points.mass.size == count:
         return points
     shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
     return made_of(points, [rows_of_points(*shape) for shape in shapes])
-
-
-def joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
-    """Join points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
-    made = sized(points, sum(part[0].shape[-1] for part in parts), anew=True)
-    for (_, array), same in zip(arrays_of(made), zip(*parts, strict=True), strict=True):
-        np.concatenate(same, axis=-1, out=array)
-    return made
 
 
 def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:

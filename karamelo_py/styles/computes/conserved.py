@@ -17,7 +17,7 @@ class Energy(Compute):
     measured = ""
 
     def refresh(self) -> None:
-        self.publish_all(*[self.hub.fields.energy(self.measured, self.group)] * len(self.published))
+        self.publish_all(*[self.hub.fields.total(self.measured, self.group)] * len(self.published))
 
 
 class KineticEnergy(Energy):
@@ -161,7 +161,7 @@ class EnergyBalance(Compute):
 
     def refresh(self) -> None:
         kinds = "kinetic", "stored", "dissipated"
-        parts = [self.hub.fields.energy(kind, self.group) for kind in kinds]
+        parts = [self.hub.fields.total(kind, self.group) for kind in kinds]
         work = self.work.evaluate(self.hub.values) if self.work is not None else 0.0
         energies = total(parts)
         drift = self._drift(energies - work, max(abs(part) for part in (*parts, work)))
