@@ -4,6 +4,7 @@ import inspect
 import json
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -457,6 +458,35 @@ def test_the_reference_is_written_for_every_style(tmp_path):
     assert inspect.getdoc(reference_pages)
 
 
+# Questions of users, and the page that the search of the site shows first.
+QUESTIONS = {
+    "moving wall": "howto/moving-wall",
+    "stress at a probe": "howto/probe",
+    "periodic boundaries": "limits",
+    "restart": "howto/restart",
+    "import mesh": "howto/mesh",
+    "write a fix": "howto/plugin",
+    "units": "units",
+    "why did my run stop": "messages/index",
+    "friction between two bodies": "howto/contact",
+    "what time step": "howto/time-step",
+    "Karamelo script fails": "howto/from-karamelo",
+    "cite": "versions",
+    "pore pressure": "limits",
+    "retaining wall force": "howto/boundary",
+    "free rigid body": "limits",
+    "JWL": "limits",
+    "Mooney-Rivlin": "limits",
+    "terrain raster": "limits",
+    "strength reduction": "howto/safety-factor",
+    "LS-DYNA": "coming-from",
+    "it blew up": "howto/blew-up",
+    "how many cells": "choose",
+    "compare with an experiment": "howto/experiment",
+    "pandas": "howto/paraview",
+}
+
+
 @pytest.mark.full  # .ci/run builds it, too
 def test_the_site_builds_without_warnings(tmp_path):
     for module in ("sphinx", "myst_nb", "ipykernel"):
@@ -468,6 +498,11 @@ def test_the_site_builds_without_warnings(tmp_path):
     command += ["-d", str(tmp_path / "doctrees"), str(ROOT / "docs"), str(tmp_path / "html")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
+    if node := shutil.which("node"):
+        search = [node, str(ROOT / "tests" / "data" / "search.js"), str(tmp_path / "html")]
+        found = subprocess.run([*search, *QUESTIONS], capture_output=True, text=True, check=True)
+        first = dict(zip(QUESTIONS, found.stdout.splitlines(), strict=True))
+        assert {q: page for q, page in first.items() if page != QUESTIONS[q]} == {}
 
 
 @pytest.mark.xdist_group("disks")

@@ -1,4 +1,4 @@
-"""A folder in which one program writes: claimed while it does, however it ends."""
+"""Lock on an output folder, so that two programs do not write to it at once."""
 
 import errno
 import os
@@ -7,20 +7,20 @@ from pathlib import Path
 
 
 class Claim:
-    """Hold a folder, until `release` or the end of the program."""
+    """Lock on a folder, held until `release` or the end of the program."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# Within a program a folder is claimed once: it knows of its own simulations.
+# One claim per folder and process: simulations of one process may share it.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 
 def claim(folder: Path) -> Claim | None:
-    """Claim a folder; None where another program does.
+    """Lock a folder; return None if another program has locked it.
 
-    Of file systems without locks, and of Windows, others are none of our business.
+    On file systems without locks, and on Windows, the folder is always granted.
     """
     try:
         import fcntl

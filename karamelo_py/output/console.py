@@ -1,6 +1,6 @@
 """Output on the terminal: banner, log lines, progress, warnings, the table at the end.
 
-On a terminal Rich draws a live bar; into a pipe or a file go the same facts as plain lines. Every
+On a terminal Rich draws a progress bar; pipes and files get the same facts as plain lines. Every
 line is flushed.
 """
 
@@ -15,18 +15,17 @@ from typing import Any, TextIO
 # Seconds between two redraws of the bar, and between two plain progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar under every line, which takes a quarter of a millisecond. Lines that come
-# faster than QUICK (seconds) for longer than BURST lines are written in bundles, one every LINES
-# seconds.
+# Rich redraws the bar after every line, in a quarter of a millisecond. Lines that come faster than
+# QUICK (seconds) for more than BURST lines are written in bundles, one every LINES seconds.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05
 
 
 class Console:
-    """The one place that writes to standard output and standard error, or to `out` and `err`.
+    """All output to standard output and standard error, or to `out` and `err`.
 
-    Whether `out` is a `terminal` is found out by default. A `quiet` one writes warnings only.
+    `terminal` is detected by default. If `quiet`, only warnings are written.
     """
 
     def __init__(
@@ -61,7 +60,7 @@ class Console:
 
     @property
     def terminal(self) -> bool:
-        """Tell if somebody looks at it live."""
+        """Whether `out` is an interactive terminal."""
         if self._terminal is None:
             isatty = getattr(self.out, "isatty", None)
             self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"
@@ -70,7 +69,7 @@ class Console:
     # Lines
 
     def say(self, text: str = "", style: str | None = None) -> None:
-        """Write a line (or several); on a terminal in a style of Rich."""
+        """Write one or more lines; on a terminal in a style of Rich."""
         if self.quiet or self._broken:
             return
         self._release()
@@ -100,7 +99,7 @@ class Console:
                 self._release()
 
     def banner(self, title: str, facts: Mapping[str, Any]) -> None:
-        """Write what is about to run: a title and facts, one line each."""
+        """Write the banner of a run: a title and facts, one per line."""
         names = max(map(len, facts), default=0)
         rows = [f"  {name.ljust(names)}  {show(value)}" for name, value in facts.items()]
         self.say(title, "bold")
@@ -112,7 +111,7 @@ class Console:
         stages: Sequence[tuple[str, float]] = (),
         title: str = "Run finished",
     ) -> None:
-        """Write the table at the end of a run: facts, then the parts of it and their seconds."""
+        """Write the closing table of a run: facts, then its stages and their seconds."""
         total = sum(seconds for _, seconds in stages) or 1.0
         parts = {
             f"  {name}": f"{f'{seconds:.3g} s':>8}  {f'{100 * seconds / total:.0f} %':>8}"
@@ -121,7 +120,7 @@ class Console:
         self.banner(title, {**facts, **parts})
 
     def leave(self) -> None:
-        """Nobody looks any more, and nothing can be written to the terminal."""
+        """Stop writing to a terminal that is gone."""
         self._broken, self._progress = True, None
 
     # Progress
@@ -134,7 +133,7 @@ class Console:
         if self.terminal and not self.quiet:
             from rich.progress import BarColumn, Progress, TextColumn
 
-            # Redrawn from `progress`: a thread of its own would wait for compiled loops anyway.
+            # Redrawn by `progress`: a refresh thread would wait for compiled loops.
             self._progress = Progress(
                 BarColumn(bar_width=30), TextColumn("{task.description}"),
                 console=self._rich, auto_refresh=False, transient=True,
@@ -145,9 +144,9 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show how far the run is, and what happens `within` a step: cheap enough for every step.
+        """Show the progress of the run and the activity `within` a step; fast enough for each step.
 
-        The `fraction` done is None where nobody knows (run_until, run_while).
+        `fraction` is None if the end of the run is unknown (run_until, run_while).
         """
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT
@@ -166,7 +165,7 @@ class Console:
             self.say(f"# {text}")
 
     def end_run(self) -> None:
-        """Take the bar away; safe to call at any time."""
+        """Remove the progress bar; safe to call at any time."""
         self._running = False
         self._release()
         if self._progress is not None:
@@ -183,7 +182,7 @@ class Console:
                 parts.append(f"{duration(elapsed * (1 - fraction) / (fraction - share))} left")
         return ", ".join(parts)
 
-    # How it gets there
+    # Helpers
 
     def _release(self) -> None:
         """Write the log lines that wait."""
@@ -204,8 +203,8 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has gone: the run still finishes its files. The interpreter
-            # would complain when it flushes the stream on exit.
+            # The reader (head, less) has closed the pipe: the run still finishes its files. Without
+            # this the interpreter would complain when it flushes the stream on exit.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
@@ -215,14 +214,14 @@ def _print(stream: TextIO, text: str) -> None:
     try:
         stream.write(text + "\n")
     except UnicodeEncodeError:
-        # A stream of an older encoding (a Windows pipe) shows what it cannot write as an escape.
+        # Characters that the encoding of the stream (a Windows pipe) lacks are escaped.
         encoding = stream.encoding or "ascii"
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()
 
 
 def show(value: Any) -> str:
-    """Write a value as a table shows it: 1 234 567, 0.333333, text as it is."""
+    """Format a value for a table: 1 234 567, 0.333333, text unchanged."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -233,7 +232,7 @@ def show(value: Any) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Write seconds as people say them: 42 s, 3 min 20 s, 2 h 5 min."""
+    """Format seconds: 42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -201,33 +201,33 @@ class Fields(PointTable):
             yield PointTable(self.hub, Rows(s, parts, ids, present[first:end]))
 
     def particle_names(self) -> list[str]:
-        """Names that `particle` knows."""
+        """Names accepted by `particle`."""
         own = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
         return list(dict.fromkeys([*point_table.COLUMNS, *own]))
 
     def shown_names(self) -> list[str]:
-        """Names that `particle` knows, then groups of points and solids: 1 for theirs, else 0."""
+        """Names accepted by `particle`, then groups and solids (1 for their points, else 0)."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
-        """Names that `node` knows."""
+        """Names accepted by `node`."""
         own = declared_columns(self.hub, "node_fields")
         return list(dict.fromkeys([*node_columns.COLUMNS, *own]))
 
     def rate_is_asked_for(self) -> bool:
-        """Tell whether a dump or a compute has the column ``epdot``, which points keep for it."""
+        """Whether a dump or a compute uses the column ``epdot``, so that points must store it."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
 
     def absent_at_points(self) -> list[str]:
-        """Names that `particle` knows, but that are 0 because no material has them."""
+        """Names accepted by `particle` whose values are 0, because no material has them."""
         present = self.columns_of_laws() | {*declared_columns(self.hub, "point_fields")}
         if any(has_rate(material.law) for material in self.hub.materials.values()):
             present.add("epdot")
         return absent(point_table.COLUMNS, present)
 
     def absent_at_nodes(self) -> list[str]:
-        """Names that `node` knows, but that are 0 in this scene."""
+        """Names accepted by `node` whose values are 0 in this scene."""
         present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
         return absent(node_columns.COLUMNS, present)
 
@@ -271,7 +271,7 @@ def _kinetic(s: Any, block: Any) -> np.ndarray:
 
 
 def _of_law(density: Callable) -> Callable:
-    """Energy of each point, from its density."""
+    """Make a function for the energy of each point from an energy density."""
 
     def energies(s: Any, block: Any) -> np.ndarray | None:
         if not can(block.laws, density):
@@ -291,9 +291,9 @@ def _bounces(s: Any, block: Any) -> np.ndarray | None:
 
 
 def _born_with(s: Any, block: Any) -> np.ndarray | None:
-    """Internal energy of a gas as it was made.
+    """Return the initial internal energy of a gas.
 
-    The stored energy counts from there; beside it alone, all that a gas does would be much.
+    Stored energy is measured from it: changes would be lost in the absolute value.
     """
     law = elastic_law(block.laws)
     if not can(law, taken_heat):
@@ -302,7 +302,7 @@ def _born_with(s: Any, block: Any) -> np.ndarray | None:
     return (block.points.mass * of_eos[block.points.material]).astype(float)
 
 
-# What the points of a block have that can be added up; None where their law does not have it.
+# Energies of the points of a block; None if the law does not have one.
 SUMMED = {
     "mass": lambda s, block: block.points.mass.astype(float),
     "kinetic": _kinetic,
@@ -314,9 +314,9 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """For signatures: a formula of columns of dump particle, time and published values.
+    """Annotation: a formula of columns of dump particle, time and published values.
 
-    The name of a group of points or a solid is a column, too: 1 for its points and 0 for others.
+    Names of particle groups and solids are columns too: 1 for their points, 0 elsewhere.
     """
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
@@ -350,21 +350,21 @@ class ColumnFormula:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "ColumnFormula":
-        """Read the formula that a script's argument stands for."""
+        """Read the formula from a script argument."""
         return cls(hub, argument)
 
     def of(self, points: PointTable) -> np.ndarray:
-        """Evaluate the formula for each of the points that there are, (n,)."""
+        """Evaluate the formula for each existing point, (n,)."""
         columns = {name: points.particle(name) for name in self.columns}
         return self.formula.evaluate_columns(self.hub.values, columns)
 
     def holds(self, points: PointTable) -> np.ndarray:
-        """(n,) whether it is not 0 for points that there are."""
+        """(n,) whether the formula is nonzero, for each existing point."""
         return self.of(points) != 0
 
 
 class ShownColumn(ColumnFormula):
-    """For signatures: the name of a column of dump particle, or a formula of columns."""
+    """Annotation: the name of a column of dump particle, or a formula of columns."""
 
     script_kind = "a column of dump particle, or a formula of columns, such as sqrt(vx^2 + vy^2)"
 
@@ -375,18 +375,18 @@ class ShownColumn(ColumnFormula):
         return word if word is not None and word.isidentifier() else cls(hub, argument)
 
 
-# ---- columns that are asked for by name, and may be none ----------------------------------------
+# ---- columns given by name -----------------------------------------------------------------------
 
 
 def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
-    """Refuse names that are not `known`; `first` is the place of the first among the arguments."""
+    """Refuse names that are not `known`; `first` is the argument index of the first name."""
     for index, name in enumerate(columns):
         if name not in known:
             raise unknown_column(f"unknown column '{name}'", name, known, argument=first + index)
 
 
 def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
-    """Make the error for a column that is none of the `known`; `where` it stands."""
+    """Make the error for an unknown column; `where` gives its place."""
     known = list(known)
     error = unknown(message, name, known, code="unknown-column", **where)
     error.expected = one_of(name, known, page="docs/reference/columns.md")

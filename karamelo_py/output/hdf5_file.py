@@ -1,8 +1,8 @@
-"""HDF5 files that a program writes, was writing when it was killed, or that are damaged: read.
+"""Read HDF5 files that were not closed: being written, left by a killed program, or damaged.
 
-HDF5 opens a file that was not closed for readers of a running writer (SWMR) alone. What such a
-reader cannot make sense of it reads again and again, for minutes to years. Here the first bytes are
-shown as those of a closed file, which is read once (HDF5 File Format 3.0, II.A and VII.B).
+HDF5 opens a file that was not closed only for readers in SWMR mode, which retry damaged data for
+minutes to years. Here the header is presented as if the file were closed,
+which is read once (HDF5 File Format 3.0, II.A and VII.B).
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ from typing import Any
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags, four addresses: 44 bytes
-_NEW = (2, 3)  # versions of such a head
+_NEW = (2, 3)  # versions with such a header
 _MASK = 0xFFFFFFFF
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open an HDF5 file to read what is there now.
+    """Open an HDF5 file to read its present content.
 
     Raises
     ------
     OSError
-        Where it is no such file, shorter than it was, or damaged where that is seen at once.
+        If the file is not HDF5, is truncated, or is visibly damaged.
     """
     import h5py
 
@@ -37,7 +37,7 @@ def reading(path: Path) -> Iterator[Any]:
 
 
 class _Closed(io.RawIOBase):
-    """Show a file as one that was closed at its present length."""
+    """A raw file that appears to have been closed at its present length."""
 
     def __init__(self, raw: io.RawIOBase):
         self._raw = raw
@@ -52,7 +52,7 @@ class _Closed(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        if whence == os.SEEK_END:  # it may have grown
+        if whence == os.SEEK_END:  # the file may have grown
             offset, whence = self._size + offset, os.SEEK_SET
         return self._raw.seek(offset, whence)
 
@@ -69,9 +69,9 @@ class _Closed(io.RawIOBase):
 
 
 def _closed(head: bytes, size: int) -> bytes:
-    """Give the head of a file with its flags cleared and its present end."""
+    """Return the header of a file with cleared flags and its present end."""
     if len(head) < _HEAD.size + 4 or head[:8] != _SIGNATURE or head[8] not in _NEW:
-        return head  # of another kind, which HDF5 judges
+        return head  # another version, left to HDF5
     signature, version, offsets, lengths, flags, base, extension, end, root = _HEAD.unpack_from(
         head
     )
@@ -79,7 +79,7 @@ def _closed(head: bytes, size: int) -> bytes:
         return head
     if not flags:
         return head
-    end = max(end, size)  # of one that was cut HDF5 says so
+    end = max(end, size)  # HDF5 reports truncated files
     shown = _HEAD.pack(signature, version, offsets, lengths, 0, base, extension, end, root)
     return shown + struct.pack("<I", _checksum(shown))
 

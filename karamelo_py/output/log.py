@@ -24,11 +24,10 @@ NUMBER_WIDTH = 16
 class Log(Rhythmic):
     """The table of logged quantities.
 
-    The file has one header line and one row per output. Columns are separated by spaces and begin
-    at the margin, so that ``numpy.loadtxt("log.mpm", skiprows=1)`` and
-    ``pandas.read_csv("log.mpm", sep=r"\\s+")`` both read it. In a file with the ending .csv
-    commas separate them. A further run goes on in the same table; if the columns have changed, a
-    comment line starting with ``#`` names the new ones.
+    The file has one header line and one row per output. Columns are separated by spaces and start
+    at the margin, so that ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm",
+    sep=r"\\s+")`` both read it. Files named .csv are separated by commas. Later runs append to the
+    table; if the columns change, a comment line starting with ``#`` names the new ones.
     """
 
     remembers = ("_header", "_end")
@@ -37,13 +36,13 @@ class Log(Rhythmic):
         self.hub = hub
         self.every: int | ByTime = 1
         self.file = Path(FILE)
-        self.is_asked_for = False  # the file, by a name that the user gives
+        self.is_asked_for = False  # the user named the file
         self.columns: list[Quantity] = []  # empty: step, dt and time
         self.last_step: int | None = None
         self._file: TextIO | None = None
-        self._claim: Claim | None = None  # on the folder of all files
+        self._claim: Claim | None = None  # for the folder of all files
         self._is_kept = True
-        # Names and numbers of the lines, where a program wants to have them.
+        # Names and numbers of the lines, if a program wants them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
         self._end = 0  # bytes of the file so far
@@ -55,7 +54,7 @@ class Log(Rhythmic):
         return self.hub.folder / self.file
 
     def begin(self) -> None:
-        """Write the header: to the file where it is new, to the terminal always."""
+        """Write the header: to a new file, and always to the terminal."""
         if not self.columns:
             self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
         headings = [column.heading for column in self.columns]
@@ -75,31 +74,31 @@ class Log(Rhythmic):
         self.hub.console.log_line(header, header=True)
 
     def write(self) -> None:
-        """Write one line: the quantities now."""
+        """Write one line with the present quantities."""
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # A blank keeps the place of the minus sign; the first column starts at the margin for
-        # pandas' sake.
+        # A blank reserves the place of the minus sign; the first column starts at the margin for
+        # pandas.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
         self._put(cells)
         self.hub.console.log_line(_row(cells, self._widths))
 
     def resumed(self) -> None:
-        """Drop rows behind those that are remembered, where the file is open."""
+        """Drop rows after the restored state, if the file is open."""
         if self._file is not None and self._is_kept:
             self._file.truncate(self._end)
 
     def close(self) -> None:
-        """Close the file; a later `begin` would start a new one."""
+        """Close the file; the next `begin` starts a new one."""
         if self._file is not None:
             file, self._file, self._claim = self._file, None, None
-            with reported(self.path, "the log file "):  # a line that was not written is tried again
+            with reported(self.path, "the log file "):  # a failed line is retried here
                 file.close()
 
     def _go_on(self) -> None:
-        """Go on in the file of an earlier run, behind the line that was its last then."""
+        """Continue the file of an earlier run after its last line at that time."""
         if not self.hub.output.writes:
             return
         there = self.path.stat().st_size if self.path.is_file() else 0
@@ -124,16 +123,16 @@ class Log(Rhythmic):
                 f"{self.file} overwrites it",
             )
         with reported(path, "the log file "):
-            # Line buffering: each line is in the file at once, also when the run is killed.
+            # Line buffering: each line reaches the file at once, even if the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            self._is_kept = path.is_file()  # else it goes to no disk: /dev/null
+            self._is_kept = path.is_file()  # False for devices such as /dev/null
             self._claim = claim(self.hub.folder)
             if self._claim is None or (self._is_kept and not _claimed(self._file)):
                 where = self.hub.folder.resolve() if self._claim is None else path
                 raise ScriptError(
                     f"another run is writing to {where}",
-                    expected="a folder of its own for each run",
+                    expected="a separate folder for each run",
                     hint="-out FOLDER sends all files there",
                     code="busy",
                 )
@@ -154,7 +153,7 @@ class Log(Rhythmic):
 
 
 def _is_log(path: Path) -> bool:
-    """Tell if what is there, if anything, looks like a log: names, then numbers."""
+    """Tell whether the file looks like a log (names, then numbers), or does not exist."""
     try:
         with path.open(encoding="utf-8") as file:
             lines = [file.readline(1 << 16) for _ in range(4)]
@@ -163,7 +162,7 @@ def _is_log(path: Path) -> bool:
     except UnicodeDecodeError:
         return False
     except OSError:
-        return True  # which opening it will tell
+        return True  # opening it will report the error
     head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
     if not rows:
         return not head or bool({"Step", "dt", "Time"} & set(head))
@@ -176,9 +175,9 @@ def _is_log(path: Path) -> bool:
 
 
 def _claimed(file: TextIO) -> bool:
-    """Keep other programs from writing to `file`; False where one does.
+    """Lock `file` against other programs; return False if one has locked it.
 
-    The claim ends with the program, however it ends. Windows has none that lets others read.
+    The lock ends with the program. Windows has no lock that lets others read, so none is taken.
     """
     try:
         import fcntl
@@ -186,7 +185,7 @@ def _claimed(file: TextIO) -> bool:
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except ImportError:
         return True
-    except OSError as error:  # of file systems without locks others are none of our business
+    except OSError as error:  # on file systems without locks the file is granted
         return error.errno not in (errno.EACCES, errno.EAGAIN)
     return True
 
@@ -196,7 +195,7 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 
 def begins_anew(path: Path) -> str:
-    """Write the warning of a run that goes on without this file of the one before."""
+    """Format the warning that a run continues without this file of the earlier run."""
     if not path.is_file():
         return f"there is no {path} of the run that is gone on from: it begins anew"
     return f"{path} is not as the run left it that is gone on from: it begins anew"

@@ -42,19 +42,19 @@ class NodeTable(NamedTuple):
         return np.zeros(len(self.ids))
 
     def positions(self) -> np.ndarray:
-        """Return where they are, (n, 3)."""
+        """Return positions (n, 3)."""
         return places_of(self.hub, self.ids)
 
 
 def by_lattice(hub: Scene, nodes: np.ndarray) -> Iterator[tuple[Any, slice]]:
-    """Yield the grids of a scene, and which of some nodes, of ascending numbers, are of each."""
+    """Yield each grid of a scene with the slice of `nodes` (ascending numbers) in it."""
     for lattice in hub.lattices:
         ends = lattice.first, lattice.first + lattice.node_count
         yield lattice, slice(*np.searchsorted(nodes, ends))
 
 
 def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
-    """(n, 3) positions of nodes, of ascending numbers."""
+    """(n, 3) positions of nodes, given by ascending numbers."""
     found = np.empty((len(nodes), 3))
     for lattice, own in by_lattice(hub, nodes):
         found[own] = lattice.positions(nodes[own])
@@ -79,7 +79,7 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
     """Karamelo's type of a node along one axis.
 
-    Splines: -2 and -1 at the lower edge and beside it, 2 and 1 at the upper one, 0 within.
+    Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 in between.
     Bernstein: 1 in the middle of a cell. Else 0.
     """
     basis = nodes.hub.update.method.basis
@@ -128,7 +128,7 @@ def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.nda
 
 
 def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
-    """Return the columns of a vector, with the direction in the place of ``*``."""
+    """Return the columns of a vector; ``*`` in the name becomes the direction."""
     return {
         name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
         for k, axis in enumerate(AXES)
@@ -154,7 +154,7 @@ COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
 }
 
-# --- what points bring to nodes where it is asked for ---------------------------------------------
+# --- sums over points, computed on request --------------------------------------------------------
 
 LOADS = "post_particles_to_grid"
 
@@ -171,10 +171,10 @@ def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
     return None if force is None or axis >= len(force) else force[axis]
 
 
-# What `of(simulation, block)` says of each point of a block, if anything.
+# A value for each point of a block, or None.
 BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
     "vol": _volume,
-    "rigid": lambda simulation, block: (  # 1 where a rigid solid takes part
+    "rigid": lambda simulation, block: (  # 1 for rigid solids
         np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
     ),
     **{f"b{axis}": partial(_force, k) for k, axis in enumerate(AXES)},
@@ -182,7 +182,7 @@ BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
 
 
 def brought(simulation: Any, name: str) -> np.ndarray:
-    """(nodes, 2) sums of N value over the points at hand: whole units of all, and what is left."""
+    """(nodes, 2) sums of N value over the local points: whole units, and the remainder."""
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))
     found = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]
@@ -198,7 +198,7 @@ def brought(simulation: Any, name: str) -> np.ndarray:
 
 
 def loaded(hub: Scene, simulation: Any) -> dict[str, int]:
-    """Number of nodes with mass that each fix acts on that puts forces on nodes, by ID."""
+    """Count, by fix ID, the nodes with mass on which a force fix acts."""
     loading = {
         ID: fix for ID, fix in hub.fixes.items() if isinstance(fix.hooks().get(LOADS), CompiledHook)
     }

@@ -1,4 +1,4 @@
-"""Lines around bodies of points and around tools, in the plane and as they are seen in space."""
+"""Lines around bodies of points and around tools, in 2D and as projected in 3D."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -8,25 +8,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from contourpy import contour_generator
 
-FINE = 300  # steps along the longest side at which the outline of a tool is looked for
-# In space, where tools are drawn by sections: places along each axis where a tool is looked for,
-# steps along a section, halvings of the way to its ends, and sections between these.
+FINE = 300  # steps along the longest side when searching the outline of a tool
+# In 3D, where tools are drawn by sections: points per axis of the search, steps along a section,
+# bisections for its ends, and sections between these.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines of the angle between two faces
-# Points whose nearest neighbours are looked for, at least and at most, and distances in between.
+# Points used to measure spacing, at least and at most, and distances computed at once.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
-Depth = Callable[[np.ndarray], np.ndarray]  # in a tool, of places (n, d): (n,)
+Depth = Callable[[np.ndarray], np.ndarray]  # in a tool, at positions (n, d): (n,)
 
 
 class Tool(NamedTuple):
-    """A wall or a tool: the depth of places in it, and its faces (m, d, d) where it has such."""
+    """A wall or tool: a depth function, and its faces (m, d, d) if it has any."""
 
     depth: Depth
     faces: np.ndarray | None = None
 
     def lines(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield lines (m, d) on its surface, as far as it lies between two corners (d,)."""
+        """Yield lines (m, d) on its surface between two corners (d,)."""
         plane = len(lo) == 2
         if self.faces is None:
             found = zeros(self.depth, lo, hi, FINE) if plane else section_lines(self.depth, lo, hi)
@@ -41,10 +41,10 @@ class Tool(NamedTuple):
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Draw lines (m, 2) where half of the material of points x (n, 2) ends.
+    """Return lines (m, 2) where points x (n, 2) fill half of the space.
 
-    Each point is scattered to the nodes of cells of its size, over three of them: a node at the
-    surface gets half as much as those within the body beside it.
+    Each point is scattered to the nodes of cells of its size, over three of them. A node at the
+    surface gets half as much as nodes inside the body.
     """
     cell = spacing(x, 4)
     if not cell > 0:
@@ -60,7 +60,7 @@ def outlines(x: np.ndarray) -> list[np.ndarray]:
 
 
 def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield nodes (n,) around places (n, d), by number, and their linear weights (n,)."""
+    """Yield the nodes (n,) around positions (n, d) and their linear weights (n,)."""
     first = at.astype(int)
     for corner in product((0, 1), repeat=len(shape)):
         node = first + corner
@@ -68,7 +68,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Scatter places (n, d) to the nodes around them, by linear weights."""
+    """Scatter positions (n, d) to the surrounding nodes, with linear weights."""
     found = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         found += np.bincount(node, weight, len(found))
@@ -76,7 +76,7 @@ def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _largest(values: np.ndarray, reach: int) -> np.ndarray:
-    """Take the largest of each node and those up to `reach` beside it along each axis."""
+    """Return the maximum over each node and its neighbours up to `reach` along each axis."""
     for axis in [*range(values.ndim)] * reach:
         beside = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
         values = np.maximum(values, beside)
@@ -84,7 +84,7 @@ def _largest(values: np.ndarray, reach: int) -> np.ndarray:
 
 
 def smoothed(values: np.ndarray) -> np.ndarray:
-    """Take the mean of each node and its neighbours, twice along each axis."""
+    """Return the mean of each node and its neighbours, applied twice along each axis."""
     for axis in range(values.ndim):
         for _ in range(2):
             beside = np.roll(values, 1, axis) + np.roll(values, -1, axis)
@@ -93,7 +93,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Draw lines (m, 2) where a depth is 0 between corners (2,), of `fine` steps the longer way."""
+    """Return lines (m, 2) of zero depth between corners (2,), by `fine` steps on the long side."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -103,10 +103,10 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 
 
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) on the surface of a tool, as far as it lies between two corners (3,).
+    """Yield lines (m, 3) on the surface of a tool between two corners (3,).
 
-    They are sections across each axis: at the ends, where faces meet, and between where the surface
-    bends. A box has its edges, a ball circles.
+    They are sections across each axis: at the ends, where faces meet, and in between if the surface
+    is curved. A box gets its edges, a ball circles.
     """
     lattice = _lattice_around(depth, lo, hi)
     for axis in range(3) if lattice else ():
@@ -116,7 +116,7 @@ def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.n
 
 
 class _Lattice(NamedTuple):
-    """Hold places around a surface by coordinates along each axis, their depths, closer bounds."""
+    """Positions around a surface by coordinates along each axis, depths, and tighter bounds."""
 
     axes: list[np.ndarray]
     depths: np.ndarray
@@ -125,13 +125,13 @@ class _Lattice(NamedTuple):
 
 
 def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
-    """Find the depths (n, m, k) of places by their coordinates along each axis."""
+    """Evaluate depths (n, m, k) on a lattice of coordinates along each axis."""
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Find the bounds of a surface between two corners (3,), closer and closer, if it is there."""
+    """Find tight bounds of a surface between two corners (3,); None if there is none."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -145,13 +145,13 @@ def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | 
 
 
 def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
-    """Tell of each section across an axis (n,) whether the surface crosses it."""
+    """Tell for each section across an axis (n,) whether the surface crosses it."""
     within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
     return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
 
 def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
-    """Find the two ends of a surface along an axis, by halvings; none where no section has it."""
+    """Find the two ends of a surface along an axis by bisection; empty if no section crosses it."""
     axes, there = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
     ends = []
     for k, beyond in ((there[0], -1), (there[-1], 1)) if len(there) else ():
@@ -167,15 +167,15 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Yield the lines (m, 3) of sections across an axis, from end to end, that show the surface.
+    """Yield lines (m, 3) of sections across an axis, from end to end, that show the surface.
 
-    All those do that lie in one of the planes which cut it off.
+    Lines in a plane that cuts the surface off are left out.
     """
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(*ends, BETWEEN + 2)
     apart = (heights[1] - heights[0]) / 2 * np.eye(3)[axis]
-    # Depths below an end are known where they are larger than a step of the section.
+    # At an end, depths are known where they exceed a step of the section.
     step = (hi - lo).max() / SECTION
     inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
     for height in heights:
@@ -183,7 +183,7 @@ def _sections(
         inset = 0.0 if cut_off else inset_of.get(height, 0.0)
         for flat in zeros(partial(_section, depth, axis, height + inset), lo, hi, SECTION):
             line = np.insert(flat, axis, height + inset, axis=1)
-            if inset:  # do other faces meet that at the end?
+            if inset:  # do other faces meet the face at the end?
                 part = inset / 2 * np.eye(3)[axis]
                 slope = (depth(line + part) - depth(line - part)) / inset
                 shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7
@@ -196,12 +196,12 @@ def _sections(
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
-    """Find sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections where they bend a little."""
+    """Find sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections where they bend slightly."""
     corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     sides = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(sides.T)  # two that are the same follow each other
+    order = np.lexsort(sides.T)  # equal sides become neighbours
     shared = (sides[order[:-1]] == sides[order[1:]]).all(axis=1)
     first, second = order[:-1][shared], order[1:][shared]
     cosine = np.abs((normal[first // 3] * normal[second // 3]).sum(axis=1))
@@ -220,14 +220,14 @@ def edges(faces: np.ndarray) -> np.ndarray:
 
 
 def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarray:
-    """Find the depth of places (n, 2) in a plane across an axis."""
+    """Evaluate the depth at positions (n, 2) in a plane across an axis."""
     return depth(np.insert(x, axis, height, axis=1))
 
 
 class Front:
-    """Keep the heights of what is nearest to the eye, of points seen at x (n, 3), by cells.
+    """Height of the nearest surface to the eye in each cell, from projected points x (n, 3).
 
-    A point fills its cell and those beside it; up to twice as many `gaps` between them are closed.
+    A point fills its cell and the cells next to it; up to twice as many `gaps` are closed.
     """
 
     def __init__(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float, gaps: int):
@@ -241,7 +241,7 @@ class Front:
         return tuple(np.clip((x[:, :2] - self.low) / self.cell, 0, last).astype(int).T)
 
     def beside(self, x: np.ndarray) -> np.ndarray:
-        """Find the heights of lines (n, 2) around the points."""
+        """Return the heights of lines (n, 2) around the points."""
         return _largest(self.height, 2)[self._cells(x)]
 
     def outlines(self) -> list[np.ndarray]:
@@ -255,19 +255,19 @@ class Front:
         return lines
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
-        """Tell of places seen at x (n, 2), in this height, if all cells `around` are in front."""
+        """Tell of positions x (n, 2) at these heights whether all cells `around` are in front."""
         return -_largest(-self.height, around)[self._cells(x)] > height + 3 * self.cell
 
 
 def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
-    """Yield the pieces of a line that are hidden and those that are not."""
+    """Yield the hidden and the visible pieces of a line."""
     turns = np.flatnonzero(np.diff(hidden)) + 1
     for first, end in pairwise([0, *turns, len(line)]):
         yield line[first : end + 1], bool(hidden[first])
 
 
 def spacing(x: np.ndarray, count: int = 1) -> float:
-    """Measure the distance of points (n, d) from their nearest neighbours, the mean of `count`."""
+    """Return the mean distance of points (n, d) from their nearest `count` neighbours."""
     if len(x) <= count:
         return 0.0
     near = []

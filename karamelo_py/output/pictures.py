@@ -1,6 +1,6 @@
-"""Pictures of the points of a snapshot, on a line, in the plane and in space, drawn by Matplotlib.
+"""Pictures of the points of a snapshot in 1D, 2D and 3D, drawn by Matplotlib.
 
-Axes, labels and the bar of colours are a background that is drawn once and then reused.
+Axes, labels and the colour bar are a background that is drawn once and reused.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ from karamelo_py.output.outlines import (
 )
 from karamelo_py.output.snapshots import Snapshot
 
-# Colour-blind safe (Okabe and Ito 2008); solids take them in turn.
+# Colour-blind safe (Okabe and Ito 2008); used cyclically for solids.
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
 MOST_IN_LEGEND = 16
-MARGIN = 4  # pixels at both sides of a long title
-MARKS = 1 << 16  # points that are drawn together
-MOST_CELLS = 1 << 23  # of a picture in which hidden points are looked for
-HIDDEN = (0.0, 0.0, 0.0, 0.25)  # colour of lines behind something
+MARGIN = 4  # pixels on both sides of a long title
+MARKS = 1 << 16  # points drawn at once
+MOST_CELLS = 1 << 23  # of the picture in which hidden points are found
+HIDDEN = (0.0, 0.0, 0.0, 0.25)  # colour of hidden lines
 # A circle of this diameter has the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
-# Towards the light, in a frame of right, up and towards the eye.
+# Direction of the light: right, up, towards the eye.
 LIGHT = np.array([-0.35, 0.6, 0.72])
-AMBIENT = 0.5  # light from all sides
-LIT = 8  # points, from which on they have a surface
+AMBIENT = 0.5  # ambient light
+LIT = 8  # points needed for a surface
 
 
 Window = Sequence[tuple[float | None, float | None]]
@@ -58,46 +58,46 @@ Window = Sequence[tuple[float | None, float | None]]
 class Options(NamedTuple):
     """Options of a picture."""
 
-    column: str  # that colours the points, or is drawn over x in 1D
-    label: str  # text beside the colours (or, in 1D, at the ordinate)
-    solids: tuple[str, ...] = ()  # names of those that colour the points, if a column does not
+    column: str  # colours the points, or is drawn over x in 1D
+    label: str  # of the colour bar (in 1D, of the ordinate)
+    solids: tuple[str, ...] = ()  # names of the solids that colour the points, if a column does not
     limits: tuple[float | None, float | None] = (None, None)  # None: grow with what has been seen
-    symmetric: bool = False  # limits grow about 0
+    symmetric: bool = False  # limits are symmetric about 0
     cmap: str = "viridis"
     azimuth: float = -60.0  # angles of view in 3D, in degrees
     elevation: float = 30.0
     axes: bool = True
-    lengths: str = ""  # text behind the names of the axes: the unit
-    window: Window = ()  # of x, y, z; None: of the domain
-    log: bool = False  # colours go by the logarithm; what is not above 0 has the lowest
-    quantile: float = 0.0  # share of the values, at each end, for which limits do not grow
+    lengths: str = ""  # unit of lengths, appended to axis names
+    window: Window = ()  # for x, y, z; None: the domain
+    log: bool = False  # logarithmic colours; values <= 0 get the lowest
+    quantile: float = 0.0  # fraction of the values at each end that does not extend the limits
     fontsize: float = 9.0
-    pointsize: float = 1.0  # of points, over that of the material they stand for
+    pointsize: float = 1.0  # diameter relative to the size of the material it represents
     outlines: bool = False  # of solids and tools
 
 
 class DrawnPoints(Artist):
-    """The points of one state: some of them are drawn after others."""
+    """The points of one state, drawn in pieces."""
 
     def __init__(self, picture: Picture):
         super().__init__()
         self.picture = picture
-        self.rows = np.empty((3, 0))  # places on paper, a value, in space light
+        self.rows = np.empty((3, 0))  # positions on paper, a value, in 3D also the light
         self.lines = LineCollection(
             [], colors="black", capstyle="round", linewidths=0.1 * picture.options.fontsize
         )
         picture.axes.add_collection(self.lines, autolim=False)
         self.lines.set_visible(False)
         self.set_zorder(picture.artist.get_zorder())
-        picture.artist.set_visible(False)  # but when this draws
+        picture.artist.set_visible(False)  # drawn only by this artist
 
     def draw(self, renderer: Any) -> None:
-        """Draw them."""
+        """Draw the points."""
         if not self.get_visible():
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # pixels also in .pdf and .svg, which no viewer would show with so many circles
+        if many:  # rasterised in .pdf and .svg too: viewers cannot show so many circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.place(self.rows[:, first : first + MARKS])
@@ -111,16 +111,16 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """Axes, labels and colour bar as a background, and on it the points of one state.
+    """Axes, labels and colour bar as a background, with the points of one state on top.
 
-    Drawing axes with their ticks takes most of Matplotlib's time. They only change when the limits
-    of the field do, so their pixels are kept, and a new state costs the points and the title.
+    Matplotlib spends most of its time on axes and ticks. They change only with the limits of the
+    field, so their pixels are stored; a new state costs the points and the title.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
         self.domain = _zoomed(domain, options.window)
         self.options = options
-        self.small = options.fontsize - 1  # numbers beside the ticks
+        self.small = options.fontsize - 1  # size of tick labels
         self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_subplot()
@@ -140,18 +140,18 @@ class Picture:
             self.axes.set_axis_off()
         self._add_legend()
 
-    cuts = False  # whether its window cuts bodies open
-    _prepare: Callable[[], Any]  # sets up axes and returns the artist that shows the points
-    # Lists what shows of points at x (n, 3), in the order in which they are drawn.
+    cuts = False  # whether the window cuts through bodies
+    _prepare: Callable[[], Any]  # sets up the axes and returns the artist of the points
+    # Visible rows of points x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
-    place: Callable[[np.ndarray], None]  # hands what shows of some points to the artist
-    _apply_limits: Callable[[float, float], None]  # takes new limits of the field
+    place: Callable[[np.ndarray], None]  # passes visible points to the artist
+    _apply_limits: Callable[[float, float], None]  # applies new limits of the field
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Mark the ends of the colours beyond which there are values."""
+        """Mark the ends of the colour bar beyond which there are values."""
 
     def _name_lengths(self, axis: Any, name: str) -> None:
-        """Label an axis of lengths; small and large ones count in powers of a thousand."""
+        """Label an axis of lengths, scaled by a power of a thousand if they are small or large."""
         size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
         if 0 < size < 1e-2 or size >= 1e5:
             power = 3 * int(np.floor(np.log10(size) / 3))
@@ -163,7 +163,7 @@ class Picture:
         axis.set_label_text(name, fontsize=self.options.fontsize)
 
     def _add_legend(self) -> None:
-        """Write names of the solids, beside the picture."""
+        """Write the names of the solids next to the picture."""
         names = self.options.solids[:MOST_IN_LEGEND]
         if len(names) < 2:
             return
@@ -176,9 +176,9 @@ class Picture:
         )
 
     def show(self, snapshot: Snapshot, side: float, title: str, tools: Sequence[Tool] = ()) -> None:
-        """Set the points and the title to draw; `side` is the length of a typical point.
+        """Set the points and the title; `side` is the size of a typical point.
 
-        `tools` are outlined beside the solids.
+        `tools` are outlined together with the solids.
         """
         if not self._laid_out:
             self._lay_out()
@@ -214,20 +214,20 @@ class Picture:
         """Set the lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
-        """Write the title above the axes, and where that is too narrow within the picture."""
+        """Write the title above the axes, or across the picture if the axes are too narrow."""
         self.title.set_text(text)
         whole = self.figure.bbox.width - 2 * MARGIN
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
             self.title.set_fontsize(self.title.get_fontsize() * whole / wide)
-        self._widest = max(self._widest, min(wide, whole))  # what is shorter does not jump back
+        self._widest = max(self._widest, min(wide, whole))  # shorter titles do not jump back
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
         at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
         self.title.set_x((at - box.x0) / box.width)
 
     def begin_with(self, limits: tuple[float, float] | None) -> None:
-        """Let limits that grow begin with those that a picture had before."""
+        """Start growing limits from the limits of an earlier picture."""
         self.limits = limits
         if limits is not None:
             if not self._laid_out:
@@ -247,7 +247,7 @@ class Picture:
         return (lo, hi) if hi > lo else (min(lo, hi), min(lo, hi) + (abs(lo) or 1.0))
 
     def save_png(self, file: BinaryIO, compression: int) -> None:
-        """Draw the state over the kept background and write it as PNG."""
+        """Draw the state over the stored background and write it as PNG."""
         if self._background is None:
             self.title.set_animated(True)
             self.marks.set_animated(True)
@@ -256,22 +256,22 @@ class Picture:
         self.canvas.restore_region(self._background)
         self.axes.draw_artist(self.title)
         self.axes.draw_artist(self.marks)
-        # Opaque everywhere, so three channels do.
+        # Opaque everywhere, so three channels are enough.
         pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
         image = Image.fromarray(np.ascontiguousarray(pixels))
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Find room for the widest labels, once: nothing moves between the pictures of a run."""
+        """Reserve room for the widest labels once, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
-        for _ in range(2):  # a second time where the aspect of the axes has moved them
+        for _ in range(2):  # twice, because the aspect ratio moves the axes
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
         self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes
-            if axes is not self.axes:  # a colour bar, no higher than the axes
+            if axes is not self.axes:  # a colour bar, no taller than the axes
                 own, beside = axes.get_position(), self.axes.get_position()
                 high = min(own.height, beside.height)
                 low = beside.y0 + (beside.height - high) / 2
@@ -282,7 +282,7 @@ class Picture:
         self._laid_out = True
 
     def _make_room_at_left(self) -> None:
-        """Narrow axes of equal units may be laid out with the name of y outside the picture."""
+        """Move axes with equal units right if the name of y would lie outside the picture."""
         label = self.axes.yaxis.label
         out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
         if out <= MARGIN or not self.axes.axison or not label.get_text():
@@ -292,17 +292,17 @@ class Picture:
         self.figure.draw_without_rendering()
 
     def _pixels_per_unit(self) -> float:
-        """Count points (1/72 inch) on paper per unit of x."""
+        """Return points (1/72 inch) on paper per unit of x."""
         box = self.axes.get_position()
         lo, hi = self.axes.get_xlim()
         return box.width * self.figure.get_figwidth() * 72 / (hi - lo)
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Find limits that hold the old ones and the finite values.
+    """Return limits that contain the old ones and the finite values.
 
     They are rounded outwards to eighths of a power of two, so that they change rarely while a field
-    grows and the pictures of a run stay comparable.
+    grows.
     """
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -319,13 +319,13 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 
 
 def within(values: np.ndarray, share: float) -> np.ndarray:
-    """Find the finite values, or the ends of them but for a share at either end."""
+    """Return the finite values, or their quantiles `share` and 1 - `share`."""
     finite = values[np.isfinite(values)]
     return np.quantile(finite, [share, 1 - share]) if share and len(finite) else finite
 
 
 def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.ndarray]:
-    """Choose the rows whose x, y and z lie in a window."""
+    """Select the rows whose x, y and z lie in a window."""
     for name, ends in zip("xyz", window, strict=False):
         for end, out in zip(ends, (np.less, np.greater), strict=True):
             if end is not None:
@@ -335,7 +335,7 @@ def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.nd
 
 
 def _zoomed(domain: Any, window: Window) -> Any:
-    """The part of a domain that is shown."""
+    """Return the visible part of a domain."""
     if not window:
         return domain
     lo, hi = np.array(domain.lo, float), np.array(domain.hi, float)
@@ -347,7 +347,7 @@ def _zoomed(domain: Any, window: Window) -> Any:
 
 
 def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
-    """Make the picture that suits the domain's dimension."""
+    """Make the picture for the domain's dimension."""
     kind = {1: LinePicture, 2: PlanePicture, 3: SpacePicture}[domain.dimension]
     return kind(domain, size, dpi, options)
 
@@ -360,12 +360,12 @@ def _number(value: float, _: Any = None) -> str:
 
 
 def _power(value: float, _: Any = None) -> str:
-    """Write the number that a place on a logarithmic scale stands for."""
+    """Format a value on a logarithmic scale."""
     return _number(float(f"{10.0**value:.3g}"))
 
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
-    """Make arrows at the lower and the upper end of a bar of colours, not to be seen yet."""
+    """Make invisible arrows at the lower and upper end of a colour bar."""
     looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
     return [
         Polygon(
@@ -379,7 +379,7 @@ def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
 
 
 class PlanePicture(Picture):
-    """2D: the points where they are."""
+    """2D: the points at their positions."""
 
     def _prepare(self) -> Any:
         lo, hi = self.domain.lo, self.domain.hi
@@ -409,7 +409,7 @@ class PlanePicture(Picture):
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
-        # The bar looks at each end as it is set, and mends ends that are the wrong way round.
+        # The bar checks each end as it is set, and swaps ends in the wrong order.
         if hi > self.norm.vmin:
             self.norm.vmax, self.norm.vmin = hi, lo
         else:
@@ -420,7 +420,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # As large as the material it stands for, and never invisible: least where they are few.
+        # As large as the material it represents, with a minimum that is larger for few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._pixels_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -434,7 +434,7 @@ class PlanePicture(Picture):
         self.marks.lines.set_segments(lines + [line for x in bodies for line in outlines(x[:, :2])])
 
     def place(self, rows: np.ndarray) -> None:
-        """Hand what shows of some points to the artist."""
+        """Pass visible points to the artist."""
         self.artist.set_offsets(rows[:2].T)
         self.artist.set_facecolors(self._colours_of(rows))
 
@@ -446,7 +446,7 @@ class PlanePicture(Picture):
 
 
 class SpacePicture(PlanePicture):
-    """3D: the points seen from outside, the farthest first, in the frame of the domain."""
+    """3D: points seen from outside, farthest first, with the edges of the domain."""
 
     cuts = True
 
@@ -454,7 +454,7 @@ class SpacePicture(PlanePicture):
         self.lo, self.hi = np.asarray(self.domain.lo, float), np.asarray(self.domain.hi, float)
         a, e = np.radians([self.options.azimuth, self.options.elevation])
         ca, sa, ce, se = np.cos(a), np.sin(a), np.cos(e), np.sin(e)
-        # Rows: right, up and towards the eye.
+        # Rows: right, up, towards the eye.
         self.view = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
         self.middle = 0.5 * (self.lo + self.hi)
         seen = self._project(np.array(list(product(*zip(self.lo, self.hi, strict=True)))))[:, :2]
@@ -472,7 +472,7 @@ class SpacePicture(PlanePicture):
         return (x - self.middle) @ self.view.T
 
     def _draw_edges(self, axis: int, reach: float) -> None:
-        """Draw the four edges along an axis; ticks at the lowest one, of z at the leftmost."""
+        """Draw the four edges along an axis; ticks at the lowest one, for z at the leftmost."""
         others = [k for k in range(3) if k != axis]
         edges = []
         for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):
@@ -483,7 +483,7 @@ class SpacePicture(PlanePicture):
         ends, seen = min(edges, key=lambda edge: edge[1][:, 0 if axis == 2 else 1].sum())
         along = seen[1] - seen[0]
         if np.hypot(*along) < 0.1 * reach:
-            return  # seen from its end
+            return  # seen end-on
         outward = np.array([along[1], -along[0]]) / np.hypot(*along)
         outward *= np.sign(outward @ seen.mean(axis=0)) or 1.0
         aligned = {
@@ -495,7 +495,7 @@ class SpacePicture(PlanePicture):
         lo, hi = self.lo[axis], self.hi[axis]
         large = self.options.fontsize / 9
         ticks = MaxNLocator(max(2, round(4 / large)), steps=STEPS).tick_values(lo, hi)
-        # Those of two edges would cover each other at their common end.
+        # Ticks of two edges would overlap at their common end.
         for tick in ticks[abs(ticks - 0.5 * (lo + hi)) < 0.48 * (hi - lo)]:
             at = seen[0] + along * (tick - lo) / (hi - lo)
             self.axes.plot(*np.array([at, at + 0.02 * reach * outward]).T, color="0.5", lw=0.7)
@@ -512,7 +512,7 @@ class SpacePicture(PlanePicture):
         places = self._project(x)
         shows = np.flatnonzero(self._shows(places, side))
         ids, places, values = ids[shows], places[shows], values[shows]
-        # From far to near, and by id: bits of negative numbers are in the order of magnitudes.
+        # From far to near, then by id; bits of negative floats are ordered by magnitude.
         bits = places[:, 2].astype(np.float32).view(np.int32).astype(np.int64)
         keys = np.where(bits < 0, -0x80000000 - bits, bits) << 32 | ids.astype(np.int64)
         rows = super()._rows(keys, places, values, side)
@@ -521,8 +521,8 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Tell which points are not wholly behind others: of a large body that is its surface."""
-        # A cell beside that of a point is within its circle, which is within three cells.
+        """Tell which points are not completely hidden: those at the surface of a large body."""
+        # A neighbouring cell lies within the circle of a point, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5
         if not cell > 0 or np.prod((high - low) / cell) > MOST_CELLS:
@@ -535,7 +535,7 @@ class SpacePicture(PlanePicture):
             Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
             for x in bodies
         ]
-        found = []  # lines of each, as they are seen in one row, their heights and what it hides
+        found = []  # lines of each tool as projected, their heights, and what the tool hides
         for front in fronts:
             if lines := front.outlines():
                 seen = np.concatenate(lines)
@@ -544,7 +544,7 @@ class SpacePicture(PlanePicture):
             if not (lines := list(tool.lines(self.lo, self.hi))):
                 continue
             at = np.concatenate(lines)
-            # Towards the eye there is the tool itself, where it hides its other side.
+            # The tool itself is nearer to the eye where it hides its far side.
             nearer = at + 0.01 * np.linalg.norm(np.ptp(at, axis=0)) * self.view[2]
             *places, height = self._project(at).T
             found.append((lines, np.transpose(places), height, tool.depth(nearer) > 0))
@@ -565,7 +565,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Measure the light on some points: a surface looks where there are fewer of them."""
+        """Compute the light on some points; a surface faces the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2
@@ -599,5 +599,5 @@ class LinePicture(Picture):
         return np.array([*x.T[:2], values])[:, np.argsort(ids)]
 
     def place(self, rows: np.ndarray) -> None:
-        """Hand what shows of some points to the artist."""
+        """Pass visible points to the artist."""
         self.artist.set_data(rows[0], rows[2])

@@ -1,4 +1,4 @@
-"""Plots of logged quantities, drawn with Matplotlib when a run ends, and the look of all plots."""
+"""Plots of logged quantities, drawn with Matplotlib when a run ends; the style of all plots."""
 
 from collections.abc import Callable, Sequence
 from math import floor, log10
@@ -14,10 +14,10 @@ from karamelo_py.script.errors import Place
 
 
 class PlottedCurve(Rhythmic):
-    """One curve: `y` against `x`, a point at every `every` steps.
+    """One curve of `y` against `x`, with a point at every `every` steps.
 
-    `side` is that of the axis of y, left or right; `scale` is linear or log; `label` stands at that
-    axis, the name of y when left out.
+    `side` is the side of its y axis, left or right; `scale` is linear or log; `label` is the title
+    of that axis, by default the name of y.
     """
 
     remembers = ("points",)
@@ -38,15 +38,15 @@ class PlottedCurve(Rhythmic):
         self.place: Place | None = None
 
     def write(self) -> None:
-        """Collect the point of the present state."""
+        """Append the present state."""
         self.points.append((float(self.x.read()), float(self.y.read())))
 
 
 class Plots(dict[str, PlottedCurve]):
-    """The curves of a scene by their IDs, and the file they are drawn to.
+    """The curves of a scene by ID, and the file they are drawn to.
 
-    Curves over the same quantity share one pair of axes; each further quantity gets axes of its
-    own below. Without a file the curves are collected only.
+    Curves over the same quantity share axes; each further quantity gets axes below. Without a file
+    the curves are only collected.
     """
 
     def __init__(self, hub: Scene):
@@ -56,12 +56,12 @@ class Plots(dict[str, PlottedCurve]):
         self.place: Place | None = None  # of save_plot
 
     def add(self, ID: str, curve: PlottedCurve) -> None:
-        """File a curve under `ID`, which must be new."""
+        """Add a curve under a new `ID`."""
         curve.id = ID
         self[ID] = curve
 
     def finish(self) -> None:
-        """Draw every curve that has points to the file; without file or points do nothing."""
+        """Draw all curves that have points to the file, if there is one."""
         curves = [curve for curve in self.values() if curve.points]
         if self.file is not None and curves:
             draw(curves, self.hub.folder / self.file, self._labelled)
@@ -73,7 +73,7 @@ class Plots(dict[str, PlottedCurve]):
 
 
 def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] = str) -> None:
-    """Draw curves, each of which has points; `labelled` adds units to the names of quantities."""
+    """Draw non-empty curves; `labelled` adds units to the names of quantities."""
     by_x: dict[str, list[PlottedCurve]] = {}
     for curve in curves:
         by_x.setdefault(curve.x.name, []).append(curve)
@@ -85,9 +85,9 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
         lines = []
         for side in ("left", "right"):
             chosen = [curve for curve in over_x if curve.side == side]
-            # Colours go on from one side to the other.
+            # Colours continue from the left side to the right.
             lines += _over_one_axis(axes, side, chosen, len(lines), labelled) if chosen else []
-        # Above the curves, where it hides none.
+        # Above the curves, so that it hides none.
         above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
         axes.legend(handles=lines, **above, frameon=False, fontsize="small")
     savefig(figure, path)
@@ -96,7 +96,7 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
 def _over_one_axis(
     axes: Any, side: str, curves: list[PlottedCurve], first: int, labelled: Callable[[str], str]
 ) -> list:
-    """Draw curves over one axis of y; return their lines."""
+    """Draw curves over one y axis; return their lines."""
     if side == "right":
         axes = axes.twinx()
         axes.spines[["top", "left"]].set_visible(False)
@@ -114,12 +114,12 @@ def _over_one_axis(
     return lines
 
 
-# ---- the look that all plots share --------------------------------------------------------------
+# ---- common style --------------------------------------------------------------------------------
 
 
 def blank_figure(width: float, height: float) -> Any:
-    """Make an empty figure of Matplotlib, in inches, that needs no display."""
-    # Matplotlib takes a third of a second to import: only scenes with plots pay it.
+    """Make an empty Matplotlib figure, in inches, that needs no display."""
+    # Importing Matplotlib takes a third of a second: only scenes with plots pay it.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -129,25 +129,25 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def in_mathtext(lead: str, exponent: int) -> str:
-    """Write a number times a power of ten for Matplotlib; no lead is 1."""
+    """Format a number times a power of ten for Matplotlib; `lead` is omitted if it is 1."""
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
 def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
-    """Write the numbers of one axis in one style: 0.02, 500, or 10^-7, 3·10^-7."""
+    """Format the numbers of one axis consistently: 0.02, 500, or 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
     return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 
 
 def _parts(a: float) -> tuple[str, int]:
-    """Find what stands before the power of ten of a number, nothing for 1, and the exponent."""
+    """Split a number into mantissa (empty for 1) and decimal exponent."""
     exponent = floor(log10(abs(a)) + 1e-9)
     lead = a / 10**exponent
     return "" if abs(lead - 1) < 1e-9 else f"{lead:g}", exponent
 
 
 def real_ticks(axis: Any) -> None:
-    """Real numbers at the ticks of a linear axis, no power of ten and no sum beside it."""
+    """Label the ticks of a linear axis with full numbers, without common factor or offset."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     class WholeNumbers(ScalarFormatter):
@@ -166,7 +166,7 @@ def real_ticks(axis: Any) -> None:
 
 
 def tidy(axes: Any) -> None:
-    """Draw a light grid, no frame on the far sides, and real numbers at the ticks."""
+    """Draw a light grid, no frame at the far sides, and full numbers at the ticks."""
     real_ticks(axes.xaxis)
     real_ticks(axes.yaxis)
     axes.grid(True, color="0.9", linewidth=0.7)

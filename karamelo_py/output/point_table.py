@@ -1,4 +1,4 @@
-"""Tables of points: all of a scene, a piece of them by id, or some of a block."""
+"""Tables of points: all points of a scene, a piece of them by id, or some of a block."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -18,7 +18,7 @@ from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
-# Columns, the vectors that they belong to, and directions.
+# Columns, the vectors they belong to, and directions.
 VECTORS = {
     f"{before}{axis}{after}": (vector, k)
     for before, after, vector in (
@@ -29,41 +29,41 @@ VECTORS = {
 
 
 class Part(NamedTuple):
-    """Points of a block, and their places in a table."""
+    """Points of a block, and their rows in a table."""
 
     block: Block
-    rows: np.ndarray | None  # ascending; None: all of the block
+    rows: np.ndarray | None  # ascending; None: all points of the block
     places: Any  # indices or a slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
-        """Return the numbers (..., k) of these points, from those of all of the block."""
+        """Select these points from an array (..., k) over the block."""
         whole = self.rows is None or len(self.rows) == array.shape[-1]
         return array if whole else fields.some_points(array, self.rows)
 
     @property
     def points(self) -> Points:
-        """The arrays of these points alone."""
+        """Return the arrays of these points only."""
         return self.block.points if self.rows is None else some_of(self.block, self.rows).points
 
 
 class Rows(NamedTuple):
-    """The points of a table, as they lie in the arrays of a scene."""
+    """Points of a table, as stored in the arrays of a scene."""
 
     s: Setup
     parts: list[Part]
     ids: np.ndarray
     present: np.ndarray
-    comm: Any = None  # of the processes that have parts of them, or None
+    comm: Any = None  # of the processes that hold parts of the table, or None
 
     def of_all(self, own: list[tuple]) -> Iterator[tuple]:
-        """Yield places and numbers, from those of the parts that are at hand."""
+        """Yield places and numbers of all processes, given those at local parts."""
         if self.comm is None:
             yield from own
         else:
             yield from (one for of_rank in self.comm.allgather(own) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Gather (n, ...) a field, which `of` takes from `Points`; zero for deleted points."""
+        """Gather a field (n, ...), which `of` selects from `Points`; zero for deleted points."""
         own = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
         found = np.zeros((*own[0][1].shape[:-1], len(self.ids)), own[0][1].dtype)
         return self._filled(found, own)
@@ -74,14 +74,14 @@ class Rows(NamedTuple):
         return found.T
 
     def put(self, of: Callable[[Points], np.ndarray], values: np.ndarray) -> None:
-        """Write a field (n, ...), which `of` takes from `Points`."""
+        """Scatter a field (n, ...), which `of` selects from `Points`."""
         for block, rows, places in self.parts:
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """Gather (n, components) a declared field, None where the scene does not have it.
+        """Gather a declared field (n, components); None if the scene does not have it.
 
-        Where only some laws have it, the others show what it starts from.
+        Points whose law does not have the field get its initial value.
         """
         arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
         if all(array is None for _, array in arrays):
@@ -91,15 +91,15 @@ class Rows(NamedTuple):
         return self._filled(found, own)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Compute (n, *columns) numbers of each point by a kernel.
+        """Compute (n, *columns) numbers of each point with a kernel.
 
-        ``of(laws)`` is called as ``fill(kin, points, laws, rows)``. Points are left at 0
-        where their laws do not have it, and ``of(laws)`` is None.
+        The kernel ``of(laws)`` is called as ``fill(kin, points, laws, rows)``. If it is None, the
+        points of those laws get 0.
         """
         own, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
-            # Arrays without points are of another type, for which all would be compiled once more.
+            # Arrays without points have another type and would cause another compilation.
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(s.kin, points, part.block.laws, rows)
@@ -108,10 +108,9 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Some points of a scene, one after another: arrays, which are safe to keep, and columns.
+    """Some points of a scene in order: arrays (copies) and columns.
 
-    Deleted points (boundary delete) have zeros in the arrays of all points and of a piece;
-    `particle` leaves them out.
+    Deleted points (boundary delete) are zero in the arrays; `particle` omits them.
     """
 
     def __init__(self, hub: Scene, rows: Rows):
@@ -120,7 +119,7 @@ class PointTable:
         self._cache: dict[str, Any] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], Any]) -> Any:
-        rows = self._rows  # where the scene has gone on this forgets what was made
+        rows = self._rows  # clears the cache if the scene has stepped
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
@@ -142,7 +141,7 @@ class PointTable:
 
     @property
     def present(self) -> np.ndarray:
-        """(n,) False for points that were deleted."""
+        """(n,) False for deleted points."""
         return self._rows.present
 
     @property
@@ -178,9 +177,9 @@ class PointTable:
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """(n, d d) moment of velocity, sum N v (X - x), of transfers that keep it, or None.
+        """(n, d d) velocity moment sum N v (X - x), for transfers that store it, else None.
 
-        The arms X - x are those of the present places: in the total frame F times the reference's.
+        The arms X - x are in present coordinates: in the total frame, F times the reference arms.
         """
         rows = self._rows
         if (kept := rows.declared(Moment)) is None:
@@ -194,18 +193,18 @@ class PointTable:
         return rows._filled(np.zeros(kept.T.shape, kept.dtype), own)
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """Return a declared field (n, components), None where the scene does not have it."""
+        """Return a declared field (n, components); None if the scene does not have it."""
         return self._rows.declared(kind)
 
     def columns_of_laws(self) -> set[str]:
-        """Name what the laws of the materials declare."""
+        """Names of the columns declared by the laws of the materials."""
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """Return a column (n,) of the points that there are.
+        """Return a column (n,) of the existing points, without deleted ones.
 
-        What the scene does not have is zero, as in Karamelo. Deleted points are left out.
+        Columns that the scene does not have are zero, as in Karamelo.
         """
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
@@ -226,7 +225,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # A kinematics fills its own components: in the plane the fourth is 12, as in space.
+        # A kinematics stores its components only: in 2D the fourth is 12, as in 3D.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -247,7 +246,7 @@ def owners_of_fields(hub: Scene, contact: Any = None) -> list:
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
-    """Map columns to the field, declared in `attribute`, that shows each, and the component."""
+    """Map each column to the field that declares it in `attribute`, and the component."""
     found: dict[str, tuple[type, int]] = {}
     for kind in fields.declared(owners_of_fields(hub), attribute):
         for k, column in enumerate(fields.columns_of(kind)):
@@ -256,13 +255,13 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
 
 
 def named_sets(hub: Scene) -> list[str]:
-    """List the groups of points and the solids: as a column, each is 1 for its points, else 0."""
+    """List groups of points and solids; as columns they are 1 for their points, else 0."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
 
 def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
-    """Tell of points, by their numbers (n,) from 0, which belong to a group or solid: 1, else 0."""
+    """Return 1 for points (0-based numbers, (n,)) that belong to a group or solid, else 0."""
     if name in hub.groups:
         return hub.groups[name].has(numbers).astype(float)
     solid = hub.solids[name]
@@ -270,7 +269,7 @@ def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:
-    """List the columns that only some scenes have, without those that are `present`."""
+    """List the columns that exist in some scenes only, without those that are `present`."""
     return [name for name, show in columns.items() if show is None and name not in present]
 
 
@@ -279,9 +278,9 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of the places, where it is known how they change.
+    """Velocities (d, n) at the time of the positions, if their rate of change is known.
 
-    Else those that the points have, of half a step before.
+    Otherwise the stored velocities, half a step earlier.
     """
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
@@ -303,17 +302,17 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
 
 
 def places_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
-    """Return (n, d) positions of points before the first step, without those of others."""
+    """Return initial positions (n, d) of points by id."""
     return from_solids(hub, ids, lambda solid, own: solid.x0_of(own), hub.domain.dimension)
 
 
 def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
-    """Return (n,) volumes of points before the first step."""
+    """Return initial volumes (n,) of points by id."""
     return from_solids(hub, ids, lambda solid, own: solid.volume0[own])
 
 
 def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
-    """Gather what ``of(solid, numbers)`` returns of its points with these numbers."""
+    """Gather ``of(solid, numbers)`` for points of all solids."""
     found, order = np.empty((len(ids), *columns)), np.argsort(ids)
     for solid in hub.solids.values():
         ends = solid.first_id, solid.first_id + solid.count
@@ -324,7 +323,7 @@ def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.
 
 
 def _column_of_laws(name: str, laws: Any) -> Callable | None:
-    """Return what exports a number of each point that its law declares; None of others."""
+    """Return the kernel that exports a number declared by laws; None if no law declares it."""
     what = columns_of(laws).get(name)
     return None if what is None else partial(export.export, what, False)
 
@@ -353,8 +352,8 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
     return table._exported[:, k].copy()
 
 
-# Columns of every scene. Those with None only some materials or fields have; in other scenes they
-# are 0, as in Karamelo.
+# Columns of every scene. Those with None need certain materials or fields; elsewhere they are 0,
+# as in Karamelo.
 COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     "id": lambda table: table.ids,
     "type": lambda table: table.solid + 1,

@@ -1,4 +1,4 @@
-"""Quantities that a log line or a plot reads at each output: anything with a name."""
+"""Named quantities that the log and plots read at each output."""
 
 import math
 import re
@@ -11,26 +11,26 @@ from karamelo_py.script.expressions import POINT_SEEDS
 from karamelo_py.script.syntax import Raw, Source
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
-LIMIT = "limit"  # the log shows the name of what limits the step
+LIMIT = "limit"  # the log shows what limits the step
 PER_POINT = frozenset(POINT_SEEDS)
 
 
 class Quantity:
     """A named number of the running scene.
 
-    It is one of the words ``step``, ``dt``, ``time``; a variable of the script; a value published
-    by a fix or a compute (``Ek``, ``v_x``); or a `formula` written on the spot (``Ek + Es``).
+    One of the words ``step``, ``dt``, ``time``; a script variable; a value published by a fix or
+    compute (``Ek``, ``v_x``); or an anonymous `formula` (``Ek + Es``).
     """
 
     script_kind = "a quantity"
 
-    words = False  # it may be ``limit``, whose content is a word
+    words = False  # whether ``limit``, which is text, is allowed
 
     def __init__(self, hub: Scene, name: str, formula: Any = None):
         self.hub = hub
         self.name = name
         self.formula = formula
-        self._told = False  # whether the user knows of a NaN
+        self._told = False  # whether a NaN has been reported
         self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return
@@ -47,7 +47,7 @@ class Quantity:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "Quantity":
-        """Read the quantity that a script's argument means; errors mark the argument."""
+        """Read the quantity from a script argument; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
             if text in cls.names(hub) or (cls.words and text == LIMIT):
@@ -69,16 +69,16 @@ class Quantity:
 
     @staticmethod
     def names(hub: Scene) -> list[str]:
-        """List every name that can be logged now."""
+        """List all names that can be logged now."""
         return [*KEYWORDS, *_variables(hub), *hub.values.names()]
 
     @property
     def heading(self) -> str:
-        """The name as it heads a column: as Karamelo writes it, and without blanks."""
+        """Column heading: the name as Karamelo writes it, without blanks."""
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """Read the number now, or the word; of the first that is no number the user is told."""
+        """Read the present number or word; the first NaN is reported to the user."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()
@@ -94,9 +94,9 @@ class Quantity:
         return number
 
     def _source(self) -> Any:
-        """Find the formula, the content of the variable, or the number behind the name.
+        """Find the formula, the value of the variable, or the number of this name.
 
-        Looked up each time, as the script may set a variable anew between two runs.
+        Looked up each time, because the script may redefine a variable between runs.
         """
         variables = _variables(self.hub)
         if self.formula is not None:
@@ -113,9 +113,9 @@ class Quantity:
 
 
 class Caption:
-    """A text in which ``{name}`` or ``{formula}`` is the number it has then, and ``{{`` a brace."""
+    """A text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
 
-    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # in dollars: mathematics of Matplotlib
+    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # in dollars: Matplotlib's mathematics
 
     def __init__(self, hub: Scene, text: str, option: str = "title"):
         self.text, self.quantities = text, {}
@@ -132,7 +132,7 @@ class Caption:
 
     @property
     def names(self) -> set[str]:
-        """The names that its numbers follow from."""
+        """Names that its numbers depend on."""
         sources = ((one.name, one._source()) for one in self.quantities.values())
         return {name for own, of in sources for name in getattr(of, "names", [own])}
 

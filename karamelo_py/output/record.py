@@ -1,7 +1,7 @@
-"""The record of a script's runs, as data: run.json beside the log.
+"""The record of a script's runs as data: run.json next to the log.
 
-The banner and the closing table of a run are printed from it, and studies read it. Its fields are
-listed in docs/run-record.md. Numbers that are not finite are null.
+The banner and the closing table are printed from it, and studies read it. Its fields are listed
+in docs/run-record.md. Numbers that are not finite are null.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ NAME = "run.json"
 
 
 def surroundings() -> dict[str, Any]:
-    """Date, machine and versions, for what is measured here and now."""
+    """Date, machine and versions, for measurements made now."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
@@ -39,7 +39,7 @@ def surroundings() -> dict[str, Any]:
 
 
 def processor() -> str:
-    """Find the name of the processor."""
+    """Return the name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.lower().startswith("model name"):
@@ -52,12 +52,12 @@ def processor() -> str:
 class RunRecord:
     """Facts of all runs of a script, and its messages.
 
-    It is written when a run begins and ends, and by `end`; to nowhere without a `path`.
+    Written when a run begins or ends, and by `end`; not at all without a `path`.
     """
 
     def __init__(self) -> None:
         self.path: Path | None = None
-        self.is_asked_for = False  # also of a script that ends before its first run
+        self.is_asked_for = False  # also for a script that ends before its first run
         self.content: dict[str, Any] = {"schema": SCHEMA, "status": "running"}
         self.runs: list[dict[str, Any]] = []
         self.messages: list[dict[str, Any]] = []
@@ -65,10 +65,10 @@ class RunRecord:
         self._begun = time.perf_counter()
 
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
-        """Note which script this is, and the values that its variables were given."""
+        """Note the script and the values given to its variables."""
         of_content = None
         with suppress(OSError):
-            if Path(file).is_file():  # a pipe can be read once
+            if Path(file).is_file():  # a pipe can be read only once
                 of_content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.content["script"] = {
             "file": str(file),
@@ -78,17 +78,17 @@ class RunRecord:
 
     @property
     def script(self) -> str:
-        """The file of the script as the user wrote it; SCRIPT where there is none."""
+        """The script file as the user wrote it; SCRIPT if there is none."""
         return str(self.content.get("script", {}).get("file", "SCRIPT"))
 
     def begin(self, facts: Mapping[str, Any]) -> None:
-        """Begin a run with what is known of it before its first step."""
+        """Start the record of a run with facts known before its first step."""
         self.content["status"] = "running"
         self.runs.append(dict(facts))
         self._write()
 
     def finish(self, facts: Mapping[str, Any]) -> None:
-        """Add what is known of the present run at its end."""
+        """Add the facts known at the end of the present run."""
         self.runs[-1].update(facts)
         self._write()
 
@@ -106,7 +106,7 @@ class RunRecord:
             self._note("error", error.sentence, error.place, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
-        # In Python each command ends so, and few change anything.
+        # In Python each command ends here, and few change anything.
         if (self.runs or self.is_asked_for) and self._written != (status, len(self.messages)):
             self._write()
 
@@ -127,12 +127,12 @@ class RunRecord:
             "messages": self.messages,
             **surroundings(),
         }
-        with suppress(ScriptError):  # whatever else is written reports a full disk
+        with suppress(ScriptError):  # other output reports a full disk
             write_whole(self.path, json.dumps(_finite(whole), indent=1, ensure_ascii=False) + "\n")
 
 
 def _finite(value: Any) -> Any:
-    """Turn numbers of NumPy into Python's, and what is not finite into None."""
+    """Convert NumPy numbers to Python's, and non-finite ones to None."""
     if isinstance(value, dict):
         return {name: _finite(of) for name, of in value.items()}
     if isinstance(value, (list, tuple)):

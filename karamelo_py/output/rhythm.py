@@ -1,4 +1,4 @@
-"""Rhythms of output: every so many steps, or whenever so much time has passed."""
+"""Output intervals: every n steps, or every time span."""
 
 import re
 from math import ceil, floor, isfinite
@@ -14,7 +14,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """At the first step at or after each multiple of `span`.
+    """Output at the first step at or after each multiple of `span`.
 
     `passed` counts the multiples that have been written.
     """
@@ -24,12 +24,12 @@ class ByTime:
         self.passed = -1
 
     def now(self, time: float) -> int:
-        """Count the multiples up to `time`; a sum of steps falls short by round-off."""
+        """Count the multiples up to `time`, allowing for round-off."""
         return floor(time / self.span * (1 + 1e-12) + 1e-9)
 
 
 class Rhythmic:
-    """Something written again and again: `every` says how often, `last_step` when last."""
+    """Something written repeatedly: at the interval `every`, last at `last_step`."""
 
     remembers = ("last_step", "passed")
     every: int | ByTime
@@ -37,7 +37,7 @@ class Rhythmic:
 
     @property
     def passed(self) -> int | None:
-        """The multiples of a span of time that were written."""
+        """Number of multiples of the time span that were written."""
         return getattr(self.every, "passed", None)
 
     @passed.setter
@@ -47,13 +47,13 @@ class Rhythmic:
 
 
 class Every:
-    """For signatures: a number of steps, or ``time(T)``; gives an int or a `ByTime`."""
+    """Annotation: a number of steps, or ``time(T)``; an int or a `ByTime`."""
 
     script_kind = "a whole number above 0, of steps, or time(T)"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> int | ByTime:
-        """Read the rhythm from an argument."""
+        """Read the interval from an argument."""
         match = _BY_TIME.fullmatch(argument.text)
         if not match:
             return _STEPS.convert(hub, argument)
@@ -66,7 +66,7 @@ class Every:
 
 
 def is_due(every: int | ByTime, step: int, time: float) -> bool:
-    """Tell if the present state is one to be written."""
+    """Tell whether the present state is to be written."""
     if isinstance(every, ByTime):
         return every.now(time) > every.passed
     return step % every == 0
@@ -75,7 +75,7 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
     """Find the first step after `step` that may be due.
 
-    While the step is not `fixed` it may grow, so that a longer way is gone by halves.
+    Unless `fixed`, the step may grow, so half of a longer distance is taken at a time.
     """
     if not isinstance(every, ByTime):
         return (step // every + 1) * every

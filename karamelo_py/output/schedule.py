@@ -1,4 +1,4 @@
-"""Output: what is written when. The log, the dumps and the plots share one rhythm."""
+"""Schedule of output: the log, dumps and plots."""
 
 import os
 import re
@@ -18,11 +18,11 @@ RESTART = "restart"
 
 
 class Output:
-    """Writes log, dumps and plots when they are due.
+    """Write log, dumps and plots when they are due.
 
-    Each of them is due at the first and the last state of every run and at the multiples of its
-    `every`, counted in absolute steps or time, so that a further run goes on in the same rhythm.
-    No state is written twice to the same file. In a rehearsal nothing is written.
+    Each is due at the first and last state of every run and at multiples of its `every`, in
+    absolute steps or time, so that further runs continue the sequence. No state is written twice to
+    one file. In a rehearsal nothing is written.
     """
 
     def __init__(self, hub: Scene):
@@ -30,22 +30,22 @@ class Output:
         self.log = Log(hub)
         self.plots = Plots(hub)
         self.units: Units | None = None
-        # False where a program keeps the log and no file is asked for.
+        # False if a program reads the log and no file is requested.
         self.writes = True
-        # Written after all others, which then have nothing to write of the same state.
+        # Written last, after everything else of the same state.
         self.last: list[Rhythmic] = []
-        # Pages that somebody watches the run on.
+        # Live pages that are being watched.
         self.pages: list[Rhythmic] = []
-        # Who writes to a file.
+        # The writer of each file.
         self.files: dict[Path, str] = {}
 
     @property
     def takes_part(self) -> bool:
-        """Tell whether dumps are written, by this process or by the first."""
+        """Whether this process takes part in writing dumps."""
         return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:
-        """Refuse to write to `file` if that is the log or a script, or cannot be done."""
+        """Refuse to write to `file` if it is the log, a script, or not writable."""
         path = self.hub.folder / file
         scripts = getattr(self.hub.interpreter, "files", ())
         if _may_be(path, self.log.path):
@@ -61,7 +61,7 @@ class Output:
         raise ScriptError(what, argument="file", expected="the name of another file")
 
     def claim(self, file: Path, writer: str) -> None:
-        """Keep `file` for one writer, such as a dump; only restart files may be written again."""
+        """Reserve `file` for one writer, such as a dump; only restart files may be overwritten."""
         other = self.files.get(file)
         if other is not None and not other == writer == RESTART:
             raise ScriptError(
@@ -72,7 +72,7 @@ class Output:
         self.files[file] = writer
 
     def begin(self, *, within: bool = False) -> None:
-        """Write the headers and the first state of a run; not that of one gone on `within`."""
+        """Write headers and the first state of a run, unless it continues `within` a run."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not self.plots:
@@ -86,7 +86,7 @@ class Output:
             self.write(last=True)
 
     def next_step(self, step: int) -> int:
-        """Find the first step after `step` at which something is due."""
+        """Find the first step after `step` at which output is due."""
         update = self.hub.update
         fixed = update.fixed_dt is not None
         return min(
@@ -94,7 +94,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write what is due at the present step; with `last`, everything not yet written."""
+        """Write everything due at this step; with `last`, everything not yet written."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time
@@ -104,7 +104,7 @@ class Output:
             if i.last_step != step and (last or is_due(i.every, step, time))
         ]
         if any(item is self.log or item in self.plots.values() for item in due):
-            # Computes and energy fixes only work when somebody looks.
+            # Computes and energy fixes work only when their values are needed.
             self.hub.refresh_values()
         for item in due:
             self._do(item, "write")
@@ -113,7 +113,7 @@ class Output:
                 item.every.passed = item.every.now(time)
 
     def write_last(self) -> None:
-        """Write what comes after all others alone."""
+        """Write the items in `last`."""
         for item in self.last if self.takes_part else ():
             if item.last_step != self.hub.update.step:
                 self._do(item, "write")
@@ -129,9 +129,9 @@ class Output:
             self._do(item, "finish")
 
     def abort(self) -> None:
-        """Draw the plots, complete dumps and close the log of a run that breaks off.
+        """Draw plots, complete dumps and close the log of an aborted run.
 
-        No further state is written. What prevents them is told as a warning.
+        Writes no further state. Errors become warnings.
         """
         if self.hub.rehearsing:
             return
@@ -148,7 +148,7 @@ class Output:
         return [self.plots, *self.hub.dumps.values()] if self.writes else []
 
     def _do(self, item: Any, what: str) -> None:
-        """Write or finish; errors have the place of the command that asked for it."""
+        """Write or finish an item; errors point to the command that defined it."""
         style = getattr(item, "style", "")
         if not self.hub.settings.comm.leads:
             what = "take_part" if hasattr(item, "take_part") else what
@@ -177,7 +177,7 @@ def _located(error: ScriptError, place: Any) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Tell if `path`, whose first ``*`` becomes a number, may come to be the file `other`."""
+    """Tell whether `path`, whose first ``*`` becomes a number, can name the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

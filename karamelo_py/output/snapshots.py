@@ -1,4 +1,4 @@
-"""Dumps of points read back: LAMMPS text (gzipped or not), HDF5, VTU."""
+"""Readers of particle dumps: LAMMPS text (gzipped or not), HDF5, VTU."""
 
 import gzip
 import re
@@ -16,25 +16,25 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Snapshot(NamedTuple):
-    """The points at one moment."""
+    """The points at one time."""
 
     step: int
-    time: float  # NaN where the file does not say
-    columns: dict[str, np.ndarray]  # (n,) by name, with x, y and z among them
-    lo: np.ndarray  # (3,) corners of the domain, or around the points where the file does not say
+    time: float  # NaN if the file does not give it
+    columns: dict[str, np.ndarray]  # (n,) by name, including x, y and z
+    lo: np.ndarray  # (3,) corners of the domain, or bounds of the points if the file has none
     hi: np.ndarray
-    units: Mapping[str, str] = {}  # by column, and of time, as far as the file says
+    units: Mapping[str, str] = {}  # by column, and of time, if the file gives them
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Read the snapshots in a file, in their order from the `first`; an error if it is no dump."""
+    """Yield the snapshots in a file from the `first` on; raise an error if it is not a dump."""
     reader = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}.get(path.suffix, _lammps)
     if path.exists() and not path.is_file():
         what = "a folder" if path.is_dir() else "a pipe or a device"
         raise ScriptError(f"{path} is {what}", expected="a file of dump particle, hdf5 or vtk")
     try:
         yield from reader(path, first)
-    except Exception as error:  # readers have many names for a file that is damaged
+    except Exception as error:  # readers raise many kinds of errors for damaged files
         reason = getattr(error, "strerror", None)
         raise ScriptError(
             f"{path} cannot be read: {reason}"

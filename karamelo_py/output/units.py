@@ -1,4 +1,4 @@
-"""Names of the units of a scene: what the numbers of a consistent set mean, for labels."""
+"""Names of the units of a scene, for labels."""
 
 import re
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ COLUMNS = {
     r"T": Powers(0, 0, 0, 1),
     r"time|dt": Powers(0, 0, 1),
 }
-# Values that fixes and computes publish, by their styles.
+# Values published by fixes and computes, by style.
 STYLES = {
     "kinetic_energy": ENERGY,
     "strain_energy": ENERGY,
@@ -61,7 +61,7 @@ STYLES = {
 
 
 class Units(NamedTuple):
-    """The units that the numbers of a scene are in, by their names."""
+    """The units of a scene, by name."""
 
     length: str
     mass: str
@@ -72,12 +72,12 @@ class Units(NamedTuple):
         return " ".join(self)
 
     def si(self, powers: Powers) -> float:
-        """Name the unit of a mechanical quantity in SI units."""
+        """Return the size of the unit of a mechanical quantity in SI units."""
         si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
         return si * TIMES[self.time] ** powers.time
 
     def name(self, powers: Powers) -> str:
-        """Name the unit of a quantity: MPa where there is such a name, else mm/ms and the like."""
+        """Name the unit of a quantity: MPa if it has a name, else a product such as mm/ms."""
         if powers in NAMED:
             order = log10(self.si(powers))
             if isclose(order, round(order), abs_tol=1e-9) and round(order) in PREFIXES:
@@ -94,12 +94,12 @@ class Units(NamedTuple):
         return f"{above or 1}/{f'({below})' if ' ' in below else below}"
 
     def of_column(self, name: str) -> str:
-        """Name the unit of a column of a dump, empty where it has none."""
+        """Name the unit of a dump column; empty if it has none."""
         powers = (powers for names, powers in COLUMNS.items() if re.fullmatch(names, name))
         return self.name(next(powers, Powers()))
 
     def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
-        """Name the unit of `name` in the log, a value perhaps of one of `parts`."""
+        """Name the unit of a log column, which may be a value of one of `parts`."""
         for ID, part in parts.items():
             if name in (ID, *(f"{ID}_{end}" for end in part.published)):
                 return self.name(STYLES.get(part.style, Powers()))
@@ -107,5 +107,5 @@ class Units(NamedTuple):
 
 
 def labelled(name: str, unit: str) -> str:
-    """Write ``name (unit)``, or the name where there is no unit."""
+    """Format ``name (unit)``, or the name without a unit."""
     return f"{name} ({unit})" if unit else name

@@ -1,7 +1,7 @@
-"""Unstructured grids in the XML format of VTK, written so many rows at a time.
+"""Unstructured grids in VTK's XML format, written in pieces (VTK File Formats, 2015).
 
-An array stands in the file behind the one before it, while rows come with all columns: until the
-last is there, compressed blocks wait in files without a name beside it (VTK File Formats, 2015).
+The file stores arrays one after another, but rows arrive with all columns: compressed blocks wait
+in unnamed temporary files until the last row.
 """
 
 import sys
@@ -16,14 +16,14 @@ import numpy as np
 
 KINDS = {"vertex": 1, "line": 3, "quad": 9, "hexahedron": 12}
 TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
-BLOCK = 1 << 15  # bytes that are compressed together
-COMPRESSION = 4  # a third of the time of level 6 for few more bytes
-IN_MEMORY = 1 << 16  # bytes of an array that wait there
-PIECE = 3 << 16  # bytes that are encoded together: without an end between them
+BLOCK = 1 << 15  # bytes compressed together
+COMPRESSION = 4  # a third of the time of level 6, slightly larger files
+IN_MEMORY = 1 << 16  # bytes of an array that wait in memory
+PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in between
 
 
 class Column:
-    """The rows of one array, as they come."""
+    """The rows of one array, added in pieces."""
 
     def __init__(self, name: str, folder: Path):
         self.name = name
@@ -50,7 +50,7 @@ class Column:
         self._file.write(packed)
 
     def write(self, out: BinaryIO) -> None:
-        """Write the array, which is forgotten then."""
+        """Write the array and free it."""
         if self._rest:
             self._pack(self._rest)
         head = [len(self._sizes), BLOCK, self._last % BLOCK, *self._sizes]
@@ -66,7 +66,7 @@ class Column:
 class Vtu:
     """A file of points with columns of these `names`, and of cells between them.
 
-    In the `folder` there is room for as much as the file takes.
+    The `folder` of temporary files needs as much room as the file.
     """
 
     def __init__(self, names: Iterable[str], folder: Path):

@@ -1,4 +1,4 @@
-"""Boundary of the domain: points that reach it stop the run, are deleted or reflected."""
+"""Edge of the domain: points that reach it stop the run, are deleted or are reflected."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def check(hub: Scene) -> None:
-    """Refuse what does not go together; called before every run."""
+    """Refuse combinations that do not work; called before every run."""
     update = hub.update
     if update.boundary == "error":
         return
@@ -35,10 +35,10 @@ def check(hub: Scene) -> None:
 
 
 def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
-    """Take out of a step that went wrong the points that leave in it, if the scene says so.
+    """Delete the points that left the domain in a failed step, if the scene asks for it.
 
-    The run is then where it was before that step. Which points leave depends on the state alone,
-    so that the results are the same however a run is cut and on whatever number of threads.
+    The run is then back at the start of the step. Which points leave depends on the state only, so
+    results do not depend on threads or on how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False
@@ -66,9 +66,9 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
 
 
 def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
-    """Take points (by id, ascending) out of the run; return their mass and energy.
+    """Delete points (by id, ascending); return their mass and energy.
 
-    The energy is kinetic, stored and dissipated; the balance counts it as work that goes with them.
+    The energy is kinetic, stored and dissipated; the balance counts it as negative work.
     """
     simulation = hub.simulation
     if len(ids) == np.count_nonzero(simulation.present):
@@ -81,7 +81,7 @@ def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
 
 
 def tell_of_bounces(hub: Scene, simulation: Any) -> None:
-    """Warn when the first points were reflected."""
+    """Warn when the first points have been reflected."""
     if hub.update.boundary == "reflect" and not hub.update.warned_of_bounces and simulation.bounces:
         hub.update.warned_of_bounces = True
         hub.warn(

@@ -1,8 +1,8 @@
-"""Clipping of the boxes of points at the edge of a region: volumes and middles.
+"""Clip the boxes of points at the edge of a region: volumes and centroids.
 
-A region says how far its surface is at least (`Region.depth`), so that a box is looked at only
-where the surface may pass through it. There the surface is a plane, found from that distance at the
-corners and the middle; where it is not plane, the box is taken in halves, up to `HALVED` times.
+`Region.depth` bounds the distance to the surface, so only boxes that the surface may cross are
+clipped. In them the surface is taken as a plane, fitted to the depth at the corners and the middle.
+If it is not plane, the box is halved, up to `HALVED` times.
 """
 
 import itertools
@@ -13,40 +13,42 @@ import numpy as np
 
 from karamelo_py.scene.region import Region
 
-HALVED = 5  # times, at most, along each direction
-PLANE = 0.01  # of a box: how far from a plane a surface may be
-EDGE = 0.05  # the same of a part of it, which has a sharp edge else
-SHEET = 0.01  # the same where it may be that of a thin sheet
-LEAST = 0.1  # of a box: less is given to a point beside it
-NOTHING = 1e-9  # of a box: rounding
-# Of a box, in the smallest parts that are not plane: a corner in the plane, an edge in space have a
-# third of that; a sheet that is thinner than these parts more, or it is most of its body.
+HALVED = 5  # times at most, along each direction
+PLANE = 0.01  # of a box: deviation of a surface from a plane
+EDGE = 0.05  # the same for a part of a box, which otherwise has a sharp edge
+SHEET = 0.01  # the same if the surface may belong to a thin sheet
+LEAST = 0.1  # of a box: smaller pieces are given to a neighbouring point
+NOTHING = 1e-9  # of a box: round-off
+# Of a box, in the smallest parts that are not plane: a corner in 2D or an edge in 3D has a third of
+# it; a sheet thinner than these parts has more, or it is most of its body.
 ROUGH = 0.025
 MOSTLY = 0.1
-FACE = 2  # parts of the face of a box along each direction
-SLOPE = 1e-3  # over the largest: one that is less is none (sums would lose their digits)
+FACE = 2  # parts per face of a box along each direction
+SLOPE = 1e-3  # relative to the largest: smaller slopes are zero (sums would lose their digits)
 
 
 class Pieces(NamedTuple):
-    """Clipped boxes: the parts in a region of boxes through which its surface passes."""
+    """Clipped boxes: their parts in a region whose surface passes through them."""
 
-    number: np.ndarray  # (n,) of the boxes, in order
-    middle: np.ndarray  # (n, d) of what is left of them
-    share: np.ndarray  # (n,) how much that is, of a whole box
-    # (m,) of each box where the surface is not plane in parts too small to be halved again: these.
+    number: np.ndarray  # (n,) of the boxes, ascending
+    middle: np.ndarray  # (n, d) centroid of the part
+    share: np.ndarray  # (n,) volume of the part, as a fraction of the box
+    # (m,) fraction of each box in parts that are not plane and too small to be halved.
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
-        """Return the least thickness whose mass is known; 0 where nothing is as thin."""
+        """Return the smallest thickness resolved by boxes of this size; 0 if all of it is."""
         mostly = self.rough.sum() > MOSTLY * self.share.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Of which boxes of edge length `size` around `x` (n, d) something is left; what, at the edge.
+    """Find the boxes of edge length `size` around `x` (n, d) that lie in a region, in part or
+    whole.
 
-    They are numbered from `first`. What is left lies in `region` and in the domain. Boxes end at
-    the box around the region, so that what lies along the axes is exact.
+    Boxes are numbered from `first`. Returns the mask of boxes, and the pieces of those at the edge.
+    The domain clips, too. Boxes end at the region's bounding box, so that faces along the axes are
+    exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -73,16 +75,16 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Give what is little to the nearest piece that is not, if one is in a box beside it.
+    """Merge small pieces into the nearest larger piece in a neighbouring box, if there is one.
 
-    `boxes` are `Filled`, of which each place is the middle of a box.
-    What has been given away has the share 0; whole boxes that took something are added.
+    `boxes` are `Filled`, whose places are the middles of boxes. Merged pieces get the fraction 0;
+    whole boxes that take a piece are added.
     """
     small = np.flatnonzero(pieces.share < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
     nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
-    # It leans to the side of its box beyond which there is more.
+    # A piece leans to the side of its box beyond which there is more.
     lean = np.where(middle > boxes.middles(pieces.number[small]), 1, -1)
     for step in np.array(list(itertools.product((0, 1), repeat=d))):
         number = boxes.beside(pieces.number[small], step * lean)
@@ -119,15 +121,15 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
 def _measure(
     region: Region, lo: np.ndarray, edges: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Measure boxes clipped by a surface: share (n,) of a box, its moment (n, d).
+    """Measure boxes clipped by a surface: fraction (n,) of the box and its moment (n, d).
 
-    In shares of a whole box. Third, how much is rough, see `Pieces`.
+    Both as fractions of a whole box. Third, how much is rough; see `Pieces`.
     """
     n, d = lo.shape
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
     box = np.flatnonzero((edges > NOTHING * size).all(axis=1))
-    # One direction after another, as regions look at them: rows are contiguous.
+    # Rows are contiguous, because regions read one direction after another.
     lo, edges = lo[box].T, edges[box].T
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=d)))
     places = np.concatenate([corners, np.full((1, d), 0.5)])
@@ -146,7 +148,7 @@ def _measure(
         whole &= inmost >= (0.5 - NOTHING) * edges.min(axis=0)
         passed = (np.abs(inmost) < reach) & ~whole
         slopes[:, ~passed] = 0
-        # Where nothing is seen of it, or of what is beside it, it may be a sheet.
+        # Where neither it nor its surroundings are seen, it may be a sheet.
         unseen = np.abs(np.sign(depth).sum(axis=0)) == len(depth)
         edge = np.where(unseen, SHEET, EDGE) * edges.max(axis=0)
         bent = passed & (off > (edge if halved == HALVED else np.minimum(edge, PLANE * size)))
@@ -154,7 +156,7 @@ def _measure(
         if halved == HALVED:
             rough = np.bincount(box[bent], volume[bent])
             bent[:] = False
-        # Simpson's rule: the mean over a box of what is bent a little.
+        # Simpson's rule for the mean over slightly curved boxes.
         done = ~bent
         share, middle = _plane((mean + 2 * inmost)[done] / 3, slopes[:, done])
         share *= volume[done]
@@ -171,8 +173,8 @@ def _measure(
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Measure the surface of `region` in boxes of edge length `size` around `x` (n, d).
 
-    Returns its area times the normal out of the region, (n, d), and a place on it, (n, d). By what
-    the covered parts of opposite faces differ: in boxes beside each other it adds up exactly.
+    Returns area times outward normal, (n, d), and a position on the surface, (n, d). The vector is
+    the difference of the covered areas of opposite faces, so that its sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
@@ -183,7 +185,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
         covered = []
         for side in (-0.5, 0.5):
             at = x[:, None, None, :] + np.insert(on_face, k, side, axis=2) * size
-            # A face along the surface is not covered, whichever of two boxes asks.
+            # A face along the surface is not covered, for both of its boxes.
             depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
             depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
             slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)
@@ -195,9 +197,10 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Clip a unit cube by a linear function: share (n,) and middle (d, n) of its positive part.
+    """Clip a unit cube by a linear function: fraction (n,) and centroid (d, n) of its positive
+    part.
 
-    It is `mean` (n,) at the middle of the cube.
+    The function is `mean` (n,) at the middle of the cube.
     """
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
@@ -212,10 +215,10 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same for a function that falls by `m` > 0 (d, n) along each edge.
+    """The same for a function that decreases by `m` > 0 (d, n) along each edge.
 
-    From the lowest corner of the cube a simplex is above 0; those at the other corners, beyond the
-    cube, are taken away and added in turn.
+    The function is positive in a simplex at the lowest corner of the cube. The simplices at the
+    other corners, outside the cube, are subtracted and added in turn.
     """
     d = len(m)
     top = mean + m.sum(axis=0) / 2

@@ -1,4 +1,4 @@
-"""The domain: the box that holds everything, and the background grid laid over it."""
+"""The domain: the bounding box of the scene and its background grid."""
 
 from collections.abc import Sequence
 
@@ -13,11 +13,9 @@ from karamelo_py.script.errors import Place, ScriptError
 class Domain:
     """A box with a grid of square cells that starts at its lower corner.
 
-    The grid covers the whole box; when a side is not a multiple of `h` it reaches over the upper
-    corner by less than one cell.
-
-    Corners `lo` and `hi` (3,) are 0 in unused directions. Without a cell size `h` the grid is left
-    to the first solid (the older language).
+    The grid covers the box; if a side is not a multiple of `h`, it extends past the upper corner by
+    less than one cell. Corners `lo` and `hi` (3,) are 0 in unused directions. Without `h`, the
+    first solid sets the cell size (older scripts).
     """
 
     axisymmetric = False  # x is a radius and y the axis
@@ -32,7 +30,7 @@ class Domain:
             self.set_cell_size(h)
 
     def set_cell_size(self, h: float) -> None:
-        """Lay the grid; an error where there would be more nodes than can be counted."""
+        """Set the cell size; raise ScriptError if there would be too many nodes."""
         self.lattice = Lattice(self.dimension, self.lo, self.hi, h)
         self.h = self.lattice.h
 
@@ -52,7 +50,7 @@ class Domain:
 
 
 def _around(hub: Scene, dimension: int) -> str | None:
-    """A domain as large as the block or cylinder that the statement in progress would make."""
+    """Suggest a domain around the block or cylinder of the present statement."""
     _, *words = words_of(hub.interpreter.statement) or [""]
     if words[:1] == ["block"]:
         ends = words[1 : 1 + 2 * dimension]
@@ -70,7 +68,7 @@ def _around(hub: Scene, dimension: int) -> str | None:
 
 
 def require_domain(hub: Scene) -> Domain:
-    """Return the domain of the scene; an error where there is none yet."""
+    """Return the domain; raise ScriptError if there is none yet."""
     if hub.domain is None:
         if announced := getattr(hub, "announced_dimension", None):
             ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
@@ -90,7 +88,7 @@ def require_domain(hub: Scene) -> Domain:
 
 
 def require_grid(hub: Scene) -> Domain:
-    """Return the domain of the scene; an error where it has no grid yet."""
+    """Return the domain; raise ScriptError if it has no grid yet."""
     domain = require_domain(hub)
     if domain.h is None:
         raise ScriptError(

@@ -1,4 +1,4 @@
-"""Groups: sets of points or of nodes that fixes, computes and dumps act on."""
+"""Groups of points or nodes, on which fixes, computes and dumps act."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -19,12 +19,12 @@ NOTHING_THERE = "what acts on this group does nothing there"
 
 
 class AnyGroup(Named):
-    """A group of points or of nodes, in signatures; that of `all` takes in what is made later.
+    """A group of points or of nodes, for annotations; `all` includes those made later.
 
-    Both have ``total()``, the number of points or nodes that there are; ``chosen()``, the members
-    of others than the group of all; and ``add(region, solids)``, which adds what lies in a region
-    and belongs to some solids (None: to any), and returns how many were found. Of a region that is
-    not known yet nothing is found.
+    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members of
+    groups other than `all`; and ``add(region, solids)``, which adds what lies in a region and
+    belongs to some solids (None: any), and returns the number found (0 for a region that is not
+    known yet).
     """
 
     kind = ""
@@ -51,7 +51,7 @@ class AnyGroup(Named):
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """Find the group that `argument` names; ``all`` is everything, or all points."""
+        """Find the group that `argument` names; ``all`` is every node, or every point."""
         if ALL in (argument.text, argument.word()):
             return (ParticleGroup if cls is AnyGroup else cls)(hub, everything=True)
         try:
@@ -71,11 +71,11 @@ class AnyGroup(Named):
 
 
 class ParticleGroup(AnyGroup):
-    """A set of points, by their reference positions. Members are decided when they are added."""
+    """A set of points, chosen by their reference positions when they are added."""
 
     kind = "particles"
     script_kind = "a group of points, or all"
-    # Whether each point is a member, from the lowest bit of a byte on, and of 64 that are none.
+    # Membership of each point, one bit each from the lowest of a byte on, and 64 spare bits.
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
@@ -96,27 +96,27 @@ class ParticleGroup(AnyGroup):
         return sum(solid.count for solid in self.hub.solids.values())
 
     def chosen(self) -> np.ndarray:
-        """Members of a group that is not that of all."""
+        """Members of a group other than `all`."""
         return np.concatenate([np.empty(0, np.int64), *self.pieces()])
 
     def pieces(self) -> Iterator[np.ndarray]:
-        """Numbers of the members, ascending, so many at a time."""
+        """Yield the numbers of the members in pieces, ascending."""
         for solid in self.hub.solids.values():
             for ids in _numbers_of(solid):
                 yield ids[self.has(ids)]
 
     def has(self, ids: np.ndarray) -> np.ndarray:
-        """(n,) whether points are members, by their numbers."""
+        """(n,) whether points, by number, are members."""
         if self.all:
             return np.ones(len(ids), np.bool_)
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)
 
     def touches(self, solid: Solid) -> bool:
-        """Return True if points of a solid are members."""
+        """Whether points of a solid are members."""
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Return the membership of `count` points, one bit each, as bytes of whole words."""
+        """Return the membership of `count` points, one bit each, in bytes of whole words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -126,15 +126,15 @@ class ParticleGroup(AnyGroup):
         return found
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add what lies in a region, see `AnyGroup`."""
+        """Add the points in a region, see `AnyGroup`."""
         return self._take(self._found(region, solids))
 
     def add_numbers(self, ids: np.ndarray) -> None:
-        """Add points by their numbers, which are ascending."""
+        """Add points by ascending numbers."""
         self._take([ids])
 
     def _take(self, pieces: Iterable[np.ndarray]) -> int:
-        """Make members of points, which come ascending, so many at a time; how many."""
+        """Add points, in ascending pieces; return their number."""
         bits, count = self.bits(self.total() + 64), 0
         for ids in pieces:
             if len(ids):
@@ -157,22 +157,22 @@ class ParticleGroup(AnyGroup):
 
 
 def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
-    """The numbers of the points of a solid, so many at a time."""
+    """Yield the numbers of the points of a solid in pieces."""
     end = solid.first_id + solid.count
     for first in range(solid.first_id, end, CHUNK):
         yield np.arange(first, min(first + CHUNK, end))
 
 
 class NodeGroup(AnyGroup):
-    """A set of nodes, by their positions. Methods decide whether solids share them.
+    """A set of nodes, by position.
 
-    The group is what was said of it, not a list of numbers: solids and methods that come later may
-    bring grids of their own, and what lies in the region there belongs to it, too.
+    It is stored as its definition, because later solids and methods may add grids, whose nodes in
+    the region belong to it, too. The method decides whether solids have separate grids.
     """
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
-    awaits_solids = False  # those that are made later may bring the first members
+    awaits_solids = False  # later solids may add the first members
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         super().__init__(hub, everything=everything)
@@ -187,23 +187,23 @@ class NodeGroup(AnyGroup):
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
     def chosen(self) -> np.ndarray:
-        """Members of a group that is not that of all; looked for anew where grids are others."""
+        """Members of a group other than `all`; found again when the grids change."""
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
             found = [numbers for part in self.parts if len(numbers := self._find(*part))]
-            # Each is ascending: millions would be sorted for nothing.
+            # Each is ascending already; sorting millions would be a waste.
             members = [np.unique(np.concatenate(found))] if len(found) > 1 else found
             self._found = lattices, (members or [np.empty(0, np.int64)])[0]
         return self._found[1]
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add what lies in a region, see `AnyGroup`."""
+        """Add the nodes in a region, see `AnyGroup`."""
         self.parts = (*self.parts, (region, solids))
         self._found = None
         return len(self._find(region, solids))
 
     def warn_past_domain(self) -> None:
-        """Warn where the group is a wall at an upper edge that has no nodes: they lie past it."""
+        """Warn if the group is meant as a wall at an upper edge but lies past the domain."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return
@@ -222,7 +222,7 @@ class NodeGroup(AnyGroup):
                 )
 
     def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
-        """Nodes in `region`; where solids have nodes of their own, those of `solids`."""
+        """Nodes in `region`; if solids have separate grids, only on the grids of `solids`."""
         if region.unknown:
             return np.empty(0, dtype=np.int64)
         require_grid(self.hub)

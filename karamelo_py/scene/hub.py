@@ -1,4 +1,4 @@
-"""The hub (Karamelo's Pointers): what every command and style may see."""
+"""The hub (Karamelo's Pointers): state of the scene that commands and styles can access."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts of a scene, in creation order; items keep their ``id`` and ``place``."""
+    """Named parts of a scene, in creation order; items have an ``id`` and a ``place``."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -31,7 +31,7 @@ class Catalogue(dict):
         self.hub = hub
 
     def add(self, ID: str, item: Any, *, replace: bool = False) -> Any:
-        """File `item` under `ID`; a second use of an ID is an error unless `replace`."""
+        """Add `item` under `ID`; an ID already in use is an error unless `replace`."""
         if not replace:
             self.refuse(ID)
         item.id, item.place = ID, self.hub.place
@@ -39,7 +39,7 @@ class Catalogue(dict):
         return item
 
     def refuse(self, ID: str) -> None:
-        """An ID that is in use is an error."""
+        """Raise ScriptError if an ID is in use."""
         if ID in self:
             before = getattr(self[ID], "place", None)
             where = f" (line {before.line})" if before else ""
@@ -71,13 +71,13 @@ class Catalogue(dict):
         )
 
     def remove(self, ID: str) -> None:
-        """Forget `ID`; unknown is an error."""
+        """Remove `ID`; raise ScriptError if it is unknown."""
         self[ID]
         del self[ID]
 
 
 class Parts(dict):
-    """Kind of parts of a law -> their catalogue; one that a plug-in asks for is made for it."""
+    """Catalogues of parts of laws by kind, made on request for kinds of plug-ins."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -97,11 +97,11 @@ class Settings:
         self.threads: int | None = None
         self.precision = "double"
         self.engine = "processor"
-        self.card: Any = None  # the GPU that takes the steps of the engine of that name
-        self.ranks = 1  # processes that are asked for
-        self.comm = SerialComm()  # the processes that share the scene
+        self.card: Any = None  # the GPU, with --gpu
+        self.ranks = 1  # number of processes requested
+        self.comm = SerialComm()  # communicator of the processes
         self.debug = False
-        self.trusts = False  # .geo files, which may run programs
+        self.trusts = False  # .geo files may run programs
 
 
 class Update:
@@ -114,40 +114,40 @@ class Update:
         self.method: Any = None
         self.transfer: Any = None  # a NamedTuple: PIC, FLIP, APIC ...
         self.scheme: Any = MUSL()
-        self.scheme_place: Place | None = None  # in the script, as of the others below
-        self.scheme_behind = 0  # how many runs it was chosen
-        self.thermal = False  # heat flows between points
-        self.anti_locking = False  # changes of volume are averaged against volumetric locking
-        self.half_start = False  # whether the first forces act for half a step
-        self.fixed_dt: float | None = None  # of set_dt; None: the step follows the fastest point
-        self.dt_factor: float | None = None  # share of the stable step; None: the program chooses
+        self.scheme_place: Place | None = None  # in the script, like the others below
+        self.scheme_behind = 0  # number of runs before it was chosen
+        self.thermal = False  # heat is conducted between points
+        self.anti_locking = False  # F-bar
+        self.half_start = False  # whether the first kick lasts half a step
+        self.fixed_dt: float | None = None  # from set_dt; None: follows the fastest point
+        self.dt_factor: float | None = None  # of the stable step; None: chosen by the program
         self.dt_place: Place | None = None
         self.boundary = "error"  # or delete or reflect, for points that reach the edge
         self.boundary_place: Place | None = None
-        self.warned_of_bounces = False  # the user knows that points were reflected
-        self.warned_of: list[str] = []  # names of failures that the user knows of
-        self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and since when
+        self.warned_of_bounces = False  # the user has been warned of reflected points
+        self.warned_of: list[str] = []  # known failures that the user has been warned of
+        self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and its start
 
     def first_time(self, name: str) -> bool:
-        """Note that the user is warned of something; False where that was so before."""
+        """Note a warning by name; return False if it has been given before."""
         first = name not in self.warned_of
         self.warned_of += [name] * first
         return first
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        """Name the fields that points carry from one step to the next."""
+        """Fields of points that persist between steps."""
         return (VelocityBefore,) if self.half_start else ()
 
     @property
     def words(self) -> str:
-        """Method, transfer, basis and scheme, as a script calls them."""
+        """Method, transfer, basis and scheme, in words of the script."""
         scheme = _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme)
         return f"{self.words_of_state} {scheme}" + " thermo-mechanical" * self.thermal
 
     @property
     def words_of_state(self) -> str:
-        """Method, transfer and basis: a state that another scheme has left fits them."""
+        """Method, transfer and basis; any scheme can continue such a state."""
         method = registry.name_of("method", type(self.method))
         transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
         return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
@@ -164,7 +164,7 @@ class Update:
 
     @property
     def dt(self) -> float:
-        """The next step."""
+        """Length of the next step."""
         return self.values.get("dt")
 
     def transfer_tag(self, real: type) -> Any:
@@ -173,7 +173,7 @@ class Update:
 
 
 def _with_numbers(name: str, tag: NamedTuple) -> str:
-    """``FLIP (alpha 0.99)``."""
+    """Format as ``FLIP (alpha 0.99)``."""
     numbers = ", ".join(
         f"{key} {value:g}" if isinstance(value, (int, float)) else f"{key} {value}"
         for key, value in tag._asdict().items()
@@ -182,29 +182,29 @@ def _with_numbers(name: str, tag: NamedTuple) -> str:
 
 
 class Hub:
-    """The scene, how it goes forward, and what it writes."""
+    """The scene, its time integration and its output."""
 
     def __init__(self, console: Console | None = None):
         self.console = console or Console()
         self.settings = Settings()
         self.folder = Path.cwd()
-        self.place: Place | None = None  # of the statement in progress
-        # While the rest of a script is tried before the first step nothing runs or is written.
+        self.place: Place | None = None  # of the present statement
+        # During a rehearsal nothing runs and nothing is written.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = 0  # runs, in fact or in the rehearsal of what follows
-        self.answered = False  # the script has printed or written something, or said where it ends
-        self.checking = False  # under ``karamelo-py check``: the first run only reports
-        self.pausing = False  # a script stops in front of its runs: a program lets time go on
-        self.open_ended = False  # a program may go on behind the script
-        # What acts, is written or drawn in some run, as far as a rehearsal came to them.
+        self.begun = 0  # number of runs, including those of a rehearsal
+        self.answered = False  # the script has printed, written or ended something
+        self.checking = False  # ``karamelo-py check``: the first run only reports
+        self.pausing = False  # the script stops before its runs, which a program controls
+        self.open_ended = False  # a program may continue after the end of the script
+        # Fixes, dumps and curves that act in some run, as far as the rehearsal got.
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
-        self.restart: Any = None  # what the script goes on from, until it is there
+        self.restart: Any = None  # the restart state, until the script has rebuilt the scene
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
-        self.parts = Parts(self)  # that some materials are made of
+        self.parts = Parts(self)  # parts of composed materials
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -213,7 +213,7 @@ class Hub:
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()  # that fixes and computes publish, and time, timestep, dt
+        self.values = Values()  # published by fixes and computes, and time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
@@ -222,20 +222,20 @@ class Hub:
         self._fits_run: Any = None  # the last one that found the arrays to fit the scene
         self.runs: list[dict[str, float]] = []  # published values at the end of each so far
         self.record = RunRecord()
-        self.warned: list[tuple[float, str]] = []  # times and messages, for those who watch
-        self.later: list[Any] = []  # `known_failures.Step` of runs that a rehearsal came to
+        self.warned: list[tuple[float, str]] = []  # times and messages, for live pages
+        self.later: list[Any] = []  # `known_failures.Step` of later runs, from the rehearsal
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 
     @property
     def catalogues(self) -> list[Catalogue]:
-        """All that has names."""
+        """All catalogues."""
         mine = [item for item in vars(self).values() if isinstance(item, Catalogue)]
         return [*self.parts.values(), *mine]
 
     @property
     def has_run(self) -> bool:
-        """True once a run has changed the state, or will have in a rehearsal."""
+        """True if a run has changed the state (in a rehearsal, will have)."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -253,9 +253,9 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """The grids of the scene: of the method, or that of the domain before there is one.
+        """The grids of the scene: of the method, or of the domain if there is no method yet.
 
-        The same list as long as they stay the same.
+        The list object changes only if the grids change.
         """
         key, method = self._key_of_lattices, self.update.method
         if self._lattices is None or self._lattices[0] != key:
@@ -267,7 +267,7 @@ class Hub:
         return self.domain, self.domain.h, self.update.method, *self.solids.values()
 
     def forget_simulation(self) -> None:
-        """The points of a solid were replaced: arrays and grids are made anew when asked for."""
+        """Discard arrays and grids after the points of a solid were replaced."""
         self._simulation = None
         self._lattices = None
 
@@ -279,14 +279,14 @@ class Hub:
                 with as_script_error(name, "refresh", type(item), item.place):
                     item.refresh()
                 if catalogue is self.computes and item.published and not item.has_published:
-                    item.has_published = True  # is told once
+                    item.has_published = True  # reported once
                     self.warn(
                         f"{name} has measured and published nothing: "
                         f"{item.id}_{item.published[0]} is 0".replace("_ ", " "),
                         item.place,
                         hint="its author calls self.publish in refresh, or says published = ()",
                     )
-        # A compute of a plug-in may draw lots: all processes go on with the numbers of the first.
+        # A compute of a plug-in may use random numbers: all processes use the values of rank 0.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
@@ -299,9 +299,9 @@ class Hub:
         code: str = "",
         cause: str = "",
     ) -> None:
-        """Tell the user of something that may not be meant; not during a rehearsal.
+        """Warn the user, except during a rehearsal.
 
-        The `code` names the kind of a trouble for programs, `cause` its likely cause.
+        `code` names the kind of problem for programs, `cause` the likely cause.
         """
         if not self.rehearsing:
             self.record.warn(message, hint, place or self.place, code, cause)
@@ -312,7 +312,7 @@ class Hub:
             self.console.warn(text)
 
     def rehearse(self) -> None:
-        """Try the rest of the script, once, before the first work that takes time."""
+        """Try the rest of the script once, before the first expensive work."""
         if not self.rehearsed:
             self.rehearsed = True
             other = self.rehearsal()
@@ -322,11 +322,11 @@ class Hub:
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:
-        """List the parts that act in runs: fixes, dumps and curves."""
+        """List fixes, dumps and curves, which act in runs."""
         return [*self.fixes.values(), *self.dumps.values(), *self.output.plots.values()]
 
     def _tell_of_late(self, rehearsed: Hub) -> None:
-        """Warn of what the script has only behind its last run."""
+        """Warn of parts that the script defines after its last run."""
         curve = next(iter(rehearsed.output.plots.values()), None)
         if curve is not None and rehearsed.output.plots.file is None and not self.open_ended:
             self.warn(
@@ -345,10 +345,10 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """A copy on which the rest of the script can be tried without consequences.
+        """A copy on which the rest of the script can be tried without side effects.
 
-        Whatever a command may change is a copy. Fixes, computes, regions and materials are the same
-        objects: commands make new ones.
+        Whatever commands may change is copied. Fixes, computes, regions and materials are the same
+        objects, because commands only make new ones.
         """
         other = copy.copy(self)
         other.rehearsing = True
@@ -386,5 +386,5 @@ class Hub:
             mine = self.groups[ID] = copy.copy(group)
             mine.hub = self
         if real._lattices is not None:
-            # The same grids, as long as these stay as they are: groups of nodes know their members.
+            # Unchanged grids are the same objects: groups of nodes remember their members.
             self._lattices = self._key_of_lattices, real._lattices[1]

@@ -1,4 +1,4 @@
-"""Lattices: the nodes of the regular grids of a scene, and how they are numbered."""
+"""Lattices: the regular grids of a scene and the numbering of their nodes."""
 
 import itertools
 import math
@@ -10,24 +10,24 @@ import numpy as np
 from karamelo_py.points.grid import Grid
 from karamelo_py.script.errors import ScriptError
 
-# A point this far (in cells) beyond a face still counts as lying on it.
+# A point this far (in cells) past a face still counts as on it.
 RELATIVE_TOLERANCE = 1e-9
-# Node numbers have to fit into 32 bits wherever a kernel packs them.
+# Kernels pack node numbers into 32 bits.
 MAX_NODES = 2**31 - 1
-# Points or nodes looked at together: large enough for NumPy, small enough for the cache and memory.
+# Points or nodes processed at once: large enough for NumPy, small enough for caches and memory.
 CHUNK = 1 << 18
 
 
 class Lattice:
-    """A grid of square cells from a lower corner, over a whole box.
+    """A grid of square cells over a box, from its lower corner.
 
-    When a side of the box is not a multiple of `h`, it reaches over the upper corner by less than
-    one cell.
+    If a side of the box is not a multiple of `h`, the grid extends past the upper corner by less
+    than one cell.
 
-    Cells have the size `h`, and `nodes_per_cell` 1, or 2 with nodes in their middle, too. Nodes are
-    numbered from `first` on, cells from `first_cell`. There are at least `least_nodes` per
-    direction, of which those beyond the box stay without mass. `cells` and `shape` (3,) count cells
-    and nodes, 1 in unused directions. More nodes than can be counted are an error.
+    Cells have the size `h`. `nodes_per_cell` is 1, or 2 with nodes at cell centres. Nodes are
+    numbered from `first`, cells from `first_cell`. There are at least `least_nodes` per direction;
+    those outside the box have no mass. `cells` and `shape` (3,) count cells and nodes, 1 in unused
+    directions. Raises ScriptError if there are more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Lattice:
 
     @property
     def spacing(self) -> float:
-        """Distance of nodes."""
+        """Distance between nodes."""
         return self.h / self.nodes_per_cell
 
     @property
@@ -69,17 +69,17 @@ class Lattice:
         return math.prod(self.shape)
 
     def places(self, numbers: np.ndarray) -> np.ndarray:
-        """Places (n, 3) of nodes; that at (i, j, k) has the number `first` + (i ny + j) nz + k."""
+        """Indices (n, 3) of nodes; node (i, j, k) has the number `first` + (i ny + j) nz + k."""
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
-        """Positions of nodes, (n, 3); of all where no numbers are given."""
+        """Positions (n, 3) of nodes, by default of all."""
         if numbers is None:
             numbers = self.first + np.arange(self.node_count)
         return self.lo + self.places(numbers) * self.spacing
 
     def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Nodes in a box, some thousand at a time: their numbers (m,) and positions (m, dimension).
+        """Yield the nodes in a box in chunks: numbers (m,) and positions (m, dimension).
 
         `lo` and `hi` (3,) may be infinite. Nodes come in the order of their numbers.
         """
@@ -96,13 +96,13 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Cells (n, dimension), counted along each axis, that hold positions; the nearest ones."""
+        """Cell indices (n, dimension) of positions; outside the grid, of the nearest cell."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
 
     def around(self, cells: np.ndarray, steps: Sequence[int]) -> np.ndarray:
-        """Numbers (k, n) of the nodes so many cells along each axis from the first of `cells`."""
+        """Numbers (k, n) of the nodes at `steps` along each axis from the first node of `cells`."""
         shape = np.array(self.shape[: self.dimension])
         places = (
             np.clip((cells + np.array(step)) * self.nodes_per_cell, 0, shape - 1)
@@ -136,7 +136,7 @@ def table(lattices: Sequence[Lattice], real: type) -> Grid:
 
 
 def numbered(lattices: Sequence[Any]) -> list[Lattice]:
-    """The same lattices with numbers of nodes, and of cells, that follow each other."""
+    """Number the nodes and cells of lattices consecutively."""
     first = first_cell = 0
     for lattice in lattices:
         lattice.first, lattice.first_cell = first, first_cell
@@ -150,23 +150,23 @@ def numbered(lattices: Sequence[Any]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Integer positions between `first` and `last` (inclusive), the last axis fastest, in chunks.
+    """Yield integer positions between `first` and `last` (inclusive), last axis fastest, in chunks.
 
     Each chunk is an int64 array (m, d) with about CHUNK / `weight` rows, so that `weight` items
-    for every position stay a bounded amount of memory however large the box is.
+    per position need a bounded amount of memory.
     """
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 
 
 def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple[int, int]]:
-    """The numbers of the first position of each chunk, and of that behind its last."""
+    """Numbers of the first position of each chunk, and one past the last position."""
     total = math.prod(b - a + 1 for a, b in zip(first, last, strict=True))
     step = max(1, CHUNK // weight)
     return [(begin, min(begin + step, total)) for begin in range(0, total, step)]
 
 
 def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
-    """Those with the numbers from `start` to before `end`."""
+    """Positions with numbers from `start` to before `end`."""
     counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
     return np.stack(np.unravel_index(np.arange(start, end), counts), axis=1) + first

@@ -16,11 +16,11 @@ except ImportError:  # Windows
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import ScriptError, render_message
 
-# Of all memory: what the system keeps for itself and gives back when it has to.
+# Of all memory: reserved by the system, and released when needed.
 SLACK = 0.03
 
-# Files of a group of processes, of version 2 and 1: its limit, what it has, and what of that is
-# in caches that can be dropped, as memory.stat calls it.
+# Files of control groups, versions 2 and 1: limit, usage, and what of the usage is droppable cache,
+# as memory.stat calls it.
 _OF_GROUPS = (
     ("memory.max", "memory.current", ("active_file", "inactive_file", "slab_reclaimable")),
     (
@@ -31,10 +31,10 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes that a machine, or a job on it, has yet, and has in all; swap is among them.
+    """Bytes that are free on a machine or in a job, and the total; swap included.
 
-    More than `free` may be had where the system does not tell of all that it can give back (caches
-    of ZFS); more than `whole` may not.
+    More than `free` may be available if the system does not report all it can release (ZFS caches);
+    more than `whole` may not.
     """
 
     free: float
@@ -42,16 +42,16 @@ class MachineMemory(NamedTuple):
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Count what can be had at most: free, or held by caches and swap; None where no one tells.
+    """Return available memory, including caches and swap; None if the system does not report it.
 
-    The machine's, or less where the processes of a container or of a batch job have a limit
-    (cgroup, of either version), or each of the `processes` that share the scene here its own
-    (ulimit -v). `root` is for tests.
+    The least of the machine's memory, the limits of containers and batch jobs (cgroup, both
+    versions), and the limit of each of `processes` on this machine (ulimit -v). `root` is for
+    tests.
     """
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # of numbers that are not needed
+        with warnings.catch_warnings(action="ignore"):  # about numbers that are not needed
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
@@ -65,7 +65,7 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
 
 
 def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
-    """Read the limits of the groups of processes (cgroup) that this one is in."""
+    """Read the limits of the control groups of this process."""
     found = []
     for line in _lines(root / "proc/self/cgroup"):
         _, controllers, path = line.split(":", 2)
@@ -73,7 +73,7 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
             continue
         top = root / "sys/fs/cgroup" / ("memory" if controllers else "")
         limit_file, used_file, dropped = _OF_GROUPS[bool(controllers)]
-        # In a container the path may be that outside; its own limit stands at the top then.
+        # In a container the path may be the outer one; the limit is then at the top.
         inner = top / path.strip("/")
         for folder in (inner, *inner.parents[: len(inner.parts) - len(top.parts)]):
             limit, used = (_number(folder / name) for name in (limit_file, used_file))
@@ -90,35 +90,35 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
 
 
 def _lines(path: Path) -> list[str]:
-    """Read the lines of a file; none where there is no file."""
+    """Read the lines of a file; empty if there is no file."""
     with suppress(OSError):
         return path.read_text(encoding="utf-8").splitlines()
     return []
 
 
 def _number(path: Path) -> float | None:
-    """Read the number in a file; None where there is no file, or no limit."""
+    """Read the number in a file; None if there is no file or no limit."""
     with suppress(OSError, ValueError):
         return float(path.read_text(encoding="utf-8"))
     return None
 
 
 def taken() -> int:
-    """Count the bytes of memory that this process has taken."""
+    """Return the bytes of memory used by this process."""
     import psutil
 
     return psutil.Process().memory_info().rss
 
 
 def age() -> float:
-    """Return how long ago this process was started, in seconds."""
+    """Return the age of this process in seconds."""
     import psutil
 
     return time.time() - psutil.Process().create_time()
 
 
 GIB = 2**30
-MANY = 20_000_000  # points, which take seconds to be placed
+MANY = 20_000_000  # points, whose placement takes seconds
 
 
 def in_words(count: float) -> str:
@@ -127,27 +127,27 @@ def in_words(count: float) -> str:
 
 
 class Room(NamedTuple):
-    """Memory for points beside those that are there `already`, whatever their fields."""
+    """Memory for points in addition to `already` existing ones."""
 
     whole: float  # bytes of memory for all points
-    of_one: int  # bytes that a point takes at least
+    of_one: int  # least bytes per point
     already: int
-    single: bool  # they are in single precision
+    single: bool  # single precision
     say: Callable[[str], None] = lambda text: None
 
     @property
     def most(self) -> float:
-        """Count the points that there may be yet."""
+        """Return how many more points fit."""
         return max(self.whole / self.of_one - self.already, 0.0)
 
     def tell(self, count: float) -> None:
-        """Tell of points that take a while to be placed."""
+        """Report the placement of points, if it takes a while."""
         if count > MANY:
             words = f"some {count:.2g} points are placed, which take more than "
             self.say(render_message("note", f"{words}{in_words(count * self.of_one)} of memory"))
 
     def refused(self, count: float) -> ScriptError:
-        """Make the error for so many points."""
+        """Make the error for too many points."""
         need = in_words((count + self.already) * self.of_one)
         return ScriptError(
             f"the scene has some {count + self.already:.2g} points with these, which take more "
@@ -159,10 +159,10 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Ask what room there is for points with a law of so many numbers in its `state`.
+    """Return the room for points whose law has `state` numbers.
 
-    A point has two places, a velocity, a mass and the state, and three numbers that are whole. In a
-    run the last good state has a place, the velocity and the state once more.
+    A point has two positions, a velocity, a mass, the state and three integers. During a run the
+    last good state stores position, velocity and state again.
     """
     settings = hub.settings
     found, comm = machine_memory(settings.comm.on_machine), settings.comm

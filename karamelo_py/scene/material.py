@@ -7,10 +7,10 @@ from karamelo_py.language.arguments import Named
 
 
 class MaterialPart(Named):
-    """A part of a law, or a whole one, under a name: of a `kind`, such as ``eos``, and a `style`.
+    """A named law or part of a law, of a `kind` such as ``eos`` and a `style`.
 
-    `made` is what the style returned: the law, or `laws` by kind where it brings others with it.
-    `given` are the values of its arguments, by name.
+    `made` is the return value of the style: the law, or `laws` by kind if it brings several.
+    `given` are the values of its arguments by name.
     """
 
     def __init__(
@@ -27,7 +27,7 @@ class MaterialPart(Named):
 
     @property
     def law(self) -> NamedTuple:
-        """The NamedTuple of numbers, whose class selects point functions (`points.laws`)."""
+        """The NamedTuple of parameters, whose class selects point functions (`points.laws`)."""
         return self.laws[self.kind]
 
 

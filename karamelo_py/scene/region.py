@@ -1,4 +1,4 @@
-"""Base of regions: an inside, a bounding box, and perhaps an inverted sense."""
+"""Base class of regions: an inside test, a bounding box, and an optional inversion."""
 
 import math
 from collections.abc import Sequence
@@ -14,18 +14,18 @@ from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError
 
 EXTERIOR = "exterior"
-HALVINGS = 12  # of the way on which a surface is looked for
+HALVINGS = 12  # bisections along a line that crosses a surface
 
 
 class Region(Named):
-    """Base of the region styles: override `contains`.
+    """Base of region styles, which override `contains`.
 
-    `lo` and `hi` are corners of a box around the shape, one number per dimension, infinite where it
-    is open. An `exterior` region is what lies outside; `parts` are regions that it is made of.
+    `lo` and `hi` are corners of a bounding box, one number per dimension, infinite if open. An
+    `exterior` region is the outside of the shape; `parts` are regions that it is made of.
     """
 
-    # Direction (0, 1, 2) and centre of the axis that a region in space is round about at the same
-    # `radius` all along.
+    # Direction (0, 1, 2) and centre of the axis of a 3D region that is a cylinder of constant
+    # `radius`.
     axis: tuple | None = None
     catalogue = "regions"
 
@@ -43,52 +43,52 @@ class Region(Named):
         self.exterior = exterior
         self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)
-        # Its place depends on results that a rehearsal does not have.
+        # Its position depends on results that a rehearsal does not have.
         self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
-        # A box around it, infinite where it is open; 0 in unused directions.
+        # Bounding box, infinite if open; 0 in unused directions.
         self.box_lo, self.box_hi = np.zeros((2, 3))
         self.box_lo[:dimension] = -np.inf if exterior else lo
         self.box_hi[:dimension] = np.inf if exterior else hi
 
     @property
     def tolerance(self) -> float:
-        """Distance beyond a face at which a point still counts as inside, for rounding."""
+        """Distance outside a face at which a point still counts as inside, for round-off."""
         return self.domain.tolerance
 
     @property
     def lo(self) -> np.ndarray:
-        """Lower corner (3,) of the part that lies in the domain."""
+        """Lower corner (3,) of the part in the domain."""
         return np.clip(self.box_lo, self.domain.lo, self.domain.hi)
 
     @property
     def hi(self) -> np.ndarray:
-        """Upper corner (3,) of the part that lies in the domain."""
+        """Upper corner (3,) of the part in the domain."""
         return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
 
     @property
     def aligned(self) -> bool:
-        """True if all faces are known to lie along the axes."""
+        """True if all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(part.aligned for part in self.parts)
 
     @property
     def flat(self) -> bool:
-        """True if it, or one of its parts, is made of lines or surfaces, which nothing is in."""
+        """True if it or one of its parts consists of lines or surfaces, without an inside."""
         return any(part.flat for part in self.parts)
 
     @property
     def from_file(self) -> bool:
-        """True if it, or one of its parts, has its shape from a file."""
+        """True if it or one of its parts comes from a file."""
         return any(part.from_file for part in self.parts)
 
     @property
     def volume(self) -> float | None:
-        """Length, area or volume of what lies in the domain, None where that is not known."""
+        """Length, area or volume of the part in the domain; None if unknown."""
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions `x` (n, >= dimension) lie in the shape, faces included: (n,) bool.
+        """Test which positions `x` (n, >= dimension) lie in the shape or on its faces: (n,) bool.
 
-        `exterior` plays no part here.
+        Ignores `exterior`.
         """
         raise NotImplementedError
 
@@ -98,11 +98,11 @@ class Region(Named):
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth of positions `x` (n, >= dimension) in the shape, below 0 outside: (n,).
+        """Return the depth of positions `x` (n, >= dimension) in the shape, negative outside: (n,).
 
-        At most the distance from its surface, as far as it is below `reach`; near a plane part of
-        the surface a linear function of `x`. `exterior` plays no part here. What follows from
-        `contains` alone, along the axes, does not see what is thinner than `reach`.
+        A lower bound of the distance to the surface, up to `reach`; linear in `x` near plane parts
+        of the surface. Ignores `exterior`. The default uses `contains` along the axes, and misses
+        what is thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -119,14 +119,15 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def shape(self) -> Any:
-        """Return what kernels know `distance` by (`kernels.surfaces.depth`), None if they do not.
+        """Return the argument of `kernels.surfaces.depth` for `distance`; None if kernels have
+        none.
 
-        `exterior` plays no part here.
+        Ignores `exterior`.
         """
         return None
 
     def outline(self) -> Any:
-        """Return what kernels know `depth` by, None if they do not."""
+        """The same for `depth`."""
         shape = self.shape()
         return Outside(shape) if self.exterior and shape is not None else shape
 
@@ -137,14 +138,14 @@ class Region(Named):
 
 
 def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], bool]:
-    """The arguments without a closing word ``exterior``, and whether it was there."""
+    """Split off a final word ``exterior``: the other arguments, and whether it was there."""
     if arguments and arguments[-1].word() == EXTERIOR:
         return arguments[:-1], True
     return arguments, False
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Refuse a lower end, the `argument` of this number, above the upper one behind it."""
+    """Refuse a lower end (`argument` is its number) above the upper end, the next argument."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",
@@ -154,7 +155,7 @@ def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> No
 
 
 def check_radius(radius: float, **where: Any) -> None:
-    """Refuse a radius that is not positive; `where` it stands."""
+    """Refuse a radius that is not positive; `where` gives the place."""
     if radius <= 0:
         raise ScriptError(f"R = {radius:g} must be above 0", expected="a radius above 0", **where)
 

@@ -1,4 +1,4 @@
-"""Solids: bodies of material points. Where their points are put is said by the styles of solid."""
+"""Solids: bodies of material points. Solid styles place the points."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -18,31 +18,29 @@ from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
-COLD, WARM = 60.0, 200.0  # what is below the one, and so far below others, is in degrees Celsius
+COLD, WARM = 60.0, 200.0  # temperatures below COLD, and WARM below others, are probably in Celsius
 
 
 class Solid(Named):
-    """Base of the styles of solid: a body of points. A style calls `put` with its points.
+    """Base of solid styles: a body of points. A style calls `put` with its points.
 
     Parameters
     ----------
     material
-        What the points are made of.
+        Material of the points.
     h
-        Cell size. With a grid shared by all solids (ulmpm) it must be that of the domain.
+        Cell size. With a grid shared by all solids (ulmpm) it must be the domain's.
     T0
-        Initial temperature; that of the material when left out.
+        Initial temperature; by default the material's.
     GlueToSolid
-        A solid that came before, whose velocity field this one shares, in methods where each
-        solid has its own.
+        An earlier solid whose velocity field this one shares, in methods with a field per solid.
     """
 
     catalogue = "solids"
-    source = "region"  # the argument that says where the points are, for messages
-    # Of its points, and of the shape in a file that they fill; per radian and radius where the
-    # domain is axisymmetric.
+    source = "region"  # argument that gives the positions of points, for messages
+    # Volume of the points, and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
-    warm = False  # its points are given temperatures of their own
+    warm = False  # its points have individual temperatures
 
     def __init__(
         self,
@@ -67,13 +65,13 @@ class Solid(Named):
             )
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
-        self.initial: dict[str, np.ndarray] = {}  # columns (n,) that its points begin with
-        # From 0; ids of points are such numbers plus 1.
+        self.initial: dict[str, np.ndarray] = {}  # initial columns (n,) of its points
+        # From 0; the id of a point is its number plus 1.
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        """Tell of a temperature that the material cannot have, or that nobody gives."""
-        # Scripts of Karamelo give T0 in mechanical runs, too.
+        """Warn of a temperature that the material cannot have, or that is not given."""
+        # Karamelo scripts give T0 in mechanical runs, too.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
                 f"T0 = {self.T0:g} has no effect: the material has no temperature",
@@ -108,7 +106,7 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Give the solid its points; none, too many, or some left of the axis are an error."""
+        """Store the points; raise ScriptError for none, too many, or points left of the axis."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -122,7 +120,7 @@ class Solid(Named):
         volume = np.asarray(placement.volume, float)
         if self.domain.axisymmetric:
             radius = placement.x0[:][:, 0]
-            if count and radius.min() <= 0:  # a point on the axis itself would have no mass
+            if count and radius.min() <= 0:  # a point on the axis would have no mass
                 raise ScriptError(
                     f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
                     "and points lie at x > 0",
@@ -130,8 +128,8 @@ class Solid(Named):
                     expected=f"a {self.described().split()[0]} at x >= 0",
                 )
             volume = volume * radius
-        # As in `Placement`, but volumes are per radian where the domain is axisymmetric. Equal ones
-        # are stored once, however many points there are. All is to be read only.
+        # As in `Placement`, but volumes are per radian if axisymmetric. Equal values are stored
+        # once. All arrays are read-only.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
         self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
@@ -146,8 +144,8 @@ class Solid(Named):
                 hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
 
-    described: Callable[[], str]  # the source of the points in words, such as ``region 'disk'``
-    why_empty: Callable[[], str]  # why there are no points, though none lies outside the domain
+    described: Callable[[], str]  # source of the points in words, such as ``region 'disk'``
+    why_empty: Callable[[], str]  # why there are no points although none lies outside the domain
     wanted: Callable[[], str]  # a source that would give points
 
     @property
@@ -157,11 +155,11 @@ class Solid(Named):
 
     @property
     def x0(self) -> np.ndarray:
-        """(n, d) reference positions; of many points they are made anew each time."""
+        """(n, d) reference positions; for large solids computed on each access."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
-        """(n, d) reference positions of some points, ascending, without those of the others."""
+        """(n, d) reference positions of some points, by ascending numbers."""
         found = np.empty((len(numbers), self.domain.dimension))
         for begin in range(0, len(numbers), CHUNK):
             some = numbers[begin : begin + CHUNK]
@@ -169,13 +167,13 @@ class Solid(Named):
         return found
 
     def pieces(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Reference positions, so many at a time, with the number of the first of them."""
+        """Yield reference positions in pieces, with the number of the first point of each."""
         for first in range(0, self.count, CHUNK):
             yield first, self.places[first : first + CHUNK]
 
 
 def solid_with(hub: Scene, number: int) -> Solid:
-    """The solid that a point belongs to."""
+    """Return the solid of a point."""
     return [solid for solid in hub.solids.values() if solid.first_id <= number][-1]
 
 
@@ -185,19 +183,19 @@ def named(hub: Scene, number: int) -> str:
 
 
 def words_of_volumes(hub: Scene) -> str:
-    """Say how much of the shapes from files the points of solids fill; nothing without such."""
+    """Report how much of the shapes from files the points fill; empty without such shapes."""
     known = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
     words = [f"{name} {own:.6g} of {whole:.6g} in its file" for name, (own, whole) in known.items()]
     return ", ".join(words[:4]) + (f" and {len(words) - 4} more solids" if len(words) > 4 else "")
 
 
 def own_grids(hub: Scene) -> bool:
-    """Return True if the method lays a grid of its own for each solid."""
+    """Whether the method uses a separate grid for each solid."""
     return getattr(hub.update.method, "own_grids", False)
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
-    """The cell size of a solid that asks for `h`; the first one sets that of a domain without."""
+    """Cell size of a solid that gives `h`; the first one may set the domain's."""
     if domain.h is None:
         domain.set_cell_size(h)
     if own_grids(hub):
@@ -214,7 +212,7 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
 
 
 def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
-    """Warn when points of `new`, to be called `ID`, lie where those of another solid are."""
+    """Warn if points of `new`, to be named `ID`, coincide with those of another solid."""
     for other in hub.solids.values():
         if other is not new and coinciding(new, other):
             hub.warn(
@@ -225,7 +223,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Return True if points of `a` coincide with points of `b`; of many, a sample is tested."""
+    """Whether points of `a` coincide with points of `b`; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():
@@ -240,7 +238,7 @@ def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:
-    """Number positions (n,), those alike that differ by rounding only."""
+    """Hash positions (n,), ignoring round-off."""
     places = np.rint(x * (1e4 / h)).astype(np.int64)
-    # Primes keep places apart; the product may overflow, which only mixes the bits.
+    # Primes separate positions; overflow only mixes the bits.
     return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]

@@ -1,4 +1,4 @@
-"""Tables of numbers that users bring: files of columns, or arrays of a program in Python."""
+"""Tables of numbers from users: columns in files, or arrays of a Python program."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """For signatures: columns by name, of a file or of arrays that a program has given."""
+    """Annotation: named columns of a file, or of arrays passed by a program."""
 
     script_kind = "the name of a file of columns"
 
@@ -26,7 +26,7 @@ class FileColumns:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "FileColumns":
-        """Read the file, or take what `Simulation` has been given."""
+        """Read the file, or take the data passed to `Simulation`."""
         given = hub.functions.get(argument.text)
         if isinstance(given, Mapping):
             return cls(
@@ -37,9 +37,9 @@ class FileColumns:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a file of numbers, by the names in its first row (or "1", "2", ...).
+    """Read columns of numbers by the names in the first row (or "1", "2", ...).
 
-    Numbers are separated by commas, semicolons or blanks; a line that begins with # is a comment.
+    Separators are commas, semicolons or blanks; lines that begin with # are comments.
     """
     rows = []
     try:

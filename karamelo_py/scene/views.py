@@ -1,7 +1,7 @@
-"""Views of nodes and points for hooks that are written in Python.
+"""Views of nodes and points for hooks written in Python.
 
-A view hands out arrays with a row for each node or point of the group. What a hook changes in them,
-by assignment or in place, is written back when it returns; what cannot be changed is read-only.
+A view has arrays with one row per node or point of the group. Changes by the hook, by assignment or
+in place, are written back when it returns; other fields are read-only.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,7 +32,7 @@ from karamelo_py.script.errors import NoItem, Place, ScriptError, nearest
 
 
 class Shown:
-    """A field of a view: how it is read and, unless it is read-only, written."""
+    """A field of a view, with its read and (unless read-only) write function."""
 
     def __init__(self, read: Callable, write: Callable | None = None, doc: str | None = None):
         self.read, self.write = read, write
@@ -61,17 +61,17 @@ class Shown:
         now[...] = value
 
 
-# Columns of dumps, and the arrays that hold them.
+# Columns of dumps, and the arrays that store them.
 _VECTORS = VECTORS | {f"{of}{axis}": ("force", k) for of in "fb" for k, axis in enumerate("xyz")}
 
 
 class View:
-    """A view whose fields are the only attributes, and take only what fits."""
+    """A view: its fields are the only attributes and check what is assigned."""
 
     _fields: tuple[str, ...] = ()
 
     def __init__(self) -> None:
-        # By names of attributes, and classes of declared fields: arrays, and what was in them.
+        # By attribute name or field class: the array given to the hook, and a copy of its content.
         self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _take_times(self, control: Any) -> None:
@@ -82,7 +82,7 @@ class View:
         self.time = float(control.values[arrays.TIME])
 
     def write_back(self) -> None:
-        """Write what a hook has changed; called when it returns."""
+        """Write changes of the hook; called when it returns."""
         for key, (now, before) in self._handed_out.items():
             if now is before or np.array_equal(now, before, equal_nan=True):
                 continue
@@ -92,7 +92,7 @@ class View:
                 self._put(key, now)
 
     def _handed(self, key: str | type, read: Callable, *, written: bool = True) -> np.ndarray:
-        """Return the array that was handed out before, or what ``read()`` gives."""
+        """Return the array given to the hook before, or the result of ``read()``."""
         if key not in self._handed_out:
             array = np.array(read())
             array.flags.writeable = written
@@ -112,7 +112,7 @@ class View:
         raise self._unknown(name)
 
     def __getitem__(self, kind: type) -> np.ndarray:
-        """(n, components) of a field that a part declares."""
+        """(n, components) of a field declared by a part."""
         if not isinstance(kind, type):
             raise self._no_column(kind)
         return self._handed(kind, lambda: self._get(kind))
@@ -121,7 +121,7 @@ class View:
         self[kind][...] = value
 
     def _no_column(self, name: Any) -> KeyError:
-        """The error for a column in brackets, which says the attribute."""
+        """Make the error for a column in brackets, naming the attribute to use."""
         kind = type(self).__name__
         attribute, *k = _VECTORS.get(str(name), (str(name),))
         if isinstance(getattr(type(self), attribute, None), Shown):
@@ -143,7 +143,7 @@ NO_HEAT = "no heat flows: the method has to be thermo-mechanical"
 
 
 def _declared(kind: type, of: str, missing: str = "") -> Callable:
-    """Return what finds the array of a declared field in those of points or nodes."""
+    """Make the getter of a declared field from the arrays of points or nodes."""
 
     def find(found: Any) -> np.ndarray:
         array = field(found.fields, kind)
@@ -182,7 +182,7 @@ class NodesView(View):
         self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
     def total(self, terms: Any) -> np.ndarray:
-        """The sum of terms (n,) or (n, k) over all nodes of the group, those of all processes."""
+        """Sum terms (n,) or (n, k) over all nodes of the group, of all processes."""
         terms = np.asarray(terms, float)
         own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.points.summed(terms[own])
@@ -231,7 +231,7 @@ class NodesView(View):
 
     @property
     def _change(self) -> np.ndarray:
-        """Of the velocity by the momentum update: v* less v."""
+        """Change of velocity in the momentum update: v* minus v."""
         return self._vectors("update", arrays.of_change(self._kin))
 
     @Shown
@@ -279,24 +279,24 @@ class PointsView(View):
         self._then = then
         self._take_times(simulation.control)
         self._numbers = ids  # from 0
-        self.ids = ids + 1  # as dumps have them
+        self.ids = ids + 1  # as in dumps
         self.moved = False
         self._found: Rows | None = None
 
     def total(self, terms: Any) -> np.ndarray:
-        """The sum of terms (n,) or (n, k) over all points of the group, rounded once.
+        """Sum terms (n,) or (n, k) over all points of the group, rounded once.
 
-        It is the same for any number of processes, which all have to ask for it.
+        Collective; the result is the same for any number of processes.
         """
         return self._simulation.points.summed(np.asarray(terms, float))
 
     def column(self, name: str) -> np.ndarray:
-        """(n,) a column of the dumps for these points."""
+        """(n,) a dump column of these points."""
         return PointTable(self._simulation.hub, self._rows).particle(name)
 
     @property
     def _rows(self) -> Rows:
-        """The points of the view, as they lie in the arrays of the scene."""
+        """The points of the view, as stored in the arrays of the scene."""
         if self._found is None:
             s, parts = self._simulation.setup, []
             place = np.full(self._simulation.count, -1)
@@ -323,7 +323,7 @@ class PointsView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """(n, d) positions; the corners of convected domains go with the points."""
+        """(n, d) positions; corners of convected domains move with the points."""
         return self._rows.take(self._place)
 
     @position.writer
@@ -340,7 +340,7 @@ class PointsView(View):
 
     def _write_velocity(self, value: np.ndarray) -> None:
         self._rows.put(lambda points: points.v, value)
-        if self._rows.declared(VelocityBefore) is not None:  # nothing has led here
+        if self._rows.declared(VelocityBefore) is not None:  # nothing has set this
             self._rows.put(_declared(VelocityBefore, "point"), np.full_like(value, np.nan))
 
     velocity = Shown(
@@ -370,11 +370,11 @@ class PointsView(View):
         return self._rows.take(_declared(kind, "point", NO_HEAT))[:, 0]
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
-        """Let points whose transfer keeps it (APIC, TPIC ...) know how their velocity changes.
+        """Set the velocity gradient of points whose transfer stores one (APIC, TPIC ...).
 
-        ``gradient(moves, step)`` -> (n, d) are the derivatives of the `component` by the
-        coordinates that the grid has (positions, or reference positions where `moves` is False);
-        `step` is a length that is small beside a cell. It is called where a point keeps them.
+        ``gradient(moves, step)`` returns the derivatives (n, d) of the velocity `component` with
+        respect to the coordinates of the grid (reference positions if `moves` is False); `step` is
+        a length much smaller than a cell. It is called only if points store a gradient.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -388,7 +388,7 @@ class PointsView(View):
             given = np.zeros((d * d, len(rows)), kept.dtype)
             given[here] = slopes[:, own]
             if not s.transfer.keeps_gradient:
-                # B = D grad v, as the nodes would show it
+                # B = D grad v, as computed from nodes
                 places = points.x[simulation.now] if points.home is None else points.home
                 where = np.ascontiguousarray(places[:, rows])
                 shown, grid = given, points.grid[rows]
@@ -397,7 +397,7 @@ class PointsView(View):
             kept[here, rows] = given[here]
 
     def set_stress(self, given: dict[str, np.ndarray]) -> None:
-        """Set components of the Cauchy stress: ``{"11": (n,) values, ...}`` of rate-form laws."""
+        """Set components of Cauchy stress of rate-form laws: ``{"11": (n,) values, ...}``."""
         s = self._simulation.setup
         names = s.kin.symmetric_names
         flags = np.array([name in given for name in names])
@@ -414,7 +414,7 @@ class PointsView(View):
                 impose_stress(s.kin, points, block.laws, chosen, flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
-        """Set the temperatures (n,) of points whose materials have one."""
+        """Set temperatures (n,) of points whose materials have one."""
         s = self._simulation.setup
         for block, rows, own in self._rows.parts:
             points = arrays.known_to_laws(block.points)
@@ -422,7 +422,7 @@ class PointsView(View):
             impose_temperature(s.kin, points, block.laws, np.asarray(rows), own_values)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
-        """Set a column of dumps to `values` (n,): place, velocity, stress, T, field of a part."""
+        """Set a dump column to `values` (n,): position, velocity, stress, T, or a part's field."""
         d, hub = self._simulation.kin.dimension, self._simulation.hub
         attribute, k = VECTORS.get(name, ("", 0))
         kind, column = declared_columns(hub, "point_fields").get(name, (None, 0))
@@ -472,14 +472,14 @@ def set_columns(
     ids: np.ndarray | None = None,
     place: Place | None = None,
 ) -> None:
-    """Set columns of points (of these ids from 0, or all of the scene) between two steps.
+    """Set columns of points (ids from 0; default all) between two steps.
 
-    Values are numbers, or one for each point.
+    Values are numbers, or one per point.
 
     Raises
     ------
     ScriptError
-        For a column that follows from others, values of another shape, or that are not finite.
+        If the column is derived from others, or values have the wrong shape or are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids
@@ -505,10 +505,10 @@ def set_columns(
 
 
 class PieceView(PointsView):
-    """Points of a group that are at hand, in the order in which they are stored.
+    """Points of a group on this process, in storage order.
 
-    For hooks that look at each point on its own (`Fix.point_by_point`). Positions are read-only.
-    Before the steps (`in_steps` False) they are some of them: others come after them.
+    For hooks that treat each point separately (`Fix.point_by_point`). Positions are read-only.
+    Before the first step (`in_steps` False) a view has only part of the points.
     """
 
     position = Shown(PointsView.position.read)
@@ -523,7 +523,7 @@ class PieceView(PointsView):
         self._in_steps = in_steps
 
     def total(self, terms: Any) -> np.ndarray:
-        """The sum of terms (n,) or (n, k) over all points of the group, rounded once."""
+        """Sum terms (n,) or (n, k) over all points of the group, rounded once."""
         if self._in_steps:
             return super().total(terms)
         raise ValueError(

@@ -1,8 +1,8 @@
 """Read the mesh in an input deck of Abaqus or CalculiX.
 
-Parts, instances with shift and rotation, sets, surfaces, generated nodes and elements. What moves
-or copies nodes in a way that is not known here is refused by its keyword (Abaqus Keywords
-Reference; CalculiX CrunchiX manual).
+Supports parts, instances with translation and rotation, sets, surfaces, and generated nodes and
+elements. Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX
+CrunchiX manual).
 """
 
 import re
@@ -16,7 +16,7 @@ from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
 from karamelo_py.scene.meshes.elements import SHAPES
 from karamelo_py.script.errors import ScriptError
 
-_MOST = 2**31  # bytes of a deck and of what it includes
+_MOST = 2**31  # bytes of a deck with its includes
 _REFUSED = ("NCOPY", "ELCOPY", "NMAP")
 # Corners of faces S1, S2, ... (Abaqus Analysis User's Guide, "Two- and three-dimensional solid
 # element library"), from 0.
@@ -57,9 +57,9 @@ class _Keyword(NamedTuple):
 
 
 class _Elements(NamedTuple):
-    type: str  # of Abaqus
+    type: str  # in Abaqus
     numbers: np.ndarray  # (n,)
-    nodes: np.ndarray  # (n, c) numbers of nodes in the deck
+    nodes: np.ndarray  # (n, c) node numbers in the deck
 
 
 class _Part:
@@ -70,14 +70,14 @@ class _Part:
         self.places: list[np.ndarray] = []
         self.elements: list[_Elements] = []
         self.skipped: list[tuple[str, int]] = []
-        # Per name what was said: numbers, or names of sets.
+        # Contents of each set: numbers, or names of sets.
         self.nodes: dict[str, list[np.ndarray | str]] = {}
         self.groups: dict[str, list[np.ndarray | str]] = {}
         self.surfaces: dict[str, list[tuple[str, str]]] = {}
         self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x
 
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers (n,) of the nodes in ascending order, and positions: the last ones given."""
+        """Ascending node numbers (n,), and positions; the last definition of a node counts."""
         if not self.numbers:
             return np.empty(0, np.int64), np.empty((0, 3))
         numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
@@ -100,7 +100,7 @@ def _wrong(keyword: _Keyword, what: str, expected: str | None = None) -> ScriptE
 
 
 def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
-    """The keywords of a deck with their lines of data, those of included files in their place."""
+    """Yield the keywords of a deck with their data lines; included files are inserted."""
     lines = path.read_text("utf-8", errors="replace").splitlines()
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
@@ -131,7 +131,7 @@ def _included(keyword: _Keyword, name: str, above: tuple[Path, ...]) -> Path:
 
 
 def _table(keyword: _Keyword, least: int, most: int) -> np.ndarray:
-    """Numbers (n, most) of the lines; what is left out at the end or between commas is 0."""
+    """Numbers (n, most) of the data lines; omitted ones are 0."""
     try:
         rows = [line.rstrip().rstrip(",").split(",")[:most] for line in keyword.lines]
         if any(len(row) < least for row in rows):
@@ -144,7 +144,7 @@ def _table(keyword: _Keyword, least: int, most: int) -> np.ndarray:
 
 
 def _flat(keyword: _Keyword) -> np.ndarray:
-    """All whole numbers of the lines (n,), however they go on from line to line."""
+    """All integers of the data lines (n,), regardless of line breaks."""
     try:
         words = ",".join(keyword.lines).replace(" ", "").split(",")
         return np.array([word for word in words if word], np.int64)
@@ -153,9 +153,9 @@ def _flat(keyword: _Keyword) -> np.ndarray:
 
 
 def _rows(keyword: _Keyword, count: int) -> np.ndarray:
-    """The elements (n, count) of *ELEMENT: lines go on until they have `count` numbers.
+    """Elements (n, count) of *ELEMENT, whose lines continue until they have `count` numbers.
 
-    More numbers on the last line, such as inner nodes of C3D8I, are passed over, as CalculiX does.
+    Extra numbers on the last line, such as inner nodes of C3D8I, are ignored, as in CalculiX.
     """
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):
@@ -178,19 +178,19 @@ def _cylindrical(x: np.ndarray) -> np.ndarray:
 
 
 def _spherical(x: np.ndarray) -> np.ndarray:
-    """Radius, longitude and latitude in degrees."""
+    """Convert from radius, longitude and latitude in degrees."""
     turn, rise = np.radians(x[:, 1]), np.radians(x[:, 2])
     flat = x[:, 0] * np.cos(rise)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), x[:, 0] * np.sin(rise)], axis=1)
 
 
 def _system(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
-    """From local coordinates: origin, a point on the local x axis, one in the local x-y plane."""
+    """Make the map from local coordinates: origin, a point on the x axis, one in the x-y plane."""
     if not keyword.lines:
         return lambda x: x
     given = _table(keyword, 3, 6)
     origin, along = given[0, :3], given[0, 3:]
-    if len(given) == 1:  # a point of the x axis parallel to the global x-y plane
+    if len(given) == 1:  # the x axis is parallel to the global x-y plane
         way = along - origin
         beside = np.array([-way[1], way[0], 0.0]) if way[:2].any() else np.array([0.0, 1, 0])
     else:
@@ -205,7 +205,7 @@ def _system(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Of an instance: a shift, then a rotation about an axis through two points, in degrees."""
+    """Make the motion of an instance: translation, then rotation about two points, in degrees."""
     rows = [_table(keyword._replace(lines=[line]), 1, 7)[0] for line in keyword.lines[:2]]
     shift = rows[0][:3] if rows else np.zeros(3)
     if len(rows) < 2:
@@ -218,7 +218,7 @@ def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _kind(name: str) -> tuple[str, int] | None:
-    """The family of a type of elements in Abaqus and its number of nodes."""
+    """Return the family of an Abaqus element type and its number of nodes."""
     for kind, pattern in _TYPES:
         match = pattern.fullmatch(name)
         if match:
@@ -248,7 +248,7 @@ class _Deck:
             if reads:
                 reads(self, keyword)
 
-    # ---- the keywords that are read, one method each ----------------------------------------
+    # ---- keywords, one method each ----------------------------------------------------------
 
     def _part(self, keyword: _Keyword) -> None:
         self.scope = self.parts.setdefault(keyword.options.get("NAME", "").upper(), _Part())
@@ -356,7 +356,7 @@ class _Deck:
             items = [w.upper() for w in words if w and not w.lstrip("-").isdigit()]
             items.append(np.array([int(w) for w in words if w.lstrip("-").isdigit()], np.int64))
         instance = keyword.options.get("INSTANCE", "").upper()
-        if instance:  # said in the assembly, of the numbers of a part
+        if instance:  # in the assembly, with numbers of a part
             self.assembly.append((sets, name.upper(), instance, items))
             return
         for item in items:
@@ -375,7 +375,7 @@ class _Deck:
     # ---- sets by numbers ---------------------------------------------------------------------
 
     def _numbers(self, sets: dict, name: str) -> np.ndarray:
-        """The numbers (n,) in a set, or the one that is its name."""
+        """Return the numbers (n,) in a set, or the number that `name` is."""
         if name.lstrip("-").isdigit():
             return np.array([int(name)])
         return np.unique(np.concatenate([np.empty(0, np.int64), *self._resolved(sets, name, ())]))
@@ -390,7 +390,7 @@ class _Deck:
     # ---- the mesh ----------------------------------------------------------------------------
 
     def mesh(self) -> Mesh:
-        """All bodies in one: their nodes and elements are numbered one after the other."""
+        """Merge all bodies; their nodes and elements are numbered consecutively."""
         bodies = self.instances or [
             _Instance(name, part, lambda x: x) for name, part in self.parts.items()
         ]
@@ -408,7 +408,7 @@ class _Deck:
                     _looked_up(table, item)
                 ]  # fmt: skip
                 known.setdefault(name, []).extend(said)
-        if self.instances:  # sets of the assembly that are made of INSTANCE.SET and each other
+        if self.instances:  # assembly sets made of INSTANCE.SET and of each other
             for sets, known in ((self.whole.nodes, found.nodes), (self.whole.groups, found.groups)):
                 for name, items in sets.items():
                     for item in items:
@@ -483,17 +483,17 @@ def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool 
 
 
 class _Found:
-    """Nodes, elements and sets of all bodies; elements are numbered from 0 as they come."""
+    """Nodes, elements and sets of all bodies; elements are numbered from 0 in order."""
 
     def __init__(self) -> None:
         self.points: list[np.ndarray] = []
         self.count = 0
-        self.blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # per type in Abaqus
+        self.blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # by Abaqus type
         self.nodes: dict[str, list[np.ndarray]] = {}
         self.groups: dict[str, list[np.ndarray]] = {}
         self.surfaces: dict[str, list[tuple[int, np.ndarray]]] = {}
         self.skipped: dict[str, int] = {}
-        # Per body: numbers in the deck in ascending order, and here.
+        # For each body: numbers in the deck, ascending, and numbers in the mesh.
         self.node_numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
@@ -539,5 +539,5 @@ class _Found:
 
 
 def read_deck(path: Path) -> Mesh:
-    """The mesh in a deck; a line that cannot be read is an error that names it."""
+    """Read the mesh in a deck; raise ScriptError naming the line that cannot be read."""
     return _Deck(path).mesh()

@@ -1,4 +1,4 @@
-"""Read or make a mesh by Gmsh: its own files of every version, MED, UNV, and geometries."""
+"""Read or generate meshes with Gmsh: its own formats, MED, UNV, and geometries."""
 
 import contextlib
 import re
@@ -14,17 +14,17 @@ from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-# Names that differ from Gmsh's in more than a capital.
+# Names that differ from Gmsh's by more than capitals.
 _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
 
 
 class NoGmsh(Exception):
-    """Gmsh or a library that it needs is not on this machine."""
+    """Gmsh, or a library that it needs, is missing."""
 
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[Any]:
-    """Gmsh with the model in a file; open models of the process stay as they are."""
+    """Open a model file in Gmsh; other open models of the process stay unchanged."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -45,9 +45,9 @@ def _model(path: Path) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[Path]:
-    """Yield a link to a file in an empty folder, or a copy.
+    """Yield a link to a file (or a copy) in an empty folder.
 
-    Gmsh reads a file of options next to the file that it opens, and options may run programs.
+    Gmsh also reads an options file next to the file that it opens, and options may run programs.
     """
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name
@@ -63,7 +63,7 @@ def _reason(error: BaseException, path: Path) -> str:
 
 
 def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh:
-    """Mesh the geometry in a file up to `dimension`, with edges up to `size` if it is given."""
+    """Mesh the geometry in a file up to `dimension`, with edges up to `size` if given."""
     try:
         with _model(path) as gmsh:
             if size:
@@ -71,7 +71,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             gmsh.model.mesh.generate(dimension)
             if not len(gmsh.model.mesh.getNodes()[0]):
                 raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
-            # Where there are physical groups, the mesh is what is in them and no more.
+            # If there are physical groups, only they are the mesh.
             groups = {d for d, _ in gmsh.model.getPhysicalGroups()}
             if groups and min(groups) > dimension:
                 raise ScriptError(
@@ -90,7 +90,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             expected="its libraries installed: on Debian and Ubuntu, apt install " + _LIBRARIES,
             hint=f"or mesh it elsewhere: gmsh -{dimension} {path.name} -o {path.stem}.msh",
         ) from None
-    except Exception as error:  # Gmsh has one class for all that it complains about.
+    except Exception as error:  # Gmsh has one class for all its errors
         raise ScriptError(
             f"Gmsh cannot mesh {path.name}: {_reason(error, path)}",
             argument="file",
@@ -99,7 +99,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
-    """The mesh in a file that Gmsh knows; its own complaint is raised as a ValueError."""
+    """Read the mesh in a file that Gmsh supports; its errors become ValueError."""
     with alone(path) as link:
         try:
             with _model(link) as gmsh:
@@ -111,10 +111,10 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """Parts of a file of Gmsh that its library forgets.
+    """Parts of a Gmsh file that its library drops.
 
-    These are names of groups that are empty, and, in versions 1 and 2, the group of each element:
-    Gmsh gives all elements of one geometrical entity to the groups of that entity.
+    These are names of empty groups, and in versions 1 and 2 the group of each element: Gmsh assigns
+    all elements of a geometrical entity to the groups of the entity.
     """
 
     def __init__(self, path: Path):
@@ -123,7 +123,7 @@ class _Header:
         names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", head, re.S)
         found = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
         self.names = {(int(dim), int(number)): name for dim, number, name in found}
-        self.groups: dict[int, int] | None = None  # of elements, by their numbers
+        self.groups: dict[int, int] | None = None  # of elements, by number
         version = re.match(rb"\$MeshFormat\s+([12])\S* +0", head)
         if not version and b"$NOD" not in head:
             return
@@ -144,7 +144,7 @@ def _taken(gmsh: Any, only_groups: bool = False, of_file: _Header | None = None)
     names = dict(of_file.names) if of_file else {}
     for dim, number in gmsh.model.getPhysicalGroups():
         names.setdefault((dim, number), gmsh.model.getPhysicalName(dim, number).strip())
-    # Per type of elements: nodes and groups (n,) of each, the number -1 where it has none.
+    # By element type: nodes and groups (n,), -1 for none.
     found: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for dim, tag in gmsh.model.getEntities():
         numbers = gmsh.model.getPhysicalGroupsForEntity(dim, tag)

@@ -1,4 +1,4 @@
-"""A mesh as every reader returns it: nodes, cells by type, named sets."""
+"""Mesh data as returned by every reader: nodes, cells by type, named sets."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.script.errors import unknown
 
-# Families of cell types, by the name that meshio gives them without their number of nodes.
+# Families of cell types: meshio's names without the number of nodes.
 DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
     "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
@@ -14,13 +14,13 @@ DIMENSIONS = {
 
 
 class CellBlock(NamedTuple):
-    """CellBlock of one type."""
+    """Cells of one type."""
 
-    type: str  # as meshio names it, such as tetra10
-    nodes: np.ndarray  # (n, c) their numbers, from 0; corners come first
-    # (c, d) natural coordinates of the nodes; None: in the order of VTK.
+    type: str  # meshio's name, such as tetra10
+    nodes: np.ndarray  # (n, c) node numbers from 0, corners first
+    # (c, d) natural coordinates of the nodes; None: VTK's order.
     reference: np.ndarray | None = None
-    label: str = ""  # the name of the type in the file, where it has another one
+    label: str = ""  # the name of the type in the file, if different
 
     @property
     def family(self) -> str:
@@ -34,15 +34,15 @@ class CellBlock(NamedTuple):
 class Mesh(NamedTuple):
     points: np.ndarray  # (N, 3)
     cells: list[CellBlock]
-    sets: dict[str, list[np.ndarray]]  # per name a mask (n,) for each item of `cells`
-    node_sets: dict[str, np.ndarray]  # per name a mask (N,)
-    left_out: dict[str, int]  # elements that no solid has, such as springs: how many of each type
+    sets: dict[str, list[np.ndarray]]  # by name, a mask (n,) for each item of `cells`
+    node_sets: dict[str, np.ndarray]  # by name, a mask (N,)
+    left_out: dict[str, int]  # elements that solids ignore, such as springs: count by type
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """The cells of a named set, or all.
+        """Return the cells of a named set, or all.
 
-        A set of nodes stands for the outer faces all of whose nodes it has. An unknown set and an
-        empty one are errors.
+        A node set selects the outer faces with all nodes in it. Raises ScriptError for an unknown
+        or empty set.
         """
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
@@ -58,14 +58,14 @@ class Mesh(NamedTuple):
         ]
 
     def _name_of(self, group: str) -> str:
-        """Find a set, whatever the case of its letters if no other one differs by that alone."""
+        """Find a set, ignoring case if that is unambiguous."""
         known = [*self.sets, *(name for name in self.node_sets if name not in self.sets)]
         alike = [name for name in known if name.casefold() == group.casefold()]
         name = group if group in known else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Groups of Gmsh have a number as well; those with a name are named. Numbers of one kind
-            # need no kind in front of them.
+            # Gmsh groups have numbers and perhaps names. Numbers that occur for one dimension only
+            # need no dimension in front.
             once = [name for name in known if name.rpartition(":")[2] not in {*known} - {name}]
             named = [name for name in once if not name.isdigit()] or once
             raise unknown(message, group, named, argument="group")
@@ -80,7 +80,7 @@ class Mesh(NamedTuple):
         return name
 
 
-# Faces of elements by their corners; seen from outside counter-clockwise, in 2D on the left.
+# Faces of elements by corners, counter-clockwise from outside; in 2D the interior is on the left.
 FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -97,7 +97,7 @@ FACE_TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
 
 
 def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[CellBlock]:
-    """The faces with nodes in `held` (N,) alone that belong to one element only."""
+    """Faces whose nodes all are in `held` (N,), and that belong to one element only."""
     highest = max((cells.dimension for cells in mesh.cells if cells.family in FACES), default=0)
     faces: dict[int, list[np.ndarray]] = {}
     for cells in mesh.cells:
@@ -114,6 +114,6 @@ def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[CellBlock]:
         outer = nodes[first[count == 1]]
         if len(outer):
             found.append(CellBlock(FACE_TYPES[corners], outer))
-    if not found:  # single nodes: no face has them alone
+    if not found:  # single nodes without a face
         found.append(CellBlock("vertex", np.flatnonzero(held)[:, None]))
     return found

@@ -1,4 +1,4 @@
-"""Elements: which are known, their exact volumes and centroids, their orientation."""
+"""Supported elements, their exact volumes and centroids, and their orientation."""
 
 import itertools
 import math
@@ -10,23 +10,23 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
-# A shape of this part of size^dimension is flat: its volume is rounding.
+# A shape with less than this part of size^dimension is flat: its volume is round-off.
 _FLAT = 1e-12
-# Nodes this far (of the mesh's size) off the plane of a 2D mesh still lie in it.
+# Nodes this close (relative to the size of the mesh) to the plane of a 2D mesh lie in it.
 _PLANE = 1e-9
-_CHUNK = 4096  # elements of many nodes that are integrated at once
+_CHUNK = 4096  # elements of many nodes integrated at once
 
 
 class Shape(NamedTuple):
-    """A family of elements; nodes are in the order of meshio, which is that of VTK."""
+    """A family of elements; nodes are in the order of meshio, which is VTK's."""
 
     name: str
-    words: str  # in plural
+    words: str  # plural
     dimension: int
-    # The order of the corners that turns a negative orientation into a positive one.
+    # Order of the corners that reverses the orientation.
     mirrored: tuple[int, ...]
     corners: tuple[tuple[float, ...], ...]  # natural coordinates
-    simplex: bool = False  # natural coordinates from 0, with a sum up to 1; else from -1 to 1
+    simplex: bool = False  # natural coordinates >= 0 with a sum <= 1; else from -1 to 1
 
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -48,7 +48,7 @@ SHAPES = {
     )
 }
 
-# Pairs of corners in whose middle elements of second order have their next nodes, then faces.
+# Pairs of corners with mid-edge nodes of second-order elements, in order, then faces.
 _MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -72,13 +72,13 @@ class MeshElements(NamedTuple):
 
     shape: Shape
     numbers: np.ndarray  # (n, c) of their corners
-    corners: np.ndarray  # (n, c, d) positions of these
-    nodes: np.ndarray | None = None  # (n, k, d) of all nodes, where they have more than corners
-    reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of these
-    bulge: float = 0.0  # how far such nodes lie off the place that corners give, over the size
+    corners: np.ndarray  # (n, c, d) positions of the corners
+    nodes: np.ndarray | None = None  # (n, k, d) all nodes, if there are more than corners
+    reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of the nodes
+    bulge: float = 0.0  # distance of such nodes from the straight shape, relative to the size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
-        """With the orientation of `which` (n,) of them reversed; by their corners."""
+        """Reverse the orientation of `which` (n,), as elements with corners only."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()
         numbers[which], corners[which] = numbers[which][:, order], corners[which][:, order]
@@ -88,10 +88,10 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """The elements of `dimension` in a mesh or its named `group`, one item for each type.
+    """Return the elements of `dimension` in a mesh or its named `group`, one item per type.
 
-    With `lower`, a group of lower dimension, such as a boundary, will do. None, elements of other
-    types, and a mesh out of the plane z = 0 in 2D, off the x axis in 1D are errors.
+    With `lower`, a group of lower dimension, such as a boundary, is accepted. Raises ScriptError if
+    there are none, for other types, and for a mesh outside z = 0 in 2D or off the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -131,7 +131,7 @@ def elements_of(
 
 
 def _in_order(cells: CellBlock) -> CellBlock:
-    """Pixels and voxels, whose nodes go row by row, and prisms with six sides, by halves."""
+    """Reorder pixels and voxels (row by row), and split six-sided prisms into halves."""
     order = {
         "pixel": ("quad", [[0, 1, 3, 2]]),
         "voxel": ("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]]),
@@ -144,7 +144,7 @@ def _in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates of the nodes that count: of corners alone where no more are known."""
+    """Natural coordinates of the nodes used; only corners if the others are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         given = tuple(map(tuple, cells.reference.tolist()))
@@ -158,13 +158,13 @@ def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
         given = given[: min(count, len(given))]
         if _exponents(shape.name, len(given)) is not None:
             return given
-        given = given[: len(given) - 1]  # the node in the middle moves no boundary
+        given = given[: len(given) - 1]  # the centre node moves no boundary
     return given[: len(shape.corners)]
 
 
 @lru_cache
 def _exponents(name: str, count: int) -> tuple[tuple[int, ...], ...] | None:
-    """Monomials (count, d) that functions of so many nodes are made of; None where not known."""
+    """Monomials (count, d) spanning shape functions of so many nodes; None if unknown."""
     d = SHAPES[name].dimension
     for p in range(1, 11):
         every = tuple(itertools.product(range(p + 1), repeat=d))
@@ -176,7 +176,7 @@ def _exponents(name: str, count: int) -> tuple[tuple[int, ...], ...] | None:
             spaces = [flat, linear] if p == 2 else [flat]
         elif name == "pyramid":
             return None
-        else:  # complete, or with nodes on the edges alone (Arnold & Awanou 2011)
+        else:  # complete, or serendipity (Arnold & Awanou 2011)
             spaces = [list(every)]
             if p > 1 and d > 1:
                 spaces.append([e for e in every if sum(k for k in e if k > 1) <= p])
@@ -195,7 +195,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Each element once: older formats repeat those that belong to two physical groups."""
+    """Remove repeated elements: older formats repeat those in two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -205,7 +205,7 @@ def _accepted(dimension: int) -> str:
 
 
 def _check_plane(positions: np.ndarray, dimension: int) -> None:
-    """Refuse nodes that lie off the x axis in 1D or the plane z = 0 in 2D."""
+    """Refuse nodes off the x axis in 1D or off the plane z = 0 in 2D."""
     beside = np.abs(positions[:, dimension:]).max() if dimension < 3 else 0.0
     if beside > _PLANE * np.ptp(positions, axis=0).max():
         raise ScriptError(
@@ -217,11 +217,11 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """The elements with positive orientation, their volumes (n,) and their centroids (n, d).
+    """Return the elements with positive orientation, their volumes (n,) and centroids (n, d).
 
-    Volume and centroid belong to the region that the map of the element covers, with curved edges
-    and warped faces: integrals of det J and x det J by Gauss's rule of the degree that makes them
-    exact. An element that is flat or twisted is an error.
+    They are integrals of det J and x det J over the mapped element, with curved edges and warped
+    faces, by a Gauss rule of the degree that makes them exact. Raises ScriptError for a flat or
+    twisted element.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes
@@ -231,7 +231,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     twisted = np.zeros(len(nodes), bool)
     for first in range(0, len(nodes), _CHUNK):
         part = slice(first, first + _CHUNK)
-        # About the first node, so that a mesh far from the origin loses no digits.
+        # Relative to the first node, so that a mesh far from the origin loses no digits.
         local = nodes[part] - nodes[part, :1]
         weights, x = _integrated(shape, reference, local)
         volume[part] = weights.sum(axis=1)
@@ -254,7 +254,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
 
 
 def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted det J (n, q) and position (n, q, d) at the points of Gauss's rule."""
+    """Weighted det J (n, q) and position (n, q, d) at Gauss points."""
     if shape.simplex and len(reference) == len(shape.corners):
         edges = nodes[:, 1:] - nodes[:, :1]
         weights = np.linalg.det(edges)[:, None] / math.factorial(shape.dimension)
@@ -266,10 +266,10 @@ def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.n
 
 @lru_cache
 def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights (q,) of a rule, and functions (q, c) and their slopes (q, c, d) at its points."""
+    """Weights (q,), shape functions (q, c) and their slopes (q, c, d) at Gauss points."""
     shape = SHAPES[name]
     exponents = _exponents(name, len(reference))
-    order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with five corners
+    order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with merged corners
     d = shape.dimension
     at, weight = np.polynomial.legendre.leggauss(-(-(d + 1) * order // 2))
     points = np.array(list(itertools.product(at, repeat=d)))
@@ -292,7 +292,7 @@ def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Functions (q, c) of the nodes at `reference`, and their slopes (q, c, d), at `points`."""
+    """Shape functions (q, c) of the nodes at `reference`, and slopes (q, c, d), at `points`."""
     if name == "pyramid":
         return _of_pyramids(points)
     exponents, inverse = _coefficients(name, reference)
@@ -308,7 +308,7 @@ def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndar
 
 
 def _of_pyramids(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As `_functions`, of a cube whose four upper corners are one."""
+    """As `_functions`, for a cube whose four upper corners coincide."""
     cube = SHAPES["hexahedron"].corners
     functions, slopes = _functions("hexahedron", cube, points)
     upper = [of[:, 4:].sum(axis=1, keepdims=True) for of in (functions, slopes)]

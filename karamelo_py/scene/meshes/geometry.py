@@ -1,4 +1,4 @@
-"""Geometries of Gmsh that describe a shape and do nothing else: what is allowed is listed here."""
+"""Check that Gmsh geometries only describe a shape, against a list of allowed commands."""
 
 import re
 import tomllib
@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 from karamelo_py.script.errors import ScriptError
 
-# The comments, texts, numbers, words and signs of Gmsh's language.
+# Comments, strings, numbers, words and signs of Gmsh's language.
 _TOKEN = re.compile(
     r"""//[^\n]*|/\*.*?(?:\*/|\Z)|"[^"]*"|'[^']*'|(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d+)?"""
     r"""|[A-Za-z_][A-Za-z0-9_]*|\S""",
     re.S,
 )
-_LONGEST = 1000  # characters: Gmsh ends a text that is much longer, and reads the rest as commands
-# Passing over a condition, a loop or a macro, Gmsh looks for the first letters of these words (and
-# of If, For, Macro, Function) and loses the letter that follows one, which may begin a text.
+_LONGEST = 1000  # characters; Gmsh cuts longer strings, and reads the rest as commands
+# When Gmsh skips a condition, loop or macro, it searches for the first letters of these words (and
+# of If, For, Macro, Function) and drops the letter after a match, which may start a string.
 _ENDS = re.compile(r"EndIf|EndFor|Else|Return")
 _LOSES = re.compile(r"(?:^|[^A-Za-z_])[EFIMR]$")
 _MAY = "run a program, or read or write a file"
@@ -25,24 +25,24 @@ _WORDS, _NO_NAMES, _FIELDS = (
     frozenset(_LISTS[name].split()) for name in ("describe", "act", "fields")
 )
 
-# Options of the program that only show; no other option may name a file or a command.
+# Display options of the program; no other option may name a file or a command.
 _GENERAL = re.compile(
     r"ExpertMode|NumThreads|Terminal|Verbosity|SmallAxes|Color|(?:Axes|Light|Trackball)\w*"
     r"|(?:Min|Max|Rotation|RotationCenter|Scale|Translation)[XYZ]|RotationCenterGravity"
 )
 _OPTION_ACTS = re.compile(r"Command|File(?!Version|s)")
-_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # to files, with a > after the text
+_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # they write to files with a > after the text
 _READS = frozenset(("Include", "Merge", "MergeWithBoundingBox"))
 _AFTER_NAMES = frozenset(("In", "Using", "Left", "Right", "Alternate"))
 _NAMES = frozenset(("For", "Macro", "Function"))  # a name follows
-# Readers of Gmsh that take no commands, by the ending as Gmsh spells it.
+# Gmsh readers without commands, by ending as Gmsh spells it.
 _DATA = frozenset(
     ending
     for lower in ("stl", "brep", "iges", "igs", "step", "stp", "unv", "vtk", "mesh", "off", "obj",
                   "med", "bdf", "nas", "ply", "cgns")
     for ending in (f".{lower}", f".{lower.upper()}")
 )  # fmt: skip
-# What else may be read, and how such a file begins that holds a mesh rather than commands.
+# Other files that may be read, if they begin as a mesh and not as commands.
 _KINDS = frozenset(("", ".geo", ".geo_unrolled", ".pos", ".opt", ".msh", ".msh2", ".msh4"))
 _MESH = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")
 _PAIRS = {"(": ")", "[": "]", "{": "}"}
@@ -63,9 +63,9 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Refuse a geometry that would do more than describe one, in files that it reads, too.
+    """Refuse a geometry that does more than describe a shape, also in files that it includes.
 
-    Of a `trusted` one only what would end this program is refused.
+    In a `trusted` geometry, only commands that would end this program are refused.
     """
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
@@ -86,8 +86,8 @@ def _refuse(token: _Token, what: str, *, trusted: bool = False) -> None:
 
 
 def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None:
-    """Read a file of Gmsh's language, and those that it names."""
-    # Gmsh reads a file of options beside any other by itself.
+    """Read a file in Gmsh's language and the files that it names."""
+    # Gmsh also reads an options file next to any file.
     for file in (path, path.with_name(f"{path.name}.opt")):
         if file in files or not file.is_file():
             continue
@@ -100,7 +100,7 @@ def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None
 
 
 def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> None:
-    """Read what a command of the geometry reads."""
+    """Read the file that a command includes."""
     token = tokens[k]
     name, end = [*(other.text for other in tokens[k + 1 : k + 3]), "", ""][:2]
     other = token.file.parent / name[1:-1]
@@ -115,7 +115,7 @@ def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> No
 
 
 def _is_data(path: Path) -> bool:
-    """Say whether Gmsh merges a file by a reader that takes no commands."""
+    """Tell whether Gmsh merges a file with a reader without commands."""
     with path.open("rb") as file:
         return path.suffix in _DATA or (path.suffix in _KINDS and file.read(12).startswith(_MESH))
 
@@ -138,7 +138,7 @@ def _tokens(path: Path, trusted: bool) -> Iterator[_Token]:
 
 
 def _after(tokens: list[_Token], k: int) -> int:
-    """Pass over what is in brackets from `k` on, such as the index of a list."""
+    """Skip brackets that start at `k`, such as the index of a list."""
     while k < len(tokens) and tokens[k].text in ("~", *_PAIRS):
         opened, depth = tokens[k].text, 0
         closed = _PAIRS.get(opened)
@@ -156,7 +156,7 @@ def _texts(tokens: list[_Token], k: int, count: int) -> list[str]:
 
 
 def _given(tokens: list[_Token]) -> Iterator[str]:
-    """Find the names that a file gives to numbers, texts and macros."""
+    """Yield the names that a file defines for numbers, strings and macros."""
     constants = False
     for k, token in enumerate(tokens):
         before = tokens[k - 1].text if k else ""
@@ -173,7 +173,7 @@ def _given(tokens: list[_Token]) -> Iterator[str]:
 
 
 def _check(tokens: list[_Token], k: int, given: set[str]) -> None:
-    """Refuse the token `k` where it would do something."""
+    """Refuse the token `k` if it does more than describe a shape."""
     token, word = tokens[k], tokens[k].text
     if not token.is_word:
         return
