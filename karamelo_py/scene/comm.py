@@ -24,7 +24,7 @@ class SerialComm:
 
     @property
     def leads(self) -> bool:
-        """Whether this is rank 0, which writes."""
+        """Tell whether this is rank 0, which writes."""
         return self.rank == 0
 
     @property

@@ -112,7 +112,7 @@ class ParticleGroup(AnyGroup):
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)
 
     def touches(self, solid: Solid) -> bool:
-        """Whether points of a solid are members."""
+        """Tell whether points of a solid are members."""
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:

@@ -190,7 +190,7 @@ def words_of_volumes(hub: Scene) -> str:
 
 
 def own_grids(hub: Scene) -> bool:
-    """Whether the method uses a separate grid for each solid."""
+    """Tell whether the method uses a separate grid for each solid."""
     return getattr(hub.update.method, "own_grids", False)
 
 
@@ -223,7 +223,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Whether points of `a` coincide with points of `b`; large solids are sampled."""
+    """Tell whether points of `a` coincide with points of `b`; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():
