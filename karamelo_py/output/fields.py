@@ -215,7 +215,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *own]))
 
     def rate_is_asked_for(self) -> bool:
-        """Tell whether a dump or a compute uses the column ``epdot``, so that points must store it."""
+        """Tell whether a dump or a compute uses the column ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
 
