@@ -18,6 +18,9 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+# LLVM's passes take longer than the steps of most tests, and change no bit (test_identical.py).
+os.environ.setdefault("KARAMELO_PY_OPTIMISATION", "0")
+
 from comparisons.results import Result
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import case

@@ -3,7 +3,11 @@
 Nothing here compares with a formula; the other tests do.
 """
 
+import os
+import subprocess
+import sys
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,6 +153,30 @@ def test_one_thread_or_two(state, d, transfer, scheme, laws):
     acting = {"FLIP": AT_NODES, "PIC": (*AT_NODES, *AT_POINTS), "APIC": ()}[transfer]
     script = crossing(d, *acting, factor, "run(60)", transfer=transfer, scheme=scheme, laws=laws)
     assert same_bits(state(script), state(script, threads=2))
+
+
+OPTIMISED = """
+import sys
+from pathlib import Path
+import numpy as np
+from karamelo_py.compiler import machine
+from karamelo_py.run import tiles
+from states import final_state
+assert machine.LEVEL == 3
+tiles.DIRECT_UP_TO, tiles.TILES = 0, {1: 8, 2: 6, 3: 4}
+np.savez("optimised.npz", **final_state(Path("in.script")))
+"""
+
+
+@pytest.mark.xdist_group("identical")
+def test_optimisation_changes_no_bit(state):
+    """LLVM's passes, which other tests leave out."""
+    plain = state(crossing(2, *AT_NODES, "run(60)"))
+    environment = {**os.environ, "KARAMELO_PY_OPTIMISATION": "3"}
+    environment["PYTHONPATH"] += os.pathsep + str(Path(__file__).parent)
+    subprocess.run([sys.executable, "-c", OPTIMISED], env=environment, check=True)
+    with np.load("optimised.npz") as optimised:
+        assert same_bits({name: plain[name] for name in optimised}, dict(optimised))
 
 
 @pytest.mark.xdist_group("identical")

@@ -10,6 +10,7 @@ it were not there, and the user told once.
 import contextlib
 import contextvars
 import errno
+import functools
 import hashlib
 import os
 import pickle
@@ -83,19 +84,13 @@ def read(path: Path) -> bytes:
     return data[32:]
 
 
-def _warn(text: str) -> None:
-    warnings.warn(text, RuntimeWarning, stacklevel=1)  # once for a text, wherever it comes from
-
-
+# Python shows a warning once for each text.
+_warn = functools.partial(warnings.warn, category=RuntimeWarning)
 _told = contextvars.ContextVar[Callable[[str], None]]("told", default=_warn)
 
 
-def _tell(text: str) -> None:
-    _told.get()(text)
-
-
 def _trouble(error: OSError) -> None:
-    _tell(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
+    _told.get()(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
 
 
 @contextlib.contextmanager
@@ -162,7 +157,7 @@ class KernelFiles:
                 _trouble(error)
                 continue
             except Exception:
-                _tell(f"a file in {folder()} is damaged; the loop in it is compiled anew")
+                _told.get()(f"a file in {folder()} is damaged; the loop in it is compiled anew")
                 with contextlib.suppress(OSError):
                     path.unlink()
                 continue
@@ -187,7 +182,7 @@ class KernelFiles:
 
     def _tell_of_unknown(self, what: Unknown) -> None:
         # Never without a word: somebody would wait for it in every run.
-        _tell(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
+        _told.get()(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
 
     def _name(self) -> str:
         return re.sub(r"[^\w.]", "", f"{self._function.__module__}.{self._function.__qualname__}")
