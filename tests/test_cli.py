@@ -40,15 +40,15 @@ def test_bodies_without_a_run_are_a_mistake(run_interpreted):
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
-def test_what_stands_behind_the_last_run_is_told(run_interpreted, command):
+def test_parts_after_the_last_run_are_warned_of(run_interpreted, command):
     """Before the first one; what some run sees is none of that."""
     lines = ("dump(d, all, particle, 1, d.txt, x)", "fix(g, body_force, all, -1e-6)",
              "compute(E, kinetic_energy, all)", "plot(p, 1, time, E)")  # fmt: skip
     seen = "\n".join(["run(1)", *lines, "run(1)", "save_plot(p.png)", "print(E)"])
     assert run_interpreted(BODY + seen, command=command).err == ""
     late = run_interpreted(BODY + "\n".join(["run(1)", "run(1)", *lines]), command=command).err
-    said = [line for line in late.splitlines() if "stands behind" in line]
-    assert [f"{kind} stands behind the last run" in line for kind, line in zip(
+    said = [line for line in late.splitlines() if "comes after the last run" in line]
+    assert [f"{kind} comes after the last run" in line for kind, line in zip(
         ("fix 'g'", "dump 'd'", "plot 'p'"), said, strict=True)] == [True] * 3  # fmt: skip
     assert all(f"| {line}" in late for line in lines if "compute" not in line)
 
@@ -65,7 +65,7 @@ def test_what_is_defined_further_down_is_told(run_interpreted):
     material = "material(rubber, neo-hookean, 1, 1, 0)\n"
     said = run_interpreted(BODY.replace(material, "") + material + "run(1)\n", status=1).err
     assert "unknown material 'rubber'" in said
-    assert "hint: material 'rubber' stands further down: move line 6 up" in said
+    assert "hint: material 'rubber' is defined further down: move line 6 up" in said
     assert said.count("error: ") == 1
 
 

@@ -94,7 +94,7 @@ def test_init(hub):
         ),
         ("fixing", "initial_integrate writes 'mass': 'velocity' or a class of a field"),
         ("homeless", "initial_integrate: points have no Force because of this fix: its author nam"),
-        ("late", "final_integrate: forces on points are those of initial_integrate"),
+        ("late", "final_integrate: forces on points are set in initial_integrate"),
         (
             "nodeless",
             "post_particles_to_grid reads 'position': 'mass', 'velocity', 'velocity_updat",

@@ -212,7 +212,7 @@ def test_numbers_of_steps_may_be_rounded(run_interpreted, steps, taken):
 @pytest.mark.parametrize(
     ("line", "hint"),
     [
-        ("plot(e, 2, time, Ekk)", "did you mean 'Ek', which stands further down, in line 9?"),
+        ("plot(e, 2, time, Ekk)", "did you mean 'Ek', defined further down, in line 9?"),
         ("plot(e, 2, t, time)", "did you mean 'time'?"),
         ("plot(e, 2, stp, time)", "did you mean 'step'?"),
         ("plot(e, 2, time, time, rigth)", "axis=right"),

@@ -127,7 +127,7 @@ def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None
     makes = ("", "fix", "compute")
     later = {ID: line for _, kind, ID, line in _ahead(script) if kind in makes}
     if below := nearest(name, later):
-        return f"did you mean '{below}', which stands further down, in line {later[below]}?", None
+        return f"did you mean '{below}', defined further down, in line {later[below]}?", None
     return energies.get(name) or f"set it first: {name} = ...", None
 
 

@@ -1,8 +1,7 @@
-"""Frames: whether weights and gradients belong to the present or to the reference configuration.
+"""Frames: weights and gradients at present (``Updated``) or reference positions (``Total``).
 
-``Updated`` takes gradients in space, and forces from the Kirchhoff stress; ``Total`` takes them
-with respect to reference positions, and forces from the first Piola-Kirchhoff stress, for which it
-needs the deformation gradient F of the points.
+``Updated`` uses spatial gradients and the Kirchhoff stress. ``Total`` uses gradients with respect
+to reference positions and the first Piola-Kirchhoff stress, and needs the deformation gradient F.
 """
 
 from typing import Any, NamedTuple
@@ -14,13 +13,13 @@ from karamelo_py.points.laws import deformation
 
 
 class Updated(NamedTuple):
-    """Weights follow the present positions (updated Lagrangian)."""
+    """Weights at present positions (updated Lagrangian)."""
 
     moves = True
 
 
 class DeformationGradient(Field):
-    """F, of laws whose state does not hold it."""
+    """F, for laws whose state does not contain it."""
 
     shape = tensor
 
@@ -31,57 +30,56 @@ class DeformationGradient(Field):
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """Check that a law has no F of its own."""
+        """True if the state of a law does not contain F."""
         return not deformation.defined(type(law))
 
 
 class Total(NamedTuple):
-    """Weights belong to the reference positions and never change (total Lagrangian)."""
+    """Weights at reference positions, which never change (total Lagrangian)."""
 
     moves = False
     point_fields = (DeformationGradient,)
 
 
 def spatial_increment(frame, kin, dl, f):
-    """dt grad v from `dl`, dt times the gradient of velocity in the frame, and F before it."""
+    """dt grad v in space from `dl`, dt times the velocity gradient in the frame, and the old F."""
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
     return dl if frame.moves else dl @ inv(f)
 
 
 def of_places_before(frame, kin, dl):
-    """`dl` of the places before a motion, from that of the places after it."""
+    """`dl` with respect to positions before a motion, from `dl` with respect to those after it."""
     # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
-    # it keeps its digits where dl is small. Gradients of the total frame belong to the reference.
+    # it is accurate for small dl. Gradients of the total frame belong to the reference.
     return dl @ inv(I - dl) if frame.moves else dl
 
 
 def strained(frame, kin, f, dl):
-    """F where the frame needs it, after what `spatial_increment` takes from F before it."""
+    """The new F, if the frame needs it, from the `dl` of the frame and the old F."""
     return f if frame.moves else f + dl
 
 
 def force_stress(frame, kin, tau, f):
-    """The stress that makes nodal forces, per reference volume."""
+    """The stress that gives nodal forces, per reference volume."""
     return tau if frame.moves else tau.nominal(f)
 
 
 def pulled_back(frame, kin, g, f):
-    """The direction of a flux down the gradient `g`, pulled back to the frame.
+    """Direction of a flux down the gradient `g`, pulled back to the frame.
 
-    Per deformed volume: in space that is g, and C^-1 g with respect to reference positions, which
-    C^-1 = F^-1 F^-T takes to space and back.
+    Per deformed volume: g in space, and C^-1 g = F^-1 F^-T g for reference positions.
     """
     return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 
 def scaled_increment(frame, kin, dl, f, ratio):
-    """`dl` changed such that the volume after it is `ratio` times what it would be."""
-    # (I + dl) s - I in space, (F + dl) s - F with respect to the reference
+    """`dl` scaled so that it gives `ratio` times the volume."""
+    # (I + dl) s - I in space, (F + dl) s - F for reference positions
     s = power(ratio, 1 / len(dl.axes))
     return s * dl + (s - 1) * (I if frame.moves else f)
 
 
 def inverse_stretch_squared(frame, kin, f, like):
-    """(h / size of a deformed cell)^2, one over the least stretch squared: it shortens the step."""
-    # The largest eigenvalue of F^-1 F^-T.
+    """Bound of (h / size of a deformed cell)^2, the inverse smallest stretch squared."""
+    # Bound of the largest eigenvalue of F^-1 F^-T.
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

@@ -1,6 +1,6 @@
-"""The regular grid under a basis: where it begins, its cells, how its nodes are numbered.
+"""The regular grid under a basis: origin, cells and node numbers.
 
-A :class:`Grid` is a row of a table: a scene may have several grids, each with nodes of its own.
+A scene may have several grids with separate nodes; a :class:`Grid` is a row of their table.
 """
 
 from typing import NamedTuple
@@ -17,27 +17,27 @@ class Grid(NamedTuple):
     z0: float
     h: float  # cell size
     inv_h: float  # 1 / h
-    spacing: float  # distance of nodes
+    spacing: float  # distance between nodes
     nx: int  # cells per direction
     ny: int
     nz: int
-    lx: float  # size in cells, not always whole
+    lx: float  # size in cells, not always an integer
     ly: float
     lz: float
-    slack: float  # how far beyond it a point still counts as on it, in cells
-    step_x: int  # from a node's number to that of its neighbour
+    slack: float  # distance outside at which a point still counts as on it, in cells
+    step_x: int  # difference of node numbers of neighbours along x
     step_y: int
-    first: int  # number of its first node
-    first_cell: int  # number of its first cell
+    first: int  # number of the first node
+    first_cell: int  # number of the first cell
 
 
 def renumbered(grid, first, step_x, step_y):
-    """The grid with other numbers of its nodes."""
+    """The grid with other node numbers."""
     return grid._replace(first=first, step_x=step_x, step_y=step_y)
 
 
 def pick(direction, a, b, c):
-    """The one of three that belongs to a direction; no branch is left where that is a literal."""
+    """Select by direction; resolved at compile time if that is a literal."""
     return a if direction == 0 else (b if direction == 1 else c)
 
 
@@ -57,7 +57,7 @@ def inside(grid, kin, x):
     for k in range(kin.dimension):
         a = in_cells(grid, k, x[k])
         end = pick(k, grid.lx, grid.ly, grid.lz)
-        # So written, NaN lies outside.
+        # In this form, NaN lies outside.
         within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within
 
@@ -70,17 +70,17 @@ def node_position(grid, n):
     return x, y, grid.z0 + (local % grid.step_y) * grid.spacing
 
 
-# --- an edge that reflects points (boundary reflect); other grids let them go --------------------
+# --- an edge that reflects points (boundary reflect) ---------------------------------------------
 
 
 class Bounces(Field):
-    """Count of a point's reflections at the edge of the domain, in each direction."""
+    """Number of reflections of a point at the edge of the domain, in each direction."""
 
     shape = vector
 
 
 class ReflectingGrid(Grid):
-    """A grid that puts points back which have come beyond its edge."""
+    """A grid that reflects points at its edge."""
 
     __slots__ = ()
     point_fields = (Bounces,)
@@ -88,7 +88,7 @@ class ReflectingGrid(Grid):
 
 @point_function(otherwise=True)
 def reflected(grid, kin, y, v, moment):
-    """Place, velocity and its moment after the edge, and 1 for each direction it was met in."""
+    """Position, velocity and moment after reflection, and 1 for each direction reflected in."""
     return y, v, moment, ()
 
 
@@ -109,12 +109,12 @@ def beyond(grid, direction, y):
 
 
 def turn(grid, direction, y, v):
-    """-1 where a point beyond the edge goes further out, else 1."""
+    """-1 if a point outside the edge moves further out, else 1."""
     return where(beyond(grid, direction, y) * v > 0, real(-1, y), real(1, y))
 
 
 def mirror(grid, direction, y):
-    """`y` put back as far inside the edge as it is beyond."""
+    """`y` reflected at the edge of the grid."""
     side = beyond(grid, direction, y)
     lower = pick(direction, grid.x0, grid.y0, grid.z0)
     upper = lower + pick(direction, grid.lx, grid.ly, grid.lz) * grid.h
@@ -123,7 +123,7 @@ def mirror(grid, direction, y):
 
 
 def turned(signs, moment):
-    """R L R of a tensor L (or none), R = diag(signs): velocities and places turn round."""
+    """R L R of a tensor L (or nothing), R = diag(signs): velocities and positions are mirrored."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

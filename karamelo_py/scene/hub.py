@@ -60,7 +60,7 @@ class Catalogue(dict):
             who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
             hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"
         if below is not None:
-            hint = f"{self.kind} '{ID}' stands further down: move line {below} up"
+            hint = f"{self.kind} '{ID}' is defined further down: move line {below} up"
         raise ScriptError(
             f"unknown {self.kind} '{ID}'" + (f"; '{ID}' is a {other}" if other else ""),
             code="unknown-ID",
@@ -339,9 +339,9 @@ class Hub:
             if id(item) not in seen and item.place is not None:
                 kind = next((c.kind for c in rehearsed.catalogues if item.id in c), "plot")
                 self.warn(
-                    f"{kind} '{item.id}' stands behind the last run, and does nothing",
+                    f"{kind} '{item.id}' comes after the last run, and does nothing",
                     place=item.place,
-                    hint="in front of the run that it is for",
+                    hint="define it before the run that needs it",
                 )
 
     def rehearsal(self) -> Hub:

@@ -1,9 +1,8 @@
-"""Fixes and computes: what acts on a run and what measures it (LAMMPS's and Karamelo's Modify).
+"""Base classes of fixes and computes (Modify in LAMMPS and Karamelo).
 
-A fix overrides the hooks it needs, by the names of Karamelo: the page on plug-ins lists them. Each
-is either a method, called with a view of the group (Python comes back at that stage of each step),
-or the result of :func:`node_hook`, :func:`point_hook` or :func:`vector_hook`, which is compiled
-into the loop.
+A fix overrides hooks, named as in Karamelo; docs/plugins.md lists them. A hook is a method, called
+with a view of the group (Python runs at that stage of each step), or the result of
+:func:`node_hook`, :func:`point_hook` or :func:`vector_hook`, which is compiled into the loop.
 """
 
 from collections.abc import Callable
@@ -39,7 +38,7 @@ __all__ = [
 ]
 
 
-FROM_PYTHON = 3e-4  # seconds of a core, of a hook without what it does
+FROM_PYTHON = 3e-4  # seconds per call of a Python hook, without its work
 
 
 class Publisher:
@@ -49,72 +48,71 @@ class Publisher:
     id: str = ""
     style: str = ""
     place: Place | None = None
-    # Suffixes of the values it sets: "x" for ``ID_x`` and the like, "" for ``ID``.
+    # Suffixes of published values: "x" for ``ID_x`` and so on, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
 
     def publish(self, name: str, value: float) -> None:
-        """Publish `value` as ID_`name`, or as the plain ID when `name` is empty."""
+        """Publish `value` as ID_`name`, or as ID if `name` is empty."""
         if name not in self.published:
             raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
         self.has_published = True
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
     def publish_components(self, vector: np.ndarray) -> None:
-        """Publish up to three components as ID_x, ID_y, ID_z, as far as `published` has them."""
+        """Publish up to three components as ID_x, ID_y, ID_z, if they are in `published`."""
         for name, value in zip("xyz", vector, strict=False):
             if name in self.published:
                 self.publish(name, value)
 
     def publish_all(self, *values: float) -> None:
-        """Publish values in the order of `published`, as many as there are."""
+        """Publish values in the order of `published`; missing ones are skipped."""
         for name, value in zip(self.published, values, strict=False):
             self.publish(name, value)
 
     def refresh(self) -> None:
-        """Bring published values up to date; called before the log or a dump is written."""
+        """Update published values; called before output."""
 
 
 class Fix(Publisher):
-    """Base of all fixes: acts on its `group` during a run. Attributes say what else it is."""
+    """Base of all fixes: acts on its `group` during a run. Class attributes declare traits."""
 
     group: Any = None  # of nodes or points
-    formulas: tuple = ()  # one, or None, for each component, of compiled hooks
-    first_step_only = False  # acts in the first step after its definition and is idle thereafter
-    # Its hooks in Python look at each point or node on its own, and move none. Then they see, in
-    # any order, the points that are at hand: those of one of several processes, and before the
-    # first step some after others. For sums over all there is ``total``.
+    formulas: tuple = ()  # of compiled hooks: one or None per component
+    first_step_only = False  # acts only in the first step after its definition
+    # Its Python hooks treat each point or node separately and move none. They then get the local
+    # points in any order, before the first step in several calls. Sums need ``total``.
     point_by_point = False
-    for_method = False  # has no hooks because the method reads it
-    # Prescribes velocities of the nodes of its group in ``post_update_grid_state``, in the
-    # directions in which it has a formula: contact does not move them.
+    for_method = False  # has no hooks: the method reads it
+    # Prescribes nodal velocities in ``post_update_grid_state``, in directions that have a formula;
+    # contact does not change them.
     prescribes_velocity = False
-    # Directions in which it holds or bounds nodes: faces of cells that have all their nodes among
-    # them are walls, at which splines are modified as at the ends of the grid.
+    # Directions in which it holds or bounds nodes. Cell faces with all nodes held are walls, at
+    # which splines are modified as at the ends of the grid.
     held_directions: tuple[int, ...] = ()
-    # Formula of the coefficient of friction along the wall that it makes by such velocities, in the
-    # directions in which it has no formula; None for walls without.
+    # Formula of the friction coefficient of this wall, in directions without a formula; None for
+    # frictionless walls.
     wall_friction: Any = None
-    # Fields that it declares (`compiler.fields`): `Force` if it sets forces on points in
+    # Declared fields (`compiler.fields`): `Force` if it sets forces on points in
     # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    impulsive = False  # undoes a penetration within one step
-    leads_points = False  # against their forces
-    follows_points = False  # pushes points by where they are, as tools do
-    depth_of: Any = None  # of points in a tool: (n,), which pictures outline
-    faces_of: Any = None  # of a tool that is made of them: (m, d, d), by their corners now
-    accelerates = False  # its formulas are forces per mass, as of weight
-    brakes = False  # takes energy, as much as it is told
-    acts_last = False  # after all others at each moment, wherever the script has it
-    # Its hooks in Python bring no energy: what they do to points and nodes stores it, passes it on
-    # or takes it away. Otherwise the energy of the scene is not watched.
+    impulsive = False  # removes a penetration within one step
+    leads_points = False  # prescribes the motion of points
+    follows_points = False  # the force depends on positions of points, as for tools
+    depth_of: Any = None  # depth of positions in a tool, (n,), for outlines in pictures
+    faces_of: Any = None  # present faces of a tool that consists of faces, (m, d, d)
+    accelerates = False  # its formulas are forces per mass, such as gravity
+    brakes = False  # dissipates energy
+    acts_last = False  # acts after all others at each stage, wherever the script defines it
+    # Its Python hooks add no energy: they store, transfer or dissipate it. Otherwise the energy
+    # balance is not monitored.
     conserves = False
-    # Acts between steps, by ``between_steps()``, after each step whose number is a multiple of
-    # this; returns whether it has taken points away. 0: it does not.
+    # Calls ``between_steps()`` after steps that are multiples of this; it returns whether points
+    # were deleted. 0: never.
     every = 0
-    friction: float | None = None  # between its two `solids`, for methods with contact on the grid
-    solids: tuple = ()  # that it acts between, without a group
+    friction: float | None = None  # between its two `solids`, for contact on the grid
+    solids: tuple = ()  # that it acts between, if it has no group
 
     def __init__(self, hub: Scene, group: Any = None):
         self.hub = hub
@@ -123,19 +121,19 @@ class Fix(Publisher):
 
     @property
     def nodes(self) -> np.ndarray:
-        """Numbers of the nodes that it acts on, of fixes that act on nodes."""
+        """Numbers of the nodes that it acts on, for fixes on nodes."""
         return self.group.nodes
 
     def defined(self) -> None:
-        """Called when the fix has its ID and belongs to the scene."""
+        """Called when the fix has its ID and is part of the scene."""
 
     def seconds(self) -> float:
-        """Estimate the seconds of a core that it adds to a step, for words of ``check``."""
+        """Estimate the core seconds that it adds to a step, for ``check``."""
         from_python = any(not isinstance(hook, CompiledHook) for hook in self.hooks().values())
         return FROM_PYTHON if from_python and not self.first_step_only else 0.0
 
     def hooks(self) -> dict[str, Any]:
-        """The hooks this fix overrides: name to method or compiled hook."""
+        """Map the names of overridden hooks to methods or compiled hooks."""
         found = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
         return {
             name: hook if isinstance(hook, CompiledHook) else self._told(name, hook)
@@ -143,7 +141,7 @@ class Fix(Publisher):
         }
 
     def _told(self, name: str, hook: Callable) -> Callable:
-        """`hook`, whose exceptions say where they come from."""
+        """Wrap `hook` so that its exceptions name the fix."""
 
         @wraps(hook)
         def call(view: Any) -> None:

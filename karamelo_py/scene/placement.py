@@ -1,4 +1,4 @@
-"""Placement of points in a filled region: cell by cell, the same number in each."""
+"""Placement of points in a region, cell by cell, with the same pattern in each cell."""
 
 import math
 from bisect import bisect_right
@@ -15,32 +15,31 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
-SAMPLE = 4096  # places of a region that are looked at before all are
-LOOKS = 9  # twice as many each time: a million at last
-FEW = 1_000_000  # points that memory has room for everywhere, whatever their fields
-# Beyond this many candidates the points outside the domain are no longer counted, only mentioned.
+SAMPLE = 4096  # positions sampled before a large region is filled
+LOOKS = 9  # times, doubling the sample: finally a million
+FEW = 1_000_000  # points that fit into memory everywhere, whatever their fields
+# Beyond this many candidates the points outside the domain are not counted.
 _MAX_COUNTED = 20_000_000
 
 
 class Placement(NamedTuple):
-    """Points and their initial domains. What is the same for all may be given once."""
+    """Points and their initial domains; values common to all points may be scalars."""
 
     x0: Any  # (n, d) positions, an array or Filled
-    volume: float | np.ndarray  # (n,), per unit thickness in 2D, area in 1D, without the radius
+    volume: float | np.ndarray  # (n,), per unit thickness in 2D or area in 1D; not times the radius
     half_size: np.ndarray  # (n, d) half edge lengths of the initial domains
-    lo: np.ndarray  # (d,) corners of the box of the solid
+    lo: np.ndarray  # (d,) corners of the bounding box of the solid
     hi: np.ndarray
-    outside: float = 0  # so many points more would lie outside the domain, inf where not known
-    shape: str = "box"  # or the cell type that meshio uses: line, triangle, quad, tetra, hexahedron
-    corners: np.ndarray | None = None  # (n, c, d) of initial domains that are no boxes
-    missed: float = 0  # parts of the region thinner than that may be missing, see `Pieces.missed`
+    outside: float = 0  # number of points rejected outside the domain, inf if unknown
+    shape: str = "box"  # or a meshio cell type: line, triangle, quad, tetra, hexahedron
+    corners: np.ndarray | None = None  # (n, c, d) of initial domains other than boxes
+    missed: float = 0  # thinner parts of the region may be missing, see `Pieces.missed`
 
 
 class Filled:
-    """Positions of the points that were kept in some cells: an array (n, d), made when asked for.
+    """Positions of the selected points in a box of cells: an array (n, d), computed on request.
 
-    What is remembered is which of the places in the cells were kept, one bit for each, and nothing
-    where all were, or none.
+    Stores one bit per candidate position, or nothing if all or none were selected.
     """
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
@@ -51,7 +50,7 @@ class Filled:
         self._kept: list[np.ndarray | None] = []
         self._ends = [0]
         self._moved = np.empty(0, np.int64), np.empty((0, len(corner)))
-        # Where equally spaced places are within their cell, and which one is where.
+        # Positions per cell, and the index of each.
         self._counts = tuple(b - a + 1 for a, b in zip(first, last, strict=True))
         self._ppc = round(len(places) ** (1 / len(corner)))
         self._subs = np.rint((places / h + 0.5) * self._ppc - 0.5).astype(np.int64)
@@ -59,20 +58,20 @@ class Filled:
         self._number[tuple(self._subs.T)] = np.arange(len(places))
 
     def candidates(self, begin: int, end: int) -> np.ndarray:
-        """All places (m, d) in the cells with numbers from `begin` to before `end`."""
+        """Return all candidates (m, d) in cells `begin` to before `end`."""
         centre = self._corner + (positions(*self._cells, begin, end) + 0.5) * self._h
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
 
     def keep(self, kept: np.ndarray) -> None:
-        """Take these (m,) of the next chunk."""
+        """Select these candidates (m,) of the next chunk."""
         count = int(np.count_nonzero(kept))
         self._kept.append(np.packbits(kept) if 0 < count < len(kept) else None)
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Numbers (n,) of places so many (n, d) further along each axis; -1 beyond the cells.
+        """Numbers (n,) of positions shifted by `step` (n, d) along the axes; -1 outside the cells.
 
-        Places stand at equal distances. They are numbered through all cells.
+        Positions have equal distances and are numbered through all cells.
         """
         cell, place = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[place] + step
@@ -82,7 +81,7 @@ class Filled:
         return np.where(none, -1, number + self._number[tuple(place.T)])
 
     def middles(self, number: np.ndarray) -> np.ndarray:
-        """Return the positions of places with these numbers, (n, d)."""
+        """Return the positions (n, d) with these numbers."""
         cell, place = self._cell_and_place(number)
         return self._corner + (cell + self._cells[0] + 0.5) * self._h + self._places[place]
 
@@ -91,7 +90,7 @@ class Filled:
         return np.array(np.unravel_index(cell, self._counts)).T, place
 
     def move(self, rows: np.ndarray, x: np.ndarray) -> None:
-        """Put points with the numbers `rows`, in order, to other places (n, d)."""
+        """Move points `rows`, ascending, to other positions (n, d)."""
         self._moved = rows, x
 
     def __len__(self) -> int:
@@ -113,7 +112,7 @@ class Filled:
         return out
 
     def _some(self, k: int, low: int, high: int) -> np.ndarray:
-        """Of the points of the k-th chunk those from `low` to before `high`."""
+        """Return points `low` to before `high` of the k-th chunk."""
         start, bits, m = self.chunks[k][0], self._kept[k], len(self._places)
         if bits is None:
             found = np.arange(low, high)
@@ -125,10 +124,10 @@ class Filled:
 
 
 def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
-    """The cells in which `region` is filled.
+    """Return the cells in which `region` is filled.
 
-    Those of the grid of `domain`, or cells that begin at the lower corner of the box of the
-    region (clipped to the domain) when the solid has a grid of its `own`.
+    They are those of the domain's grid; with `own`, cells that start at the lower corner of the
+    region's bounding box, clipped to the domain.
     """
     d = domain.dimension
     if not own:
@@ -139,11 +138,11 @@ def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattic
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Places of `ppc` points along a cell of size 1, from its centre, and their lengths: (ppc,).
+    """Return positions of `ppc` points along a unit cell, from its centre, and lengths: (ppc,).
 
-    By the rules ``regular`` and ``cut`` they are equally spaced; those of ``gauss`` are the points
-    and weights of Gauss and Legendre. Without a rule they are as in Karamelo: equally spaced, but 3
-    stand at the Gauss points in the digits that Karamelo writes, with equal lengths.
+    With ``regular`` and ``cut`` they are equally spaced; with ``gauss`` they are Gauss-Legendre
+    points and weights. The default is Karamelo's: equally spaced, but for 3 the Gauss points, as
+    rounded in Karamelo, with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)
@@ -157,9 +156,9 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The `ppc`^dimension points of a cell of size 1, see `offsets`: places and sizes, (m, d).
+    """Return positions and sizes of `ppc`^dimension points of a unit cell, (m, d), see `offsets`.
 
-    In Karamelo's order: x before y; in 3D the lowest z first. Sizes that are the same are (d,).
+    In Karamelo's order: x before y; in 3D the lowest z first. Equal sizes are (d,).
     """
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
@@ -179,12 +178,11 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """The points of `lattice` that fill `region` within the domain.
+    """Fill `region` within the domain with points.
 
-    Cells are counted from the lower corner of the lattice, x outermost, then y, then z. Only cells
-    that the box around the region reaches are looked at, a bounded number at a time. More points
-    than can be numbered, or than memory has `room` for (asked where there may be many), are an
-    error.
+    Cells are visited from the lower corner of the lattice, x outermost, then y, then z, in chunks,
+    and only inside the region's bounding box. Raises ScriptError for more points than can be
+    numbered, or than memory has `room` for (called if there may be many).
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -200,10 +198,10 @@ def fill(
     last_cell = np.array(lattice.cells[used]) - 1
     if region.unknown or (lo > hi).any():
         return placed
-    # One cell more on either side: rounding must not lose a point that lies on a face.
+    # One more cell on each side, so that round-off loses no point on a face.
     first = np.floor((lo - corner) / h) - 1
     last = np.floor((hi - corner) / h) + 1
-    # An open side ends at the domain; a closed one may reach beyond it, and then we say so.
+    # An open side ends at the domain; a closed one that extends past it causes a warning.
     first = np.where(np.isinf(lo), 0, first)
     last = np.where(np.isinf(hi), last_cell, last)
     inner_first = np.clip(first, 0, last_cell + 1)
@@ -213,15 +211,15 @@ def fill(
         raise ScriptError(
             f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
         )
-    # Beyond an axis, or a side that the region lies evenly about, is the mirror image of the rest.
+    # Past an axis or a plane of symmetry of the region lies its mirror image.
     ends = domain.lo[used], domain.hi[used]
-    with np.errstate(invalid="ignore"):  # of open sides
+    with np.errstate(invalid="ignore"):  # for open sides
         at_side = [np.abs((lo + hi) / 2 - end) <= domain.tolerance for end in ends]
     at_side[0] |= domain.axisymmetric & (np.arange(dimension) == 0)
     reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
     reaches_out |= (hi > ends[1] + domain.tolerance) & np.isfinite(hi) & ~at_side[1]
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
-    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # further cells have no number
+    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # integers stay exact
     counted = reaches_out.any() and near and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
@@ -237,7 +235,7 @@ def fill(
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
-    numbers: list[np.ndarray] = []  # which point of the pattern each one is
+    numbers: list[np.ndarray] = []  # index of each point in the pattern
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
     for begin, end in x0.chunks:
@@ -249,7 +247,7 @@ def fill(
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
-            # What lies beyond an open side is not meant to be there.
+            # Points past an open side are not missed.
             beyond = x[kept & ~in_domain]
             outside += int(((beyond >= open_lo) & (beyond <= open_hi)).all(axis=1).sum())
         if rule == "cut":
@@ -272,9 +270,9 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Count the points of this spacing that a region has at least, by some of its places.
+    """Return a lower bound of the number of points with this spacing in a region, by sampling.
 
-    More places are looked at until they tell whether there are more points than `most`.
+    The sample grows until it shows whether there are more points than `most`.
     """
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
@@ -284,7 +282,7 @@ def _least(region: Region, domain: Domain, spacing: float, most: float) -> float
         x = lo + size * random.random((max(SAMPLE, places), domain.dimension))
         places, inside = places + len(x), inside + int(region.inside(x).sum())
         share = inside / places
-        # Four times what its mean is uncertain by.
+        # Four standard deviations of the mean.
         unsure = 4 * math.sqrt(max(share * (1 - share), 1 / places) / places)
         least = (share - unsure) * whole
         if least > most or (share + unsure) * whole <= most:
@@ -295,7 +293,7 @@ def _least(region: Region, domain: Domain, spacing: float, most: float) -> float
 def _cut_off(
     placed: Placement, region: Region, size: float, left: list[tuple[np.ndarray, Pieces]]
 ) -> Placement:
-    """With what is left at the edge of the region in place of whole boxes, see `cut`."""
+    """Replace boxes at the edge of the region by their clipped pieces, see `clip`."""
     x0, d = placed.x0, region.dimension
     pieces = Pieces(*map(np.concatenate, zip(*(piece for _, piece in left), strict=True)))
     pieces = join(region, x0, pieces)

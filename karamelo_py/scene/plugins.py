@@ -1,6 +1,6 @@
-"""Checks of parts of a scene as a script asks for them, and the part that an exception comes from.
+"""Checks of the parts of a scene, and attribution of exceptions to plug-ins.
 
-Built-in parts go through the same checks as those of plug-ins.
+Built-in parts pass the same checks.
 """
 
 import inspect
@@ -39,7 +39,7 @@ from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import FAILURES
 from karamelo_py.script.values import in_a_row
 
-# Attributes that the class of a part must have.
+# Attributes that the class of a part must define.
 SAID = {
     "basis": ("cells", "nodes_per_cell", "least_nodes", "steady_moment", "steep_edge"),
     "transfer": ("inverts_spread",),
@@ -51,11 +51,11 @@ ROWS = (
 )  # fmt: skip
 COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
-ALIKE = 0.85  # so much of a name has to be that of a hook
+ALIKE = 0.85  # similarity of a method name to a hook name that is reported as a misspelling
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:
-    """Refuse a fix whose hooks or fields cannot be what its author meant.
+    """Refuse a fix with wrong hooks or fields.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def check_fix(hub: Scene, fix: Fix) -> None:
 
 
 def _wrong_hooks(fix: Fix) -> Iterator[str]:
-    """Say what is wrong with the hooks of a fix."""
+    """Yield what is wrong with the hooks of a fix."""
     hooks = {moment: getattr(fix, moment) for moment in STAGES if hasattr(fix, moment)}
     if hooks and fix.group is None and not fix.for_method:
         yield (
@@ -142,7 +142,7 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):
             try:
                 given = function(*[1.0] * takes)
-            except (ArithmeticError, ValueError):  # of a number that this is not about
+            except (ArithmeticError, ValueError):  # of a number that does not matter here
                 continue
         if not isinstance(given, tuple) or len(given) != gives:
             yield f"{moment}: {function.__name__} has to return {gives} numbers, not {given!r}"
@@ -157,7 +157,7 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
 
 
 def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
-    """Say what a hook on whole points cannot read or write."""
+    """Yield what a hook on whole points cannot read or write."""
     known, fields, written_too = WORDS, fix.point_fields, "velocity"
     if hook.on_nodes:
         known, fields = NODE_WORDS, fix.node_fields
@@ -175,7 +175,7 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
                     f"names it in {of}_fields"
                 )
             if written and item is Force and moment != "initial_integrate":
-                yield f"{moment}: forces on points are those of initial_integrate"
+                yield f"{moment}: forces on points are set in initial_integrate"
             if written and item is Supply and moment != "supply_heat":
                 yield f"{moment}: heat is supplied in supply_heat"
             if written and item is Force and WorkOfForces not in fix.point_fields:
@@ -188,18 +188,18 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
 
 
 def misfit(function: Callable, count: int) -> str:
-    """Say why a function cannot be called with so many arguments, if that is so."""
+    """Return why a function cannot be called with `count` arguments, or an empty text."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
     except TypeError as error:
         return str(error)
-    except ValueError:  # it has no signature
+    except ValueError:  # no signature
         pass
     return ""
 
 
 def check_part(hub: Scene, name: str, part: Any) -> None:
-    """Refuse a transfer, basis, method or scheme (`name`: ``basis smooth``) that is not whole."""
+    """Refuse an incomplete transfer, basis, method or scheme (`name`: ``basis smooth``)."""
     family, kind = name.partition(" ")[0], type(part)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
     what = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""
@@ -222,7 +222,7 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
 
 
 def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
-    """Refuse fields that are declared wrongly, or whose columns mean something else."""
+    """Refuse wrong field declarations, and columns that exist with another meaning."""
     for attribute in ("point_fields", "node_fields"):
         kinds = getattr(owner, attribute, ())
         if not isinstance(kinds, tuple):
@@ -241,7 +241,7 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
 
 
 def check_columns(hub: Scene, name: str, law: Any) -> None:
-    """Refuse a law, or a part of one, that shows a number under a name that is in use."""
+    """Refuse a law, or part of a law, with a column name that is in use."""
     for column in laws.columns_of(law):
         if shows := _shows(hub, column, None):
             raise faults.fault(name, f"the column '{column}' is {shows}", hub.place)
@@ -261,7 +261,7 @@ def _wrong_field(kind: Any) -> str:
 
 
 def _wrong_size(kind: type, domain: Any) -> str:
-    """Say if the number of components is wrong, in the dimensions that the scene may have."""
+    """Describe a wrong number of components, in the dimensions possible for the scene."""
     for dimension in [domain.dimension] if domain else KINEMATICS:
         kin = KINEMATICS[dimension]()
         size, start = kind.shape(kin), getattr(kind, "start", 0.0)
@@ -273,7 +273,7 @@ def _wrong_size(kind: type, domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
-    """Say what a column shows already, if that is not this field (None: a law)."""
+    """Describe the present use of a column, unless it is this field (None: a law)."""
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
@@ -286,11 +286,11 @@ def _shown(kind: Any) -> str:
     return getattr(kind, "__name__", repr(kind))
 
 
-# ---- the part at fault --------------------------------------------------------------------------
+# ---- attribution ---------------------------------------------------------------------------------
 
 
 class PartInUse(NamedTuple):
-    """A style in use: family and name, its class, and where the script asks for it."""
+    """A style in use: family and name, its class, and the place in the script."""
 
     name: str
     kind: type
@@ -298,12 +298,12 @@ class PartInUse(NamedTuple):
 
 
 def is_foreign(kind: type) -> bool:
-    """Tell if a class does not come with the program."""
+    """Tell if a class belongs to a plug-in."""
     return not kind.__module__.startswith(registry.PREFIX)
 
 
 def foreign_parts(hub: Scene) -> list[PartInUse]:
-    """List the parts of a scene that plug-ins brought."""
+    """List the parts of a scene that come from plug-ins."""
     update, method = hub.update, hub.update.method
     parts = [
         PartInUse(f"{of.kind} {item.style}", type(getattr(item, "law", item)), item.place)
@@ -324,9 +324,9 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Turn an exception in the code of a plug-in into an error of the script that names its part.
+    """Convert an exception in plug-in code to a script error that names the part.
 
-    The part is `usual` where the exception does not show one.
+    If the traceback does not show the part, it is `usual`.
     """
     try:
         yield
@@ -343,14 +343,14 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
         if not found:
             raise
         part, place = found[0]
-        if not (place or isinstance(error, Undefined)):  # told by the line that asked for it
+        if not (place or isinstance(error, Undefined)):  # the line that asked for it is reported
             place = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
         what = f"{faults.cause_of(error)}{place}"
         raise faults.fault(part.name, what, part.place, faults.TRACEBACK) from error
 
 
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
-    """Find the part whose file it is, or else one of whose package it is."""
+    """Find the part defined in a file, or else in its package."""
     path = Path(file).resolve()
     for part in parts:
         own = getattr(sys.modules.get(part.kind.__module__), "__file__", None)

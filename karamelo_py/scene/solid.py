@@ -60,7 +60,7 @@ class Solid(Named):
         self.glued_to = glued_to
         if glued_to is not None and not hub.update.method.fields_per_solid:
             hub.warn(
-                "GlueToSolid has no effect: with this method all solids share one velocity field",
+                "GlueToSolid has no effect: with this method all solids have one velocity field",
                 hint="leave it out",
             )
         self._compare_temperatures(hub)
@@ -102,7 +102,7 @@ class Solid(Named):
             begins = "has no thermal stress at" if self.warm else "starts at"
             hub.warn(
                 f"the solid {begins} the temperature 0: neither it nor its material says one",
-                hint="give T0 behind the cell size",
+                hint="give T0 after the cell size",
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
@@ -204,7 +204,7 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
     if abs(h - domain.h) > 1e-9 * domain.h:
         raise ScriptError(
             f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "
-            "which all solids share",
+            "which is common to all solids",
             argument="h",
             expected=f"{domain.h:g}, as in dimension(...)",
         )

@@ -1,6 +1,6 @@
-"""Errors of a script, with their place in the text and a remedy.
+"""Errors of a script, with their place in the text and a fix.
 
-Remedies are names that are alike, and what says the same here as a word of another program.
+Fixes are similar names, and translations of words of other programs.
 """
 
 import difflib
@@ -27,40 +27,39 @@ class Place(NamedTuple):
 
 
 class NoItem(KeyError):
-    """An item that is not there in brackets; its text is the whole message."""
+    """A missing item in brackets; its text is the whole message."""
 
     def __str__(self) -> str:
         return self.args[0]
 
 
 class Quit(Exception):
-    """The statement quit: the script ends here, and that is fine."""
+    """The statement quit: the script ends normally."""
 
 
-# What code that is not ours may raise: exit() in it would end the program without a word.
+# Exceptions of foreign code, whose exit() would end the program silently.
 FAILURES = (Exception, SystemExit)
 
 
 class Pause(Exception):
-    """The script waits in front of a run."""
+    """The script is stopped before a run."""
 
 
 @dataclass(eq=False, repr=False)
 class ScriptError(Exception):
-    """Something in a script (or on the command line) that the user has to change.
+    """A mistake in a script or on the command line, which the user has to correct.
 
     Parameters
     ----------
     message
-        What is wrong, in one sentence without a final stop.
+        What is wrong, in one sentence without a full stop.
     place
-        Where; filled in by whoever knows it when the raiser does not.
+        The place; filled in by a caller if the raiser does not know it.
     argument
-        Name or index (from 0, or below 0 from the last without a name) of the argument of a style
-        or command that is to blame;
-        `karamelo_py.language.signature.call` turns it into a place.
+        Name or index of the argument at fault (from 0; negative from the last one without a name);
+        `karamelo_py.language.signature.call` converts it to a place.
     expected
-        What would have been right.
+        What would be correct.
     hint
         What to write instead.
     """
@@ -71,24 +70,23 @@ class ScriptError(Exception):
     argument: str | int | None = None
     expected: str | None = None
     hint: str | None = None
-    # Command or style that complains, put in front of the message.
+    # Command or style that raises it, prepended to the message.
     command: str | None = None
-    # Where scripts include the one that it is in, the nearest first.
+    # Includes of the script, the nearest first.
     included: list[Place] = field(default_factory=list)
-    # Further mistakes of the script, which do not follow from this one.
+    # Independent further mistakes of the script.
     others: "list[ScriptError]" = field(default_factory=list)
-    # Where the text of a script is wrong: the statements in which it is not.
+    # For syntax errors: the statements that are correct.
     statements: list = field(default_factory=list)
-    # What kind of message it is (codes.toml). The word at fault, what kind of thing it names, and
-    # a known name that is like it.
+    # Kind of message (codes.toml), word at fault, what it should name, similar known name.
     code: str = ""
     name: str | None = None
     kind: str = ""
     alike: str | None = None
-    # Of a run that went wrong: the likely cause, and the command that resumes.
+    # For failed runs: the likely cause, and the command that resumes.
     cause: str = ""
     resume: str = ""
-    # Whether the statement it belongs to is known: nothing outside of it may add to it.
+    # True once the statement is known; callers further out add nothing.
     complete: bool = False
 
     def __str__(self) -> str:
@@ -96,15 +94,15 @@ class ScriptError(Exception):
 
     @property
     def sentence(self) -> str:
-        """The message, after the command or style that complains."""
+        """The message, after the command or style that raises it."""
         if self.command and not self.message.startswith(self.command):
             return f"{self.command}: {self.message}"
         return self.message
 
     def render(self) -> str:
-        """Write the whole message for the user: place, marked line, what was expected, remedy.
+        """Format the message for the user: place, marked line, expectation, fix.
 
-        Further mistakes of the script follow.
+        Further mistakes follow.
         """
         physics = {"code": self.code, "cause": self.cause, "resume": self.resume}
         text = render_message(
@@ -126,9 +124,9 @@ def render_message(
     cause: str = "",
     resume: str = "",
 ) -> str:
-    """Lay out an error or a warning (`kind`) as it is shown to the user.
+    """Format an error or a warning (`kind`) for the user.
 
-    With a `code` of a run it is a message of physics: likely cause, fix, the command that resumes.
+    With a `code` of a run it is a physics message: likely cause, fix, and the command that resumes.
     """
     physics = bool(code) and not codes().get(code, {}).get("script")
     lines = [f"{kind}: {message}"]
@@ -145,7 +143,7 @@ def render_message(
 
 
 def _marked(place: Place) -> list[str]:
-    """Write the source line and, below it, carets under the marked word."""
+    """Format the source line and the carets below the marked word."""
     text, start = place.text.rstrip(), place.column - 1
     length = max(place.length, 1)
     if len(text) > _WIDEST_LINE:
@@ -155,7 +153,7 @@ def _marked(place: Place) -> list[str]:
         start += (3 if cut else 0) - cut
         length = min(length, max(end - cut - start, 1))
         text = shown
-    # Tabs are kept so that the carets line up whatever the width of a tab on this terminal.
+    # Tabs are copied, so that the carets line up for any tab width.
     before = "".join(c if c == "\t" else " " * _width(c) for c in text[:start].ljust(start))
     carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
     number = str(place.line)
@@ -172,14 +170,14 @@ def _width(character: str) -> int:
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """Write ``did you mean '...'?`` with those of `names` most like `name`; None without any."""
+    """Format ``did you mean '...'?`` with the most similar names; None without any."""
     like = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
     close = [f"'{n}'" for n, ratio in like if ratio == like[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """Write ``one of a, b, c``; of many those most like `name`, their number and what lists all."""
+    """Format ``one of a, b, c``; of many, the nearest, their number, and where to find all."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
@@ -190,14 +188,14 @@ def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") ->
 
 
 def plural(count: float, noun: str) -> str:
-    """Write ``1 cell``, ``2 cells``."""
+    """Format ``1 cell``, ``2 cells``."""
     return f"{count:g} {noun}" if count == 1 else f"{count:.0f} {noun}s"
 
 
 def unknown(
     message: str, name: str, known: Iterable[str], hint: str | None = None, **where: Any
 ) -> ScriptError:
-    """Make the error for a `name` that is none of the `known`, `where` it stands."""
+    """Make the error for a `name` that is not `known`; `where` gives the place."""
     known = list(known)
     few = nearest_few(name, known)
     return ScriptError(
@@ -211,7 +209,7 @@ def unknown(
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
-    """Up to three of `names` that are like `name`, the one most like it first."""
+    """Return up to three `names` similar to `name`, most similar first."""
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
@@ -220,46 +218,46 @@ def nearest_few(name: str, names: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """Find the one of `names` most like `name`, or None when none is alike."""
+    """Return the most similar of `names`, or None if none is similar."""
     names = list(names)
     lowered = name.lower()
     for candidate in names:
         if candidate.lower() == lowered and candidate != name:
             return candidate
-    # Of short names a longer one says something else: Ek_s is not Es.
+    # A longer name is not a misspelling of a short one: Ek_s is not Es.
     like = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
     by_lower = {candidate.lower(): candidate for candidate in like}
     for word, among in (name, {n: n for n in like}), (lowered, by_lower):
         if close := difflib.get_close_matches(word, among, n=1, cutoff=0.6):
             return among[close[0]]
-    # A part of the name: cubic of cubic-spline.
+    # Part of a name: cubic for cubic-spline.
     by_lower = {candidate.lower(): candidate for candidate in names}
     parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
     return by_lower.get(next(parts, ""))
 
 
-# ---- words of other programs, above all of LAMMPS -----------------------------------------------
+# ---- words of other programs, mainly LAMMPS -----------------------------------------------------
 
 
 @cache
 def table() -> dict[str, Any]:
-    """Read the table other_programs.toml; nothing needs it before something is wrong."""
+    """Read other_programs.toml, on the first error."""
     path = Path(__file__).with_name("other_programs.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 @cache
 def codes() -> dict[str, dict[str, Any]]:
-    """Read codes.toml: what each code of a message means."""
+    """Read codes.toml: the meaning of each message code."""
     path = Path(__file__).with_name("codes.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def of_karamelo(name: str) -> bool:
-    """Tell if a name is that of a command of Karamelo, which no variable there can have."""
+    """Tell whether `name` is a Karamelo command, which no variable can be called."""
     return name in table()["karamelo"].split()
 
 
 def instead(family: str, name: str) -> str | None:
-    """Find what to write here for a command or style of another program; None for other words."""
+    """Translate a command or style of another program; None for other words."""
     return table()["instead"].get(family, {}).get(name)

@@ -1,4 +1,4 @@
-"""From the trees of expressions to what they stand for: numbers, texts and formulas."""
+"""Evaluate trees of expressions to numbers, texts and formulas."""
 
 import math
 from functools import partial, reduce
@@ -12,9 +12,9 @@ from karamelo_py.script.terms import REWRITTEN, applied
 
 
 class NameScope(Protocol):
-    """The scope that gives names and calls of commands their meaning: the interpreter.
+    """Resolves names and calls of commands; implemented by the interpreter.
 
-    It `hides` the function of a name that the script uses for something else.
+    It `hides` a function whose name the script uses for something else.
     """
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value: ...
@@ -25,7 +25,7 @@ class NameScope(Protocol):
 
 
 def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
-    """Evaluate the tree of `raw`: to a number, a text or a formula."""
+    """Evaluate the tree of `raw` to a number, a text or a formula."""
     if isinstance(node, (syntax.NumberLiteral, syntax.TextLiteral)):
         return node.value
     if isinstance(node, syntax.Name):
@@ -44,7 +44,7 @@ def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
 
 
 def mark(raw: syntax.Raw, node: syntax.Node) -> Any:
-    """Find the place of `node`, a part of `raw`."""
+    """Return the place of `node`, a part of `raw`."""
     return raw.source.place(raw.start + node.start, raw.start + node.end)
 
 
@@ -52,7 +52,7 @@ def _binary(node: syntax.BinaryOperation, raw: syntax.Raw, scope: NameScope) -> 
     left = evaluate(node.left, raw, scope)
     logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
     if logical and (left != 0) == (node.operator == "||"):
-        # What cannot matter is not evaluated, so that a != 0 && 1/a > 2 is fine.
+        # Short-circuit evaluation, so that a != 0 && 1/a > 2 is fine.
         return 1.0 if left != 0 else 0.0
     right = evaluate(node.right, raw, scope)
     if isinstance(left, str) or isinstance(right, str):
@@ -98,19 +98,19 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
             return evaluate(node.operands[1 if condition != 0 else 2], raw, scope)
     values = tuple(_numeric(operand, raw, scope, node.name) for operand in node.operands)
     if node.name in ("min", "max"):
-        # Pairwise: the evaluator knows them for two operands.
+        # Pairwise: the evaluator has them for two operands only.
         return reduce(lambda a, b: _apply(node.name, node, (a, b), raw), values)
     return _apply(node.name, node, values, raw)
 
 
 def usage(name: str) -> str:
-    """Write how a function is called."""
+    """Format how a function is called."""
     operands = {"if": "condition, a, b", "atan2": "y, x", "min": "a, b, ...", "max": "a, b, ..."}
     return f"{name}({operands.get(name) or ('a, b' if FUNCTIONS[name].least == 2 else 'a')})"
 
 
 def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) -> float | Expression:
-    """Do the operation on numbers, or a formula if one of the values is."""
+    """Apply an operation: to numbers at once, else as a formula."""
     if any(isinstance(value, Expression) for value in values):
         terms = [Expression(value)._term for value in values]
         try:

@@ -1,7 +1,7 @@
-"""Values of expressions: numbers, texts, and formulas that are evaluated again and again.
+"""Values of expressions: numbers, texts, and formulas that are evaluated repeatedly.
 
-An operation on numbers is done at once. As soon as something that changes takes part (a position,
-the time, a published value), the result is a formula, with the numbers folded in.
+Operations on numbers are evaluated at once. With a variable operand (a position, the time, a
+published value) the result is a formula, with constants folded in.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
-FIRST = frozenset(POINT_SEEDS[3:])  # places before the first step
+FIRST = frozenset(POINT_SEEDS[3:])  # initial positions
 GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
-CHUNK = 1 << 18  # points at which a formula is evaluated together
+CHUNK = 1 << 18  # points per evaluation of a formula
 
 
 class Expression:
-    """A number, or a formula of positions, time and published values; used alike in signatures.
+    """A number, or a formula of positions, time and published values.
 
     Its `names` are the seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
     """
@@ -40,12 +40,12 @@ class Expression:
 
     @classmethod
     def seed(cls, name: str) -> Expression:
-        """Make the formula that is nothing but a name."""
+        """Make the formula that consists of a name."""
         return cls(terms.Term("name", (), name))
 
     @classmethod
     def from_script(cls, hub: Any, argument: Any) -> Expression:
-        """Read the expression that a script's argument stands for."""
+        """Read the expression from a script argument."""
         value = argument.value(hub)
         if isinstance(value, str):
             raise ScriptError(
@@ -54,7 +54,7 @@ class Expression:
         return cls(value)
 
     def minus(self, other: Expression) -> Expression:
-        """Make the formula of the difference."""
+        """Return the difference as a formula."""
         return Expression(terms.applied("-", self._term, other._term))
 
     @property
@@ -63,19 +63,19 @@ class Expression:
 
     @property
     def is_constant(self) -> bool:
-        """Tell if it is one number for ever."""
+        """Tell if it is a constant number."""
         return not self._term.names
 
     @property
     def constant(self) -> float:
-        """The number, if it is one for ever (else a ValueError)."""
+        """The constant number; ValueError if it is not constant."""
         if not self.is_constant:
             raise ValueError(f"{self.text} is not constant")
         return self._term.value
 
     @property
     def text(self) -> str:
-        """The formula as it could stand in a script, down to its seeds, unless it is too long."""
+        """The formula in script syntax, down to its seeds, unless it is too long."""
         if not terms.is_short(self._term):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
         return terms.text_of(self._term)
@@ -84,11 +84,11 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Tell if it is the same number as another everywhere, for all that can be seen."""
+        """Tell if it is visibly the same number as another everywhere."""
         return terms.alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
-        """Compute the number it has now; a formula of positions has none."""
+        """Return its present number; ValueError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             raise ScriptError(
@@ -99,7 +99,7 @@ class Expression:
         return _evaluate(self._term, values)
 
     def program(self, values: Values) -> formula.Program:
-        """Write the formula for :func:`karamelo_py.compiler.formula.evaluate`."""
+        """Compile for :func:`karamelo_py.compiler.formula.evaluate`."""
 
         def place(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
@@ -109,7 +109,7 @@ class Expression:
         return terms.program(self._term, place)
 
     def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
-        """Write the formula of numbers that are not published, for a stack of this depth alone."""
+        """Compile a formula of unpublished numbers for a stack of this depth only."""
         return terms.program(
             self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth
         )
@@ -117,9 +117,9 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Compute the (n,) numbers it has at positions `x`, whose reference positions are `x0`.
+        """Evaluate at positions `x` with reference positions `x0`, (n,).
 
-        Positions are (n, 1 to 3); missing directions count as 0, and `x0` defaults to `x`.
+        Positions are (n, 1 to 3); missing directions are 0, and `x0` defaults to `x`.
         """
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
@@ -127,7 +127,7 @@ class Expression:
         out = np.empty(len(x))
         scratch = np.empty((6 + formula.ROWS, formula.BLOCK))
         program = self.program(values)
-        # Some at a time: copies with three columns of millions of points would take much memory.
+        # In chunks: copies with three columns of millions of points would take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])
@@ -136,7 +136,7 @@ class Expression:
         return out
 
     def evaluate_columns(self, values: Values, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Compute the (n,) numbers it has of rows of `columns`, at most six, by their names."""
+        """Evaluate for rows of named `columns`, at most six, (n,)."""
         names = list(columns)
         if not names:
             return np.array([self.evaluate(values)])
@@ -161,7 +161,7 @@ Value = float | str | Expression
 
 
 def shown(value: Value) -> str:
-    """Write a value as a script would say it."""
+    """Format a value in script syntax."""
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, Expression):

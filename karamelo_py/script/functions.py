@@ -1,6 +1,6 @@
-"""The functions of the script language, for plain numbers.
+"""Functions of the script language, for numbers.
 
-The same functions for many points at once are in :mod:`karamelo_py.compiler.formula`.
+For many points at once they are in :mod:`karamelo_py.compiler.formula`.
 """
 
 import math
@@ -12,11 +12,11 @@ from karamelo_py.compiler.operations import BINARY, UNARY, quietly
 
 # Pi, the golden ratio, and Euler's constant.
 CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}
-# Words that look like names but mean something to particular commands only.
+# Words that look like names, with a meaning for particular commands only.
 WORDS = frozenset({"NULL", "INF", "EDGE"})
-# Functions whose names no variable may have; other names of functions were free in Karamelo.
+# Functions that no variable may be named after; other names were free in Karamelo.
 RESERVED = frozenset({"exp", "sqrt", "cos", "sin", "tan", "atan2", "log", "if"})
-# The tails of the normal distribution that inv_norm leaves out, on each side.
+# Tails of the normal distribution omitted by inv_norm, on each side.
 TAIL = 1e-10
 
 
@@ -62,7 +62,7 @@ FUNCTIONS: dict[str, Signature] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """Compute a function or operator of plain numbers; NaN in, NaN out, errors as in `math`."""
+    """Apply a function or operator to numbers; NaN in, NaN out, errors as in `math`."""
     if any(map(math.isnan, numbers)):
         return math.nan
     result = _COMPUTED[name](*numbers)
@@ -72,7 +72,7 @@ def compute(name: str, *numbers: float) -> float:
 
 
 def compute_quietly(name: str, *numbers: float) -> float:
-    """Compute an operation as floating-point hardware does: inf or NaN where there is no result."""
+    """Apply an operation as floating-point hardware does: inf or NaN for invalid operands."""
     if name == "if":
         return numbers[1] if numbers[0] != 0 else numbers[2]
     return math.nan if any(map(math.isnan, numbers)) else quietly(name, *numbers)

@@ -1,4 +1,4 @@
-"""The grammars script.lark and expression.lark, their parsers, and the trees that they make."""
+"""The grammars script.lark and expression.lark, their parsers, and the trees they build."""
 
 import functools
 import hashlib
@@ -14,14 +14,14 @@ from karamelo_py.compiler import cache
 from karamelo_py.script import syntax
 from karamelo_py.script.syntax import Mistake
 
-# Trees are walked by recursion; this keeps well below Python's limit.
+# Trees are traversed recursively; this stays far below Python's limit.
 MAX_DEPTH = 150
 
 SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
 
 
 def refused() -> type[Exception]:
-    """Name the error of a text that a grammar does not allow."""
+    """Return the exception class of a text that a grammar does not allow."""
     from lark.exceptions import UnexpectedInput
 
     return UnexpectedInput
@@ -29,17 +29,16 @@ def refused() -> type[Exception]:
 
 @functools.cache
 def parser_of(start: str) -> Any:
-    """Make the parser of statements, or that of expressions, which knows no other tokens.
+    """Make the parser of statements or of expressions.
 
-    Lark needs 0.06 s for each, and 0.01 s to take one from its tables, which are kept on disk; what
-    cannot be read or written there is no matter.
+    Lark needs 0.06 s for each, and 0.01 s from tables cached on disk. Cache errors are ignored.
     """
     import lark
     from lark.grammar import Rule
     from lark.lexer import TerminalDef
 
     text = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
-    # The numbers and texts of the tables, as bytes that make no objects of other kinds.
+    # The tables contain only numbers and strings, so that their bytes create no other objects.
     stamp = hashlib.sha256(f"{lark.__version__} {sys.version} {text}".encode()).hexdigest()[:24]
     path = cache.folder().with_name("parsers") / f"{start}-{stamp}.tables"
     with suppress(OSError, ValueError, EOFError, TypeError):
@@ -58,7 +57,7 @@ def parser_of(start: str) -> Any:
 
 
 def literal(word: str, start: int) -> float:
-    """Read a number, which stands at `start`."""
+    """Read a number that starts at `start`."""
     value = float(word)
     if math.isinf(value):
         raise Mistake(f"the number {word} is too large", start, start + len(word), "below 1.8e308")
@@ -66,7 +65,7 @@ def literal(word: str, start: int) -> float:
 
 
 def span(part: Any) -> tuple[int, int]:
-    """Find where a token, or what was made of some, begins and ends."""
+    """Return the start and end of a token, or of what was built from some."""
     return part if isinstance(part, tuple) else (part.start_pos, part.end_pos)
 
 
@@ -79,7 +78,7 @@ def _spelled(sign: str) -> str:
 
 
 def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
-    """Find start, end and depth of a node."""
+    """Return start, end and depth of a node above others."""
     depth = 1 + max((node.depth for node in below), default=0)
     if depth > MAX_DEPTH:
         raise Mistake(
@@ -93,9 +92,9 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
 
 
 class _TreeBuilder:
-    """Makes spans of statements and trees of expressions while Lark parses.
+    """Builds statement spans and expression trees while Lark parses.
 
-    Each method is named after a rule of the grammar and gets what the rule matched.
+    Each method is named after a grammar rule and receives what it matched.
     """
 
     def script(self, parts: list) -> list:
@@ -153,5 +152,5 @@ class _TreeBuilder:
         return syntax.FunctionCall(*around, str(parts[0]), operands)
 
     def parenthesis(self, parts: list) -> syntax.Node:
-        # The same tree, but marked and quoted with its parentheses.
+        # The same tree, marked and quoted with its parentheses.
         return replace(parts[1], start=parts[0].start_pos, end=parts[2].end_pos)

@@ -1,7 +1,7 @@
-"""Syntax errors in a user's words: characters, quotes and parentheses, then expressions.
+"""Syntax errors in the user's terms: characters, quotes and parentheses, then expressions.
 
-Of expressions Lark's parser, fed token by token, tells where it stopped, what it had read and what
-was open then; what the user did follows from these.
+For expressions, Lark's parser, fed token by token, gives the position where it stopped, what it had
+read and what was open; the user's mistake is inferred from these.
 """
 
 import re
@@ -16,15 +16,15 @@ CLOSES_NOTHING = (
 _PUNCTUATION = re.compile(
     r'"[^"\n]*"|#[^\n]*|(?<!&)&(?=[ \t]*(?:#.*)?(?:\n|\Z))|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]'
 )
-# A comment of C in the line that ends there.
+# A C++ comment in the line that ends there.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
-# Empty lines and comments of Abaqus, and a keyword: no script begins with one.
+# Empty lines and comments of Abaqus, then a keyword: no script begins like this.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
 _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
 
 def check_characters(text: str) -> None:
-    """Refuse files of Abaqus and LS-DYNA, and what no script may contain outside of quotes."""
+    """Refuse files of Abaqus and LS-DYNA, and characters that need quotes."""
     first = _KEYWORD.match(text)
     if first and first[1].lower() in table()["abaqus"].split():
         hint = "docs/howto/from-abaqus.md says it in this language; solid mesh reads its mesh"
@@ -42,11 +42,11 @@ def check_characters(text: str) -> None:
         if len(word) > 1 or word in '"#()':
             continue
         if word == "&":
-            message = "no & stands at the end of a line"
+            message = "lines do not end in &"
             expected = "a statement in one line, or a call over several"
             hint = "leave it out; a call may run over several lines inside its parentheses"
         elif ord(word) < 32 or word == "\x7f":
-            message = f"a control character (code {ord(word)}) stands here"
+            message = f"a control character (code {ord(word)})"
             expected, hint = "a text file", "delete it; is this really a script?"
         else:
             message, expected = f"typographic quote {word}", 'the plain quote "'
@@ -55,7 +55,7 @@ def check_characters(text: str) -> None:
 
 
 def in_script(text: str) -> Mistake:
-    """Find the mistake in the quotes or parentheses of a script."""
+    """Return the mistake in the quotes or parentheses of a script."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
         word, start = match[0], match.start()
@@ -74,7 +74,7 @@ def in_script(text: str) -> Mistake:
 
 
 def open_quote(text: str, start: int) -> Mistake:
-    """Make the mistake of a quote that begins at `start` and has no end."""
+    """Make the mistake of a quote that starts at `start` and has no end."""
     end = text.find("\n", start)
     hint = "comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "'
     end = len(text) if end < 0 else end
@@ -82,7 +82,7 @@ def open_quote(text: str, start: int) -> Mistake:
 
 
 def open_parenthesis(text: str, start: int) -> Mistake:
-    """Make the mistake of a parenthesis at `start` that is not closed."""
+    """Make the mistake of an unclosed parenthesis at `start`."""
     before = re.search(r"[^\W\d]\w*[ \t]*$", text[:start])
     begin = before.start() if before else start
     what = f"the call of {before[0].rstrip()}" if before else "this parenthesis"
@@ -99,9 +99,9 @@ _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
 
 
 class _Stop(NamedTuple):
-    """The place at which the parser stopped: tokens before and there, and what it held.
+    """Position where the parser stopped: tokens before and at it, and the parser's stack.
 
-    `here` is a character that begins no token, a token, or None at the end.
+    `here` is a character that starts no token, a token, or None at the end.
     """
 
     code: str
@@ -116,32 +116,32 @@ class _Stop(NamedTuple):
 
     @property
     def last(self) -> Any:
-        """The token before, or None."""
+        """The previous token, or None."""
         return self.before[-1] if self.before else None
 
     @property
     def kind(self) -> str:
-        """The type of the token here."""
+        """The type of the token at this position."""
         return getattr(self.here, "type", "")
 
     @property
     def opened(self) -> list[int]:
-        """List the places of open parentheses."""
+        """Positions of open parentheses."""
         return [t.start_pos for t in self.stack if getattr(t, "type", "") == "LPAR"]
 
     @property
     def after_call(self) -> bool:
-        """Tell if all before is one call."""
+        """Tell if everything before is one call."""
         types = [getattr(part, "type", "") for part in self.stack]
         return types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR" and types.count("LPAR") == 1
 
     def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
-        """Make a mistake that marks what stands here."""
+        """Make a mistake that marks this position."""
         return Mistake(message, self.start, self.end, expected, hint)
 
 
 def _stop(parser: Any, code: str) -> _Stop:
-    """Feed `code` to Lark's `parser` up to where it can go no further."""
+    """Feed `code` to Lark's `parser` until it stops."""
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
     interactive = parser.parse_interactive(code)
@@ -160,7 +160,7 @@ def _stop(parser: Any, code: str) -> _Stop:
 
 
 def in_expression(parser: Any, code: str) -> Mistake:
-    """Find the mistake in `code`, which Lark's `parser` refuses."""
+    """Return the mistake in `code`, which Lark's `parser` refuses."""
     at = _stop(parser, code)
     if at.here is None:
         return _at_end(at)
@@ -182,7 +182,7 @@ def in_expression(parser: Any, code: str) -> Mistake:
     if before and before.type in _ENDS and at.kind in _STARTS:
         return _side_by_side(at)
     if at.kind not in _OPERATORS:
-        return at.mistake(f"'{at.here}' cannot stand here")
+        return at.mistake(f"unexpected '{at.here}'")
     for start in (at.start - 1, at.start):
         if code[max(start, 0) : start + 2] in ("//", "/*"):
             message = f"'{code[start : start + 2]}' begins no comment"
@@ -191,7 +191,7 @@ def in_expression(parser: Any, code: str) -> Mistake:
     if before and before.type in _OPERATORS:
         return at.mistake(f"operator '{at.here}' follows operator '{before}'", hint=hint)
     if before and before.type in _ENDS:
-        return at.mistake(f"'{at.here}' cannot stand between two values", hint=hint)
+        return at.mistake(f"'{at.here}' does not join two values", hint=hint)
     return at.mistake(f"operator '{at.here}' has nothing on its left", hint=hint)
 
 
@@ -220,11 +220,11 @@ def _equals(at: _Stop) -> Mistake:
     if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
         hint = f"a formula needs no arguments: {first} = {rest}"
         place = first.start_pos, before.end_pos
-        return Mistake("only a name can stand left of '='", *place, expected, hint)
+        return Mistake("only a name can be left of '='", *place, expected, hint)
     hint = "compare with ==" if at.opened or len(tokens) == 1 else None
     if len(tokens) > 1 and all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
         hint = "a name begins with a letter and has letters, digits and _ only"
-    return at.mistake("'=' cannot stand here", expected, hint)
+    return at.mistake("unexpected '='", expected, hint)
 
 
 def _comma(at: _Stop) -> Mistake:
@@ -283,10 +283,10 @@ def _side_by_side(at: _Stop) -> Mistake:
         )
     hint = None
     if at.after_call and at.kind == "NAME":
-        hint = "multiply with *; two statements stand on two lines"
+        hint = "multiply with *; write two statements on two lines"
         hint = NO_BLOCKS if at.before[0] in table()["blocks"] else hint
     elif before.type == "NUMBER" and at.kind == "NAME" and not code[end:].strip():
-        hint = "numbers stand without units"
+        hint = "write numbers without units"
     return at.mistake(
         f"an operator is missing between '{_short(before)}' and '{_short(here)}'",
         "an operator, such as *, or a comma between arguments",
@@ -299,11 +299,11 @@ NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:
-    """Write the line to stand instead of ``name word word``."""
+    """Format the correct line for ``name word word``."""
     if name in table()["blocks"]:
         return NO_BLOCKS
     if name in _NAMED and words and re.fullmatch(r"\d\w*", words[0]):
-        words[0] = f"n{words[0]}"  # no ID here
+        words[0] = f"n{words[0]}"  # the ID is missing
     if other := table()["otherwise"].get(name) or instead("command", name):
         form = re.match(r"(\w+)\(\w+\)", other)
         return f"{form[1]}({words[0]})" if form and len(words) == 1 else other
@@ -312,7 +312,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
         style = other.removeprefix("the style ")
         if other and (style == other or " " in style):
             return other
-        if words[1] == "all" or other:  # LAMMPS has the group in front of the style
+        if words[1] == "all" or other:  # LAMMPS has the group before the style
             words[1:3] = style or words[2], words[1]
     if name == "dump" and len(words) > 2:
         words[2] = (instead(name, words[2]) or words[2]).removeprefix("the style ")

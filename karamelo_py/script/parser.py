@@ -1,4 +1,4 @@
-"""From a file to text, and from text to statements and trees of expressions."""
+"""Read files as text, and text as statements and expression trees."""
 
 import difflib
 import re
@@ -11,7 +11,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import Mistake
 
 _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
-# What programs write beside scripts.
+# First bytes of files that programs write next to scripts.
 _WRITTEN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
     *(".LAMMPS", ".log", ".part"),
@@ -44,12 +44,12 @@ def read_script(path: Path) -> str:
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """Read the statements of a script.
+    """Parse the statements of a script.
 
-    Arguments of calls stay as they are written; everything else is checked. Syntax errors of other
-    statements are `others` of the first, and statements without any its `statements`.
+    Arguments of calls stay unparsed; everything else is checked. Further syntax errors are in
+    `others` of the first one, and correct statements in its `statements`.
     """
-    # A byte order mark and the line ends of other systems mean nothing.
+    # Ignore a byte order mark, and normalise line ends.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     source = syntax.Source(text, file)
     try:
@@ -74,7 +74,7 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
 
 
 def parse_expression(raw: syntax.Raw) -> syntax.Node:
-    """Read the tree of an expression."""
+    """Parse an expression."""
     try:
         return _tree(raw.code)
     except Mistake as mistake:
@@ -82,16 +82,16 @@ def parse_expression(raw: syntax.Raw) -> syntax.Node:
 
 
 def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node]:
-    """Read an expression that stands in no script, such as one from the command line."""
+    """Parse an expression outside of scripts, such as one from the command line."""
     raw = syntax.Raw(syntax.Source(text, file), 0, len(text))
     return raw, parse_expression(raw)
 
 
 @lru_cache(maxsize=4096)
 def _tree(code: str) -> syntax.Node:
-    """Read the tree of `code`; its offsets count from the start of `code`."""
+    """Parse `code`; offsets count from its start."""
     word = code.strip()
-    # Most arguments and many right-hand sides are one name or one whole number.
+    # Fast path: most arguments and many right-hand sides are one name or integer.
     start = code.index(word)
     if word.isascii() and word.isidentifier() and word not in grammar.SPELLINGS:
         return syntax.Name(start, start + len(word), 1, word)
@@ -108,7 +108,7 @@ def _tree(code: str) -> syntax.Node:
 def _statement(
     source: syntax.Source, kind: str, name: str, start: int, end: int, parts: Any
 ) -> syntax.Statement:
-    """Read the statement that lies at `start` to `end`."""
+    """Build the statement between `start` and `end`."""
     place = source.place(start, start + max(len(name), 1))
     whole = syntax.Raw(source, start, end)
     if kind == "call":
@@ -129,7 +129,7 @@ def _statement(
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
-    """Raw arguments of a call; `parts` are spans (None where empty) and the commas between."""
+    """Raw arguments of a call; `parts` are spans (None if empty) and the commas between them."""
     if parts == [None]:
         return []
     raws = []
@@ -147,10 +147,10 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
         if single := _SINGLE_QUOTED.match(source.text, part[0]):
             bare = ", or the word without quotes" if single[1].isidentifier() else ""
             raise ScriptError(
-                f"{single[0]} stands in single quotes",
+                f"{single[0]} is in single quotes",
                 code="syntax",
                 place=source.place(*single.span()),
-                expected="texts stand in double quotes",
+                expected="text in double quotes",
                 hint=f'write "{single[1]}"{bare}',
             )
         raws.append(syntax.Raw(source, *part))

@@ -1,4 +1,4 @@
-"""Text of files that people write: in any of the usual codes, and of no pipe that never ends."""
+"""Read text files in the usual encodings, and refuse endless pipes."""
 
 import os
 import re
@@ -10,17 +10,17 @@ _CODES = (
     (b"\xff\xfe\0\0", "utf-32"), (b"\0\0\xfe\xff", "utf-32"), (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
-# What a shell puts in for <(command), and the end of a pipe: whoever names them waits for it.
+# Shell substitutions <(command), and the read end of a pipe: they will be written to.
 _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
 
 
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
-    """Read a regular file of at most `largest` bytes (None: of any size).
+    """Read a regular file of at most `largest` bytes (None: any size).
 
-    Raises OSError where that cannot be read, or is something else.
+    Raises OSError if it cannot be read or is not regular.
     """
     piped = _PIPED.fullmatch(str(path)) is not None
-    # A pipe that nobody writes to would be waited for.
+    # Opening a pipe without a writer would block.
     flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)
     flags |= 0 if piped else getattr(os, "O_NONBLOCK", 0)
     with open(os.open(path, flags), "rb") as file:
@@ -36,7 +36,7 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """Read a text; OSError as `read_bytes`, and ValueError where it is none."""
+    """Read a text file; OSError as in `read_bytes`, ValueError if it is not text."""
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):
@@ -46,5 +46,5 @@ def read_text(path: Path, largest: int | None = LARGEST) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        # Old editors write comments in Latin-1, where every byte is a character.
+        # Old editors write Latin-1, in which every byte is valid.
         return data.decode("latin-1")

@@ -1,4 +1,4 @@
-"""A script once it is read: statements, raw arguments, expression trees."""
+"""Parsed scripts: statements, raw arguments, expression trees."""
 
 import re
 from bisect import bisect_right
@@ -7,12 +7,12 @@ from functools import cached_property
 
 from karamelo_py.script.errors import Place, ScriptError
 
-# Quoted text is matched first so that a # in it starts no comment.
+# Quoted text is matched first, so that # in it starts no comment.
 _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
 
 class Source:
-    """The text of one script file, and where its offsets are."""
+    """The text of one script file, with conversion of offsets to places."""
 
     def __init__(self, text: str, file: str):
         self.text = text
@@ -23,7 +23,7 @@ class Source:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
     def place(self, start: int, end: int) -> Place:
-        """Find the place of the characters from offset `start` up to `end`."""
+        """Return the place of the characters from offset `start` up to `end`."""
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
@@ -33,7 +33,7 @@ class Source:
         return Place(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """Read the characters from `start` to `end` with comments and line ends made blank."""
+        """Return the characters from `start` to `end`, with comments and line ends blanked."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(
@@ -44,7 +44,7 @@ class Source:
 
 @dataclass(eq=False)
 class Mistake(Exception):
-    """A syntax error at offsets of a text whose place in a file is not known here."""
+    """A syntax error at offsets of a text, without a place in a file."""
 
     message: str
     start: int
@@ -53,7 +53,7 @@ class Mistake(Exception):
     hint: str | None = None
 
     def error(self, source: Source, offset: int = 0) -> ScriptError:
-        """Make it an error with a place."""
+        """Convert to an error with a place."""
         place = source.place(offset + self.start, offset + self.end)
         expected, hint = self.expected, self.hint
         return ScriptError(self.message, place=place, expected=expected, hint=hint, code="syntax")
@@ -80,7 +80,7 @@ class NumberLiteral(Node):
 
 @dataclass(frozen=True, slots=True)
 class TextLiteral(Node):
-    """A literal text, without its quotes."""
+    """A string literal, without quotes."""
 
     value: str
 
@@ -102,7 +102,7 @@ class UnaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class BinaryOperation(Node):
-    """`left` `operator` `right`; the operators are spelled ``^ && ||`` whatever the script says."""
+    """`left` `operator` `right`; operators are spelled ``^ && ||`` whatever the script uses."""
 
     operator: str
     left: Node
@@ -111,7 +111,7 @@ class BinaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class FunctionCall(Node):
-    """A call of a function or of a command that gives a value."""
+    """A call of a function, or of a command that returns a value."""
 
     name: str
     operands: tuple[Node, ...]
@@ -122,7 +122,7 @@ class FunctionCall(Node):
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """An argument or right-hand side as it was written; offsets into `source`."""
+    """An argument or right-hand side as written; offsets into `source`."""
 
     source: Source
     start: int
@@ -130,7 +130,7 @@ class Raw:
 
     @property
     def code(self) -> str:
-        """The text to parse: as written, comments and line ends made blank."""
+        """The text to parse: as written, with comments and line ends blanked."""
         return self.source.code(self.start, self.end)
 
     @property

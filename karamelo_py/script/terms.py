@@ -1,4 +1,4 @@
-"""Terms of formulas: numbers, names and operations on them, as text and as programs."""
+"""Terms of formulas (numbers, names, operations), as text and as programs."""
 
 import math
 from collections.abc import Callable
@@ -11,12 +11,12 @@ from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import TAIL
 
-# Number of operations in all; of those that messages show.
+# Number of operations, at most; and the number shown in messages.
 _MAX_SIZE = 20000
 _MAX_SHOWN = 1000
 _MAX_LEVELS = 100
 
-# Functions that the evaluator does not know as such.
+# Functions that the evaluator lacks.
 REWRITTEN = {
     "pow": lambda a, b: applied("^", a, b),
     "mod": lambda a, b: applied("%", a, b),
@@ -30,8 +30,8 @@ REWRITTEN = {
     "inv_norm": lambda a: _inverse_normal(a),
 }
 
-# Numerators and denominators, from the highest power on, of Wichura's algorithm AS 241 (1988) for
-# the inverse of the normal distribution: around the middle, and towards the tails.
+# Numerators and denominators, highest power first, of Wichura's algorithm AS 241 (1988) for the
+# inverse normal distribution: in the middle, and in the tails.
 _MIDDLE = (
     (
         2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
@@ -84,7 +84,7 @@ class Term:
             self.names = frozenset({value})
         elif operands:
             self.names = frozenset().union(*(term.names for term in operands))
-        # Operations as if none were shared, counted in earnest only where they seem too many.
+        # Counts shared operations repeatedly; exact only if needed.
         self.size = 1 + sum(term.size for term in operands)
         if self.size > _MAX_SIZE:
             self.size = len(in_order(self))
@@ -93,7 +93,7 @@ class Term:
 
 
 def in_order(root: Term) -> list[Term]:
-    """List the terms below `root` and itself, each once, operands before what is made of them."""
+    """List `root` and the terms below it once each, operands first."""
     found: dict[int, Term] = {}
     open_terms = [(root, False)]
     while open_terms:
@@ -109,7 +109,7 @@ def in_order(root: Term) -> list[Term]:
 
 
 def constant(value: float) -> Term:
-    """Make a number."""
+    """Make a constant term."""
     return Term("number", (), float(value))
 
 
@@ -119,7 +119,7 @@ def applied(operation: str, *operands: Term) -> Term:
 
 
 def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Term) -> Term:
-    """Two polynomials of `r`, the first over the second."""
+    """Make the quotient of two polynomials of `r`."""
     terms = []
     for coefficients in polynomials:
         term = constant(coefficients[0])
@@ -142,7 +142,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Tell if two terms are the same number everywhere: those of + and * may change places."""
+    """Tell if two terms are equal everywhere, up to the order of operands of + and *."""
     known: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -157,7 +157,7 @@ def alike(one: Term, other: Term) -> bool:
 
 
 def number_text(value: float) -> str:
-    """Write a number as a script says it, exactly."""
+    """Format a number exactly in script syntax."""
     return repr(float(value)).removesuffix(".0")
 
 
@@ -170,7 +170,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Tell if a term can be written down, where what is shared is written again and again."""
+    """Tell if a term can be written out with its shared parts repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -180,7 +180,7 @@ def is_short(root: Term) -> bool:
 
 
 def text_of(term: Term) -> str:
-    """Write a term as a script would write it."""
+    """Format a term in script syntax."""
     operation, operands = term.operation, term.operands
     if operation == "number":
         return number_text(term.value)
@@ -199,7 +199,7 @@ def text_of(term: Term) -> str:
 
 
 def _bracketed(term: Term, level: int) -> str:
-    """Write the text of `term`, in parentheses if it binds less than `level`."""
+    """Format `term`, in parentheses if it binds less than `level`."""
     if term.operation == "number":
         own = 7 if math.copysign(1.0, term.value) < 0 else 9
     else:
@@ -209,27 +209,27 @@ def _bracketed(term: Term, level: int) -> str:
 
 # ---- as programs ---------------------------------------------------------------------------------
 #
-# A formula is a graph: a variable that is used twice is one term with two users. Terms with several
-# users are computed first, each into a row of its own; so are operands that would not fit on the
-# stack. What remains are trees without branches that meet again.
+# A formula is a graph: a variable used twice is one term with two users. Terms with several users
+# are computed first, each into a row; so are operands that would not fit on the stack. The rest are
+# trees.
 
-# Levels that are put on the stack without a row between; Python's own stack is spared, too.
+# Depth of the stack without rows in between; limits Python's recursion, too.
 _MOST_LEVELS = 60
 
 
 def program(
     root: Term, place: Callable[[str], tuple[int, int]], *, depth: int | None = None
 ) -> formula.Program:
-    """Write the stack program of a term.
+    """Compile the stack program of a term.
 
-    `place` gives the instruction that pushes a name: GLOBAL or POINT, and where it is. A stack of
-    the given `depth` has no rows behind it; the program keeps nothing then.
+    `place` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With a given
+    `depth` the program stores no rows.
     """
     return _Writer(root, place, depth).program()
 
 
 class _Writer:
-    """One program while it is written: terms by their numbers, equal ones counted as one."""
+    """Compiles one program; equal terms have the same number."""
 
     def __init__(self, root: Term, place: Callable[[str], tuple[int, int]], depth: int | None):
         self.bare = depth is not None
@@ -239,14 +239,14 @@ class _Writer:
         self.uses: list[int] = []
         self.uniform: list[bool] = []
         self.code: list[tuple[int, int]] = []
-        self.constants: dict[str, int] = {}  # in hexadecimal: 0.0 and -0.0 are different numbers
-        self.rows: dict[int, int] = {}  # of terms that are kept now
+        self.constants: dict[str, int] = {}  # by hexadecimal text, because 0.0 and -0.0 differ
+        self.rows: dict[int, int] = {}  # rows of stored terms
         self.free = list(range(formula.MAX_KEPT))[::-1]
         self.root = self._number(root)
         self.kept = self._chosen()
 
     def _number(self, root: Term) -> int:
-        """Give a number to each term; to terms that are alike the same."""
+        """Number all terms; equal terms get the same number."""
         numbers: dict[int, int] = {}
         known: dict[tuple, int] = {}
         for term in in_order(root):
@@ -269,7 +269,7 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """Choose terms to keep: those with several users, and what the stack cannot hold."""
+        """Choose terms to store: those with several users, and what the stack cannot hold."""
         kept = set()
         if not self.bare:
             kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}

@@ -1,4 +1,4 @@
-"""Published values: the numbers that formulas, logs and plots read by name while a scene runs."""
+"""Published values: named numbers that formulas, logs and plots read during a run."""
 
 from collections.abc import Sequence
 
@@ -12,29 +12,29 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Tell whether published values with these suffixes lie one after another, in this order."""
+    """Tell whether values with these suffixes occupy consecutive slots in this order."""
     known = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not known or known == list(range(known[0], known[0] + len(suffixes)))
 
 
 class Values:
-    """Numbers with names, in one array that kernels read and write.
+    """Named numbers in one array that kernels read and write.
 
-    The array is never reallocated, so that whoever holds it sees every change. Slots 0, 1 and 2
-    are time, timestep (the number of the step) and dt.
+    The array is never reallocated, so references to it stay valid. Slots 0, 1 and 2 are time,
+    timestep (the number of the step) and dt.
     """
 
     def __init__(self) -> None:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
-        self._of: dict[str, dict[str, int]] = {}  # slots of the names of an ID
-        self._first: dict[str, int] = {}  # slot of ID_x, whether it has a name or not
+        self._of: dict[str, dict[str, int]] = {}  # slots of names, by ID
+        self._first: dict[str, int] = {}  # slot of ID_x, named or not
         self._used = 0
         for name in ("time", "timestep", "dt"):
             self.publish(name)
 
     def publish(self, name: str, value: float = 0.0) -> int:
-        """Make `name` known with this value; a known name keeps its slot. Returns the slot."""
+        """Publish `name` with this value and return its slot; a known name retains its slot."""
         if name not in self._slots:
             self._slots[name] = self._reserve(1)
         slot = self._slots[name]
@@ -44,9 +44,8 @@ class Values:
     def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES) -> None:
         """Publish the values of a fix or compute: ``ID_x`` for "x" and so on, ``ID`` for "".
 
-        ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` lie in consecutive slots, whether or not all of them
-        have a name; so do other suffixes. Names that the ID had before and `suffixes` leaves out
-        are forgotten.
+        ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` have consecutive slots, named or not; so do other
+        suffixes. Earlier names of the ID that are not in `suffixes` are removed.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
@@ -67,22 +66,22 @@ class Values:
         self._of[ID] = slots
 
     def slot(self, name: str) -> int:
-        """Find the place of `name` in the array (KeyError if it is not published)."""
+        """Return the slot of `name`; KeyError if it is not published."""
         return self._slots[name]
 
     def names(self) -> list[str]:
-        """List every published name, in the order of publication."""
+        """List all published names in order of publication."""
         return list(self._slots)
 
     def __contains__(self, name: object) -> bool:
         return name in self._slots
 
     def get(self, name: str) -> float:
-        """Read the present value of `name` (KeyError if it is not published)."""
+        """Return the present value of `name`; KeyError if it is not published."""
         return float(self.array[self.slot(name)])
 
     def set(self, name: str, value: float) -> None:
-        """Change the value of `name` (KeyError if it is not published)."""
+        """Set the value of `name`; KeyError if it is not published."""
         self.array[self.slot(name)] = value
 
     def _reserve(self, count: int) -> int:
@@ -90,7 +89,7 @@ class Values:
         if first + count > CAPACITY:
             raise ScriptError(
                 f"there are more than {CAPACITY} values of fixes and computes",
-                hint="use the IDs of deleted fixes and computes again: they keep their values",
+                hint="use the IDs of deleted fixes and computes again: they remain in memory",
             )
         self._used += count
         return first

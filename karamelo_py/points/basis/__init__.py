@@ -48,12 +48,6 @@ A basis with point domains lists their stored parts, and thus the initial arrays
 shape
     names of the parts, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
     ``deformation`` (F in 2D or in 3D) and ``corners`` (of its `element`, an
-
-A basis whose points have domains lists what a place keeps of them, and thus the initial arrays:
-
-shape
-    names of its parts, in their order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
-    ``deformation`` (F in the plane or in space) and ``corners`` (of its `element`, an
     :class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 

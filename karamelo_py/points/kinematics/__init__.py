@@ -9,12 +9,11 @@ tag               vector          velocity gradient, F           symmetric tenso
 ``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
 ================  ==============  =============================  =================================
 
-The gradient of a basis function has the components of a vector, and a third, N/r, at an
-axisymmetric point. The tags are empty NamedTuples: kernels are made for each of them, without
-branches. Each has classes of its own, NamedTuples of the components that exist there: an object
-knows where it belongs, and no `kin` is passed on. Kernels are traced: loops, classes and operators
-here are gone when they run. A number times a tensor, added to another one, is rounded once (`fma`):
-a + dt * b.
+The gradient of a basis function has the components of a vector; axisymmetric points add a third,
+N/r. The tags are empty NamedTuples, and kernels are compiled for each of them, without branches.
+Each tag has its own classes, NamedTuples of the components that exist, so objects know their
+kinematics. Kernels are traced: loops, classes and operators here cost nothing at run time. A
+number times a tensor added to another tensor is rounded once (`fma`): a + dt * b.
 """
 
 from collections import namedtuple
@@ -26,14 +25,14 @@ from numba import config
 from karamelo_py.compiler.algebra import algebra
 from karamelo_py.compiler.compile import fma, real
 
-COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice: nothing has to be remembered
+COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 
 
 # --- tags ----------------------------------------------------------------------------------------
 
 
 class Line(NamedTuple):
-    """One dimension: uniaxial strain, the limit that plane strain and space have too."""
+    """One dimension: uniaxial strain."""
 
     word = "1D"
     dimension = 1
@@ -55,8 +54,8 @@ class PlaneStrain(NamedTuple):
 class Axisymmetric(NamedTuple):
     """Two dimensions, x the radius and y the axis: a body of revolution without torsion.
 
-    The gradient of a basis function N at such a point has three components,
-    (dN/dr, dN/dz, N/r): the last makes the strain and the force around the axis.
+    The gradient of a basis function N at such a point has three components, (dN/dr, dN/dz, N/r).
+    The last gives the hoop strain, and the force of the hoop stress.
     """
 
     word = "axisymmetric"
@@ -81,20 +80,20 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 def free_from(kin):
-    """First direction in which a body may move as a whole: no radius is one, a constant."""
+    """First direction along which a body may translate: not the radius."""
     return 1 if isinstance(kin, Axisymmetric) else 0
 
 
 def planar(kin):
-    """The tag whose tensors are plain d x d matrices of the same vectors.
+    """The tag whose tensors are d x d matrices over the same vectors.
 
-    Moments of velocity have no part around the axis: those of axisymmetric points are plane.
+    For velocity moments, which have no hoop component.
     """
     return PlaneStrain() if isinstance(kin, Axisymmetric) else kin
 
 
 def total(terms):
-    """Sum terms, from the first on, as kernels do: `sum` rounds otherwise from Python 3.12 on."""
+    """Sum terms from the first on; `sum` rounds differently from Python 3.12 on."""
     made = terms[0]
     for term in terms[1:]:
         made = made + term
@@ -110,11 +109,11 @@ def product(factors):
 
 
 def dot(*vectors):
-    """sum_k a_k b_k, or of the products of three vectors."""
+    """sum_k a_k b_k, or sum_k a_k b_k c_k."""
     return total([product(components) for components in zip(*vectors, strict=True)])
 
 
-# --- what vectors and tensors share -----------------------------------------------------------
+# --- base of vectors and tensors ---------------------------------------------------------------
 
 
 class Elements(tuple):
@@ -123,22 +122,22 @@ class Elements(tuple):
     Attributes
     ----------
     kin
-        The kinematics that they belong to.
+        The kinematics.
     places
         Row and column of each component (for vectors the direction, twice), from 0.
     axes
-        Rows of components.
+        Indices of rows.
 
-    Tensors have besides:
+    Tensors also have:
 
     acting
-        As `places`, but for the direction that a row acts along: around an axis that is the radius.
+        As `places`, but with the direction that a row acts along: the radius for hoop components.
     rows
-        For each direction, number and column of the components that act along it, the last first.
+        For each direction, index and column of the components that act along it, the last first.
     """
 
     __slots__ = ()
-    __array_ufunc__ = None  # NumPy's numbers leave products to these
+    __array_ufunc__ = None  # products with NumPy numbers are left to these classes
 
     def __add__(self, other):
         if type(other) is Isotropic:
@@ -171,12 +170,12 @@ class Elements(tuple):
         return self._make([-a for a in self])
 
     def with_diagonal(self, p):
-        """Add p I; of p = 0 nothing is left."""
+        """Add p I; nothing is compiled for p = 0."""
         pairs = zip(self, self.places, strict=True)
         return self._make([a + p if i == j else a for a, (i, j) in pairs])
 
     def at(self):
-        """Find components by row and column."""
+        """Map row and column to components."""
         return dict(zip(self.places, self, strict=True))
 
 
@@ -192,21 +191,21 @@ def add_outer(start, a, b):
 
 
 def add_product(start, s, gradient):
-    """v_i + s_ij g_j, rounded once a term (`Matrix.dot`)."""
+    """v_i + s_ij g_j, each term rounded once (`Matrix.dot`)."""
     return s.vector._make(
         [add_row(s, terms, gradient, a) for a, terms in zip(start, s.rows, strict=True)]
     )
 
 
 def add_row(s, terms, gradient, a):
-    """a + s_ij g_j of one row, rounded once a term."""
+    """a + s_ij g_j for one row, each term rounded once."""
     for k, j in terms:
         a = fma(s[k], gradient[j], a)
     return a
 
 
 class Isotropic(namedtuple("Isotropic", "p")):
-    """p I, whatever the number of dimensions."""
+    """p I, in any number of dimensions."""
 
     __slots__ = ()
     __array_ufunc__ = None
@@ -234,12 +233,12 @@ I = Isotropic(1)  # noqa: E741
 
 
 class Vector(Elements):
-    """A vector, or the gradient of a basis function (axisymmetric with N/r behind)."""
+    """A vector, or the gradient of a basis function (axisymmetric: followed by N/r)."""
 
     __slots__ = ()
 
     def planar(self):
-        """Leave out what is around an axis."""
+        """Remove the hoop component."""
         return self if self.vector is type(self) else self.vector._make(self[:2])
 
     def squared(self):
@@ -260,9 +259,9 @@ class Matrix(Elements):
     __slots__ = ()
 
     def dot(self, gradient):
-        """s_ij g_j of a stress and a gradient, rounded once a term.
+        """s_ij g_j of a stress and a gradient, each term rounded once: a nodal force.
 
-        What is around an axis acts along the radius. It is the force of the stress on a node.
+        Hoop components act along the radius.
         """
         made = []
         for (k, j), *rest in self.rows:
@@ -272,12 +271,12 @@ class Matrix(Elements):
         return out
 
     def columns(self):
-        """Take the columns as vectors, without what is around an axis."""
+        """The columns as vectors, without the hoop component."""
         a, d = self.at(), self.kin.dimension
         return tuple([self.vector._make([a[i, j] for i in range(d)]) for j in range(d)])
 
     def diagonal(self):
-        """(t_xx, t_yy, t_zz), as far as vectors go."""
+        """(t_xx, t_yy, t_zz), limited to the directions of vectors."""
         a = self.at()
         return self.vector._make([a[i, i] for i in range(self.kin.dimension)])
 
@@ -307,20 +306,20 @@ class Tensor(Matrix):
         return self._make([a[j, i] for i, j in self.places])
 
     def planar(self):
-        """Leave out what is around an axis."""
+        """Remove the hoop component."""
         made = self.vector.tensor
         return self if made is type(self) else made._make(self[:4])
 
     def generator(self):
-        """Give what strain and turn of this increment, dt grad v, are taken from."""
+        """Return the matrix that gives strain and rotation of this increment, dt grad v."""
         return self
 
     def strain_at_end(self):
-        """Find the strain that adds to a stress which has turned with this small increment."""
+        """Strain whose stress is added after the old stress is rotated, for small increments."""
         return sym(self)
 
     def after(self, dl):
-        """(I + dl) F, as F + dl F: small increments keep their digits."""
+        """(I + dl) F, computed as F + dl F to preserve the digits of small increments."""
         a, b = dl.at(), self.at()
         return self._make(
             [
@@ -329,7 +328,7 @@ class Tensor(Matrix):
             ]
         )
 
-    # Where a kinematics has no component F_ii, F_ii is 1.
+    # If a kinematics has no component F_ii, F_ii is 1.
 
     def left_cauchy_green(self):
         """b = F F^T."""
@@ -344,11 +343,10 @@ class Tensor(Matrix):
     def stretch(self):
         """Right stretch U = sqrt(F^T F), for det F not 0.
 
-        In the plane U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley and Hamilton (Hoger &
-        Carlson 1984, J. Elasticity 14). In space Newton's iteration X <- (g X + X^-T / g) / 2 takes
-        F to its rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, with his
-        scaling by Frobenius norms): right to round-off whether or not principal stretches are
-        equal, which closed forms are not.
+        In 2D U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
+        1984, J. Elasticity 14). In 3D Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
+        rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius
+        norms). Unlike closed forms it is accurate to round-off for equal principal stretches too.
         """
         if self.kin.dimension == 3:
             r = self
@@ -367,7 +365,7 @@ class Tensor(Matrix):
         )
 
     def towards_rotation(self):
-        """Take a step of Newton's iteration to the rotation."""
+        """One step of Newton's iteration to the rotation."""
         back = inv(self)
         g = sqrt(sqrt(total([t * t for t in back]) / total([t * t for t in self])))
         pairs = zip(self, back.transposed(), strict=True)
@@ -387,12 +385,12 @@ class Tensor(Matrix):
 
 
 def further_terms(squared):
-    """tan(x) / x - 1 - x^2 / 3 by the square of x, right to x^8/46."""
+    """tan(x) / x - 1 - x^2 / 3 as a function of x^2, with an error of x^8/46."""
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
-# Round-off is reached after four steps for ratios of principal stretches up to 2, and after seven
-# for whatever the inverse itself can bear.
+# Four steps reach round-off for ratios of principal stretches up to 2, seven for any F that can be
+# inverted.
 POLAR_STEPS = 7
 
 
@@ -412,15 +410,15 @@ def determinant(a, d):
 
 
 def squares(a, axes, i, j):
-    """a_ik a_jk; 1 where there is no such component."""
+    """a_ik a_jk; 1 if there is no such component."""
     terms = [a[i, k] * a[j, k] for k in axes if (i, k) in a and (j, k) in a]
     return total(terms) if len(terms) else 1
 
 
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
-    """dl of a step that may turn a point far, and the logarithm of I + dl.
+    """dl of a step with a large rotation, and the logarithm of I + dl.
 
-    Strain and turn are those of the logarithm: of the constant dt grad v that leads to I + dl.
+    Strain and rotation are those of the logarithm: the constant dt grad v that leads to I + dl.
     """
 
     __slots__ = ()
@@ -429,15 +427,15 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.dl + other
 
     def at(self):
-        """Find components of dl by row and column."""
+        """Map row and column to components of dl."""
         return self.dl.at()
 
     def generator(self):
-        """Give what strain and turn are taken from."""
+        """Return the matrix that gives strain and rotation."""
         return self.logarithm
 
     def strain_at_end(self):
-        """Find the strain by the axes at the end: with what it adds, it turns by half the angle."""
+        """Strain in the axes at the end: the added stress is rotated by half the angle."""
         return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 
@@ -445,11 +443,11 @@ algebra(LargeIncrement)
 
 
 def large(dl):
-    """Find strain and turn of a step that may turn a point far.
+    """Compute strain and rotation of a step with a large rotation.
 
-    ln(I + dl) = 2 artanh(G / 2), by the gradient G = 2 dl (2 I + dl)^-1 in the middle of the step.
-    Of a pure turn G is skew (Hughes & Winget 1980), and so are its odd powers: no strain comes of
-    it, wherever the series ends. It is right to G^7/448.
+    ln(I + dl) = 2 artanh(G / 2) with the midpoint gradient G = 2 dl (2 I + dl)^-1. For a pure
+    rotation G is skew (Hughes & Winget 1980), and so are its odd powers, so that it gives no strain
+    for any truncation. The error is G^7/448.
     """
     G = dl @ inv(I + 0.5 * dl)
     squared = G @ G
@@ -463,7 +461,7 @@ class SymmetricTensor(Matrix):
     __slots__ = ()
 
     def at(self):
-        """Find components by row and column, on both sides of the diagonal."""
+        """Map row and column to components, on both sides of the diagonal."""
         a = dict(zip(self.places, self, strict=True))
         return a | {(j, i): value for (i, j), value in a.items()}
 
@@ -473,12 +471,11 @@ class SymmetricTensor(Matrix):
         return total([self[i] for i in axes]) / len(axes)
 
     def turned(self, dl):
-        """Turn with the increment dl, R s R^T by its rotation R: objective (Jaumann).
+        """Rotate by the increment dl: R s R^T with its rotation R, objective (Jaumann).
 
-        R is the rotation by the vector w = axial(skew(dl)), built by Cayley's formula from
-        tan(|w|/2) ~ |w|/2 (1 + |w|^2/12): orthogonal to round-off, its angle right to |w|^5/120
-        (Hughes & Winget 1980 use tan(|w|/2) ~ |w|/2, right to |w|^3/12). Of a `LargeIncrement` the
-        series has two terms more.
+        R rotates about w = axial(skew(dl)), by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
+        |w|^2/12): orthogonal to round-off, with an angle error of |w|^5/120 (Hughes & Winget 1980
+        use tan(|w|/2) ~ |w|/2, with |w|^3/12). A `LargeIncrement` uses two more terms.
         """
         if self.kin.dimension == 1:
             return self
@@ -496,8 +493,8 @@ class SymmetricTensor(Matrix):
         scale = 1 / (1 + tt)
         cosine = (1 - tt) * scale
         sine = (t + t) * scale
-        # The deviator in the plane turns by twice the angle; written as a change, which is exactly
-        # nothing where nothing turns.
+        # The in-plane deviator rotates by twice the angle; written as a change, which is exactly
+        # zero without rotation.
         double_sine = 2 * sine * cosine
         double_versine = -2 * sine * sine
         apart = 0.5 * (xx - yy)
@@ -549,7 +546,7 @@ class SymmetricTensor(Matrix):
     def nominal(self, F):
         """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress.
 
-        P times the reference volume and the gradient by reference positions makes nodal forces.
+        P times reference volume and reference gradient gives nodal forces.
         """
         if self.kin.dimension == 1:
             return type(F)._make([self[0] / F[0]])
@@ -583,7 +580,7 @@ def _class(kind: type, tag: type, names: tuple) -> type:
 
 
 def _rows(one: type, whole: type) -> None:
-    """Note how the components of tensors act on vectors; `whole` is the class of F."""
+    """Set how the components of tensors act on vectors; `whole` is the class of F."""
     d = one.kin.dimension
     one.acting = tuple((i if i < d else 0, j) for i, j in one.places)
     number = {(j, i): k for k, (i, j) in enumerate(one.places)}
@@ -598,7 +595,7 @@ for _tag in TAGS:
     _tag.Tensor = _class(Tensor, _tag, _tag.tensor_names)
     _tag.Tensor.symmetric = _tag.Symmetric
     if _tag is Axisymmetric:
-        # In the plane vectors are the same.
+        # In 2D the vectors are the same.
         _tag.Vector = PlaneStrain.Vector
         _tag.Gradient = _class(Vector, _tag, ("1", "2", "around"))
         _tag.Gradient.tensor = _tag.Tensor
@@ -612,22 +609,22 @@ for _tag in TAGS:
 
 
 def vector(kin, numbers):
-    """Take numbers as a vector."""
+    """Make a vector of numbers."""
     return kin.Vector._make(numbers)
 
 
 def gradient(kin, numbers):
-    """Take numbers as the gradient of a basis function."""
+    """Make the gradient of a basis function of numbers."""
     return kin.Gradient._make(numbers)
 
 
 def tensor(kin, numbers):
-    """Take numbers as a tensor."""
+    """Make a tensor of numbers."""
     return kin.Tensor._make(numbers)
 
 
 def symmetric_tensor(kin, numbers):
-    """Take numbers as a symmetric tensor."""
+    """Make a symmetric tensor of numbers."""
     return kin.Symmetric._make(numbers)
 
 
@@ -642,7 +639,7 @@ def nothing(kin):
 
 
 def zero(kin, like):
-    """The tensor 0, as numbers of the type of `like` to begin sums in loops with."""
+    """The tensor 0 with numbers of the type of `like`, to start sums in loops."""
     return kin.Tensor._make([real(0, like) for _ in kin.Tensor.places])
 
 
@@ -651,18 +648,18 @@ def zero_vector(kin, like):
     return kin.Vector._make([real(0, like) for _ in kin.Vector.places])
 
 
-# --- as on the blackboard -------------------------------------------------------------------------
+# --- notation of formulas -------------------------------------------------------------------------
 
 
 def det(f):
-    """Determinant; axisymmetric with the stretch around the axis."""
+    """Determinant; axisymmetric with the hoop stretch."""
     a, d = f.at(), f.kin.dimension
     plane = determinant(a, d)
     return plane * a[2, 2] if len(f.axes) > d else plane
 
 
 def inv(f):
-    """F^-1 by the transposed cofactors over the determinant (Cramer), det F not 0."""
+    """F^-1 by transposed cofactors over the determinant (Cramer), det F not 0."""
     a, d = f.at(), f.kin.dimension
     k = 1 / determinant(a, d)
     return f._make(
@@ -702,7 +699,7 @@ def von_mises(s):
 
 
 def outer(a, b):
-    """a_i b_j; of a gradient with N/r also a_r N/r around the axis."""
+    """a_i b_j; for a gradient with N/r also the hoop component a_r N/r."""
     out = b.tensor._make([a[i] * b[j] for i, j in b.tensor.acting])
     if COMPILED:
         out.origin = add_outer, a, b

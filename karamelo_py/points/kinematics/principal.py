@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Find principal values (3,) of a symmetric tensor, in no order, and their directions."""
+    """Compute principal values (3,) of a symmetric tensor, unordered, and their directions."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -21,8 +21,8 @@ def principal(s):
 def from_principal(s, values, directions, slopes=None):
     """Make the symmetric tensor with principal values in directions; of the class of `s`.
 
-    Where each value is a function of that of another tensor, `slopes` (3,) are its derivatives:
-    tensors with equal values need them for their own.
+    If each value is a function of the corresponding value of another tensor, `slopes` (3,) are its
+    derivatives, needed for derivatives at equal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)
@@ -62,14 +62,14 @@ def jacobi_rotation(a, b, c):
     return cosine, t * cosine, t
 
 
-# Each sweep squares what is left off the diagonal.
+# Each sweep squares the off-diagonal remainder.
 _SWEEPS = 8
 
 
 def principal_in_space(s):
     """See `principal`."""
-    # Jacobi's rotations (Golub & Van Loan 2013, section 8.5): directions are right to round-off
-    # whether or not principal values are equal, which closed forms are not.
+    # Jacobi rotations (Golub & Van Loan 2013, section 8.5): unlike closed forms, accurate to
+    # round-off for equal principal values too.
     a, b, c, d, e, f = s
     u, v, w = Space.Vector(1, 0, 0), Space.Vector(0, 1, 0), Space.Vector(0, 0, 1)
     enough = 1e-3 * round_off(a)
@@ -92,18 +92,18 @@ def principal_in_space(s):
 
 
 def rotated(k, g, u, v):
-    """Turn two directions in their plane by the angle with the cosine k and the sine g."""
-    return k * u - g * v, k * v - (-g) * u  # differences: a sum would be rounded once
+    """Rotate two directions in their plane by the angle with cosine k and sine g."""
+    return k * u - g * v, k * v - (-g) * u  # differences, because a sum would be rounded once
 
 
 def real_principal(s):
-    """See `principal`; values that are whole as long as nothing strains are real numbers, too."""
+    """See `principal`; also returns real numbers for values that are integers without strain."""
     values, directions = principal(s)
     return [1.0 * x for x in values], directions
 
 
 def logarithm_of(s):
-    """ln of a symmetric tensor with principal values above 0."""
+    """ln of a symmetric tensor with positive principal values."""
     values, directions = real_principal(s)
     found = tuple([logarithm(x) for x in values])
     return from_principal(s, found, directions, tuple([1 / x for x in values]))
@@ -116,16 +116,16 @@ def exponential_of(s):
     return from_principal(s, found, directions, found)
 
 
-# Jacobi's rotations end where a tensor is diagonal, its slopes need not be. With S' in the frame of
-# the principal directions n, f(S)' = sum_a f_a' n_a n_a
-# + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S' n_b) (n_a n_b + n_b n_a), a < b
-# (Ogden 1997, "Non-linear elastic deformations", section 6.1).
+# Jacobi rotations stop when a tensor is diagonal, which its slopes need not be. With S' in the
+# frame of the principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b)
+# (n_a . S' n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section
+# 6.1).
 
 PAIRS = (0, 1), (0, 2), (1, 2)
 
 
 class TurningFrame(NamedTuple):
-    """Directions, and what turns them."""
+    """Directions, and the derivatives that rotate them."""
 
     directions: Any
     shears: tuple  # n_a . S' n_b of the pairs of directions, for each slope
@@ -133,7 +133,7 @@ class TurningFrame(NamedTuple):
 
 
 def in_frame(s, directions):
-    """Find components of a tensor in a frame: (3,) of the diagonal, and those of the pairs."""
+    """Components of a tensor in a frame: (3,) of the diagonal, and of the pairs."""
     if s.kin.dimension == 2:
         k, g = directions
         apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
@@ -163,7 +163,7 @@ def out_of_frame(s, diagonal, shears, directions):
 
 
 def columns(numbers, n):
-    """Give the `n` slopes of numbers: for each a tuple of theirs."""
+    """Return the `n` slopes of numbers, each as a tuple."""
     return list(zip(*[slopes_of(x, n) for x in numbers], strict=True))
 
 
@@ -179,7 +179,7 @@ def _principal_slopes(s):
     return tuple(made), TurningFrame(directions, tuple([t[1] for t in turned]), tuple(apart))
 
 
-# Of values that differ by a smaller share quotients of differences are worse than mean slopes.
+# For values closer than this fraction, mean slopes are more accurate than quotients of differences.
 ALIKE = 1e-5
 
 
@@ -187,7 +187,7 @@ def turning_ratios(values, directions, slopes):
     """(f_a - f_b) / (s_a - s_b) of the pairs of principal values."""
     ratios = []
     for (a, b), apart in zip(PAIRS, directions.apart, strict=False):
-        if slopes is None:  # equal principal values stay equal: both lie on an edge, or at the apex
+        if slopes is None:  # equal principal values stay equal, at an edge or the apex
             alike, limit = apart == 0, 0
         else:
             limit = 0.5 * (slopes[a] + slopes[b])

@@ -1,4 +1,4 @@
-"""Skins of bodies: shells of triangles from files, and the outer faces of a mesh."""
+"""Skins of bodies: triangle shells from files, and outer faces of meshes."""
 
 import numpy as np
 
@@ -7,17 +7,17 @@ from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Vertices this close (of the size of the surface) are the same one, written with few digits.
+# Vertices this close (relative to the size of the surface) are the same, written with few digits.
 _WELD = 1e-6
-_SAMPLES = 4000  # places on a shell that tell whether it lies in another one
-_SETS = 8  # of shells of which none overlap, at most
+_SAMPLES = 4000  # positions on a shell for testing whether it lies in another
+_SETS = 8  # of shells that do not overlap, at most
 
 
 class Skin:
-    """Surface of a body: sets of `faces` (m, d, d), each of which is closed.
+    """Surface of a body: sets of `faces` (m, d, d), each of them closed.
 
-    A position is in the body if one of the sets encloses it, or within the `tolerance` of a face.
-    Faces of an `open` skin enclose nothing.
+    A position is in the body if one of the sets encloses it, or within `tolerance` of a face. An
+    `open` skin encloses nothing.
     """
 
     def __init__(
@@ -25,27 +25,27 @@ class Skin:
     ):
         self.tolerance, self.open = tolerance, open
         self.surfaces: list[Surface] = [surface_of(faces, tolerance, odd=odd) for faces in sets]
-        # (length, area) of what it encloses; not known where sets may overlap
+        # Enclosed length or area or volume; unknown if sets may overlap.
         self.volume = None if open or odd or len(sets) > 1 else float(abs(_volumes(sets[0]).sum()))
 
     @property
     def faces(self) -> np.ndarray:
-        """(m, d, d) corners of all faces."""
+        """Corners of all faces (m, d, d)."""
         return np.concatenate([surface.faces for surface in self.surfaces])
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return how deep positions (n, >= d) lie in the body, below 0 outside, `reach` at most."""
+        """Return the depth of positions (n, >= d) in the body, negative outside, up to `reach`."""
         if self.open:
             return -np.minimum.reduce([distances(surface, x, reach) for surface in self.surfaces])
         return np.maximum.reduce([depths(surface, x, reach) for surface in self.surfaces])
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions (n, >= d) belong to the body, its faces included: (n,) bool."""
+        """Test which positions (n, >= d) are in the body or on its faces: (n,) bool."""
         return self.depth(np.asarray(x), 2 * self.tolerance) >= -self.tolerance
 
 
 def _volumes(faces: np.ndarray) -> np.ndarray:
-    """Volumes (m,) below faces (m, d, d), whose sum is what they enclose."""
+    """Signed volumes (m,) below faces (m, d, d), which sum to the enclosed volume."""
     d = faces.shape[2]
     if d == 1:
         return faces[:, 0, 0] * np.where(np.arange(len(faces)) % 2, 1, -1)
@@ -57,7 +57,7 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Faces (m, d, d) that belong to one only of the elements; of solid ones seen from outside.
+    """Return the faces (m, d, d) that belong to one element only, oriented outwards.
 
     Faces with four corners are split along the diagonal from the lowest node number, so that
     neighbours agree and leave no gap. In 1D they come in pairs, the lower one first.
@@ -81,7 +81,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Elements of lower dimension as simplices (m, d, d), a line in 3D as a triangle."""
+    """Convert elements of lower dimension to simplices (m, d, d); a line in 3D is a triangle."""
     found: list[np.ndarray] = []
     for part in parts:
         corners, d = part.corners, part.corners.shape[2]
@@ -91,7 +91,7 @@ def flat_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def _once(rows: np.ndarray) -> np.ndarray:
-    """Numbers of the rows (n, k) that are there an odd number of times, ascending."""
+    """Return the rows (n, k) that occur an odd number of times, as ascending indices."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     begin = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
@@ -100,7 +100,7 @@ def _once(rows: np.ndarray) -> np.ndarray:
 
 
 def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
-    """The two triangles of quadrilaterals (n, 4, d), cut from the corner of lowest `rank`."""
+    """Split quadrilaterals (n, 4, d) into triangles from the corner of lowest `rank`."""
     order = (np.argmin(rank, axis=1)[:, None] + np.arange(4)) % 4
     turned = np.take_along_axis(corners, order[:, :, None], axis=1)
     return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
@@ -110,7 +110,7 @@ def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
 
 
 def triangles_of(mesh: Mesh) -> np.ndarray:
-    """Triangles (m, 3) of a surface; a quadrilateral becomes two, within its outline."""
+    """Return the triangles (m, 3) of a surface; quadrilaterals are split inside their outline."""
     found = [np.empty((0, 3), np.int64)]
     for cells in mesh.cells:
         nodes = cells.nodes
@@ -125,13 +125,13 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 
 
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
-    """Make the skin of a body of closed shells: `points` (n, 3), `triangles` (m, 3) of them.
+    """Make the skin of a body from closed shells: `points` (n, 3), `triangles` (m, 3) of them.
 
-    A shell that lies in another one is a cavity, whichever side its triangles show. Shells that
-    overlap are one body. An edge that belongs to an odd number of triangles is an error.
+    A shell inside another is a cavity, whatever its orientation. Overlapping shells form one body.
+    An edge with an odd number of triangles is an error.
     """
     triangles = _closed(points, triangles)
-    for sided in (True, False):  # as the file has them; else turned so that neighbours agree
+    for sided in (True, False):  # oriented as in the file; else reoriented consistently
         some = _single(triangles, sided=sided)
         some = some if sided else _turned(some)
         edge, way = _edges(some)
@@ -152,7 +152,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
     within = _within(shells, lo, hi, tolerance)
     depth = within.sum(axis=1)
     shells = [s[:, ::-1] if n % 2 else s for s, n in zip(shells, depth, strict=True)]
-    # What a shell is in, it goes with; outermost ones go apart where their boxes overlap.
+    # A shell joins the set of the shell around it; outermost ones are separated if boxes overlap.
     sets: list[list[int]] = []
     for outer in np.flatnonzero(depth == 0):
         own = [outer, *np.flatnonzero(within[:, outer])]
@@ -167,7 +167,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The triangles with equal vertices numbered alike; an error if the surface is open."""
+    """Merge equal vertices of triangles; raise an error if the surface is open."""
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
@@ -194,19 +194,19 @@ def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (3 m,) of triangles: lower and higher number, and 1 or -1 by their direction."""
+    """Edges (3 m,) of triangles: lower and higher vertex, and 1 or -1 for the direction."""
     a, b = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     return np.minimum(a, b), np.maximum(a, b), np.where(a < b, 1, -1)
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number the edges (3 m,) of triangles, alike where they are; 1 or -1 by their direction."""
+    """Number the edges (3 m,) of triangles, equal ones alike; 1 or -1 for the direction."""
     low, high, way = _ends(triangles)
     return np.unique(low * (triangles.max() + 1) + high, return_inverse=True)[1].ravel(), way
 
 
 def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Leave one of triangles that coincide, and none where two shells meet in them."""
+    """Keep one of several equal triangles, and none where two shells touch."""
     same = np.sort(triangles, axis=1)
     order = np.lexsort(same.T)
     begin = np.flatnonzero(np.r_[True, (np.diff(same[order], axis=0) != 0).any(axis=1)])
@@ -219,7 +219,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Turn triangles so that two at an edge go through it in opposite directions."""
+    """Reorient triangles so that two at an edge run through it in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -245,9 +245,9 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Numbers (m,) of the shells that triangles belong to, which have edges (3 m,) in common.
+    """Number the shells (m,) that triangles belong to, connected by edges (3 m,).
 
-    Where triangles of a file have no sides, edges of two of them alone.
+    If the triangles are not oriented, only edges of two triangles connect.
     """
     edges = np.ascontiguousarray(edge.reshape(3, -1).T)
     if not sided:
@@ -267,7 +267,7 @@ def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
 def _within(
     shells: list[np.ndarray], lo: np.ndarray, hi: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """Tell of each shell whether it lies wholly in each other one: (n, n) bool."""
+    """Tell which shells lie completely inside which others: (n, n) bool."""
     n = len(shells)
     within = np.zeros((n, n), bool)
     for k in range(n):
@@ -282,7 +282,7 @@ def _within(
 
 
 def _sample(faces: np.ndarray) -> np.ndarray:
-    """Places (n, 3) on triangles: corners, and along edges."""
+    """Return positions (n, 3) on triangles: corners, and along edges."""
     some = faces[:: max(1, 21 * len(faces) // _SAMPLES)]
     part = np.linspace(0, 1, 8)[:-1, None, None, None]
     return ((1 - part) * some + part * np.roll(some, -1, axis=1)).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Surfaces in files of Wavefront (.obj): faces with any number of corners, with textures or not."""
+"""Reader of Wavefront files (.obj): polygons, with or without textures."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def read_obj(path: Path) -> Mesh:
-    """Read triangles and quadrilaterals, others in triangles; objects and groups are sets."""
+    """Read faces, with polygons split into triangles; objects and groups become sets."""
     points: list[list[float]] = []
     faces: dict[int, list[list[int]]] = {3: [], 4: []}
     owners: dict[int, list[tuple[str, ...]]] = {3: [], 4: []}
@@ -24,7 +24,7 @@ def read_obj(path: Path) -> Mesh:
             elif word in names:
                 names[word] = tuple(rest)
             elif word == "f":
-                # Texture and normal follow a slash; numbers below 0 count from the last vertex.
+                # Texture and normal follow a slash; negative numbers count from the last vertex.
                 corners = [int(item.split("/", 1)[0]) for item in rest]
                 corners = [k - 1 if k > 0 else len(points) + k for k in corners]
                 if min(corners) < 0 or max(corners) >= len(points):
@@ -47,7 +47,7 @@ def read_obj(path: Path) -> Mesh:
 
 
 def _split(points: list[list[float]], corners: list[int]) -> list[list[int]]:
-    """Triangles around a corner of a polygon from which all of it is seen."""
+    """Split a polygon into triangles around a corner from which all of it is visible."""
     count = len(corners)
     for start in range(count):
         fan = [
@@ -58,4 +58,4 @@ def _split(points: list[list[float]], corners: list[int]) -> list[list[int]]:
         normals = np.cross(b - a, c - a)
         if (normals @ normals.sum(axis=0) >= 0).all():
             return fan
-    raise ValueError("a face whose outline turns inwards in several places: export it in triangles")
+    raise ValueError("a face that is concave in several places: export it as triangles")

@@ -1,7 +1,7 @@
-"""The one door for meshes from files: which reader takes a file, and what it must return.
+"""Entry point for mesh files: chooses the reader.
 
-Gmsh reads its own files, MED and UNV, and meshes geometries; decks of Abaqus have a reader here;
-meshio reads the rest, and Gmsh's files where Gmsh's library cannot be loaded.
+Gmsh reads its own formats, MED and UNV, and meshes geometries; Abaqus decks have a reader here;
+meshio reads the rest, and Gmsh's formats if Gmsh's library is missing.
 """
 
 import contextlib
@@ -26,11 +26,11 @@ from karamelo_py.script.errors import FAILURES, ScriptError
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 _BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas")
-# What Gmsh's own files begin with; other text it would take for its language of geometries.
+# First bytes of Gmsh's formats; Gmsh takes other text for its geometry language.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
-_BY_ENDING = (".unv", ".bdf", ".nas")  # of which Gmsh asks no more
+_BY_ENDING = (".unv", ".bdf", ".nas")  # Gmsh recognises these by ending
 _MED = b"\x89HDF"
-# Files of other programs under an ending that meshes have: how they begin, and what to do.
+# Files of other programs with endings used by meshes: their first bytes, and advice.
 _FOREIGN = (
     (re.compile(rb"\s*MFEM"), "a mesh of MFEM", "in MFEM, write it as .vtu or .msh"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
@@ -42,15 +42,15 @@ _FOREIGN = (
 
 
 class MeshFile(InputFile):
-    """For signatures: a file that `read` can read, by its ending."""
+    """Annotation: a file that `read` can read, judged by its ending."""
 
     endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH} - {".svg"}
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
-    """The mesh in a file; a geometry is meshed up to `dimension`, a CAD file by edges of `size`.
+    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`.
 
-    A `trusted` geometry may run commands of the system and write files.
+    A `trusted` geometry may run system commands and write files.
     """
     status = path.stat()
     if not status.st_size:
@@ -59,7 +59,7 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
         )
     if path.suffix.lower() in GEOMETRIES:
         refuse_commands(path, trusted=trusted)
-    # Regions and solids often come from the same file.
+    # Cached, because regions and solids often use the same file.
     cad = path.suffix.lower() in CAD
     return _read(
         path.resolve(), dimension, size if cad else None, (status.st_mtime_ns, status.st_size)
@@ -68,7 +68,7 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
 
 @lru_cache(maxsize=2)
 def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int]) -> Mesh:
-    if path.suffix.lower() in GEOMETRIES:  # it may include its neighbours
+    if path.suffix.lower() in GEOMETRIES:  # it may include other files
         mesh = mesh_geometry(path, dimension, size)
     elif path.suffix.lower() in CAD:
         _refuse_what_is_no_cad(path)
@@ -92,7 +92,7 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
 
 
 def _refuse_what_is_no_cad(path: Path) -> None:
-    """Refuse a file that is not what its ending says: the library of CAD would print on its own."""
+    """Refuse a file whose content does not match its CAD ending: the library would print."""
     with path.open("rb") as file:
         begin = file.read(1024)
     right = {
@@ -105,7 +105,7 @@ def _refuse_what_is_no_cad(path: Path) -> None:
 
 
 def _by_content(path: Path) -> Mesh:
-    """Let the reader take the file that its first bytes name, else the one of its ending."""
+    """Choose the reader by the first bytes, else by the ending."""
     with path.open("rb") as file:
         begin = file.read(4096)
     ending = path.suffix.lower()
@@ -132,7 +132,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _refuse_systems(path: Path) -> None:
-    """Refuse nodes of Nastran in a coordinate system of their own, which no reader here turns."""
+    """Refuse Nastran nodes in local coordinate systems, which no reader supports."""
     with path.open(errors="replace") as file:
         for number, line in enumerate(file, 1):
             if line[:4].upper() == "GRID":
@@ -158,13 +158,13 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
 
 
 def _by_meshio(path: Path, file_format: str | None = None, why: str | None = None) -> Mesh:
-    # Pixels and voxels of VTK, which meshio knows by half.
+    # VTK's pixels and voxels, which meshio supports only in part.
     for number, name, count, dimension in ((8, "pixel", 4, 2), (11, "voxel", 8, 3)):
         meshio._common.num_nodes_per_cell.setdefault(name, count)
         meshio._mesh.topological_dimension.setdefault(name, dimension)
         meshio._vtk_common.vtk_to_meshio_type.setdefault(number, name)
     try:
-        # It prints what it has to say, and ends the process where no format fits.
+        # meshio prints messages, and ends the process if no format fits.
         with (
             contextlib.redirect_stdout(io.StringIO()),
             contextlib.redirect_stderr(io.StringIO()),
@@ -183,7 +183,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Named sets of elements, and numbers that elements have, as ``name`` and ``name:number``."""
+    """Yield named sets of elements, and integer tags as ``name`` and ``name:number``."""
     for name, held in mesh.cell_sets.items():
         if not name.startswith("gmsh:"):
             yield (
@@ -205,7 +205,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
             yield f"{name}:{number}", masks
             if len(tags) == 1 or name == "gmsh:physical":
                 yield str(number), masks
-            for group in getattr(mesh, "cell_tags", {}).get(int(number), ()):  # of MED
+            for group in getattr(mesh, "cell_tags", {}).get(int(number), ()):  # from MED
                 yield group, masks
     for name, (number, dimension) in mesh.field_data.items():
         arrays = tags.get("gmsh:physical", [])
@@ -220,7 +220,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
 
 
 def _reason(error: BaseException) -> str:
-    """Word an exception in one line; where no format fits, meshio says so only in passing."""
+    """Return an exception as one line; meshio hides the fact that no format fits."""
     said = str(error).strip()
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:
