@@ -25,7 +25,6 @@ STYLES = {
 # Lines that must be refused, after a domain in 2D.
 LINES = {
     "periodic": "boundary(periodic)",
-    "plane stress": "plane_stress(true)",
     "torsion": "axisymmetric(true, twist=true)",
     "grids refined": "refine_grid(0.05)",
 }

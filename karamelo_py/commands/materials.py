@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
+from karamelo_py.commands.thin import fit_to_domain
 from karamelo_py.language import registry
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
@@ -11,6 +12,7 @@ from karamelo_py.language.unknown import check_ID, longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.doubts import doubts
+from karamelo_py.points.laws.thin import ThinInLargeIncrements
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.run.lower.check_plugins import try_law
 from karamelo_py.scene.hub import Catalogue, Hub
@@ -52,7 +54,7 @@ def judge(hub: Hub, made: Material) -> None:
     """Test the law of a plug-in, and warn of values that hardly any material has."""
     try_law(hub, made)
     with attributed(hub):
-        for what, hint in doubts(made.law):
+        for what, hint in doubts(made.whole):
             hub.warn(f"material '{made.id}': {what}", hint=hint)
 
 
@@ -124,6 +126,8 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     given: dict = {}
     made = style_of(hub, kind, ID, style, arguments, given)
     entry = (Material if kind == "material" else MaterialPart)(kind, style, made, given)
+    if isinstance(entry, Material):
+        fit_to_domain(hub, entry)
     check_columns(hub, f"{kind} {style}", entry.law)
     catalogue.add(ID, entry)
 
@@ -225,7 +229,9 @@ def element(
     material: Material,
     first: LoadPath,
     *more: LoadPath,
-    kinematics: Literal["3D", "plane-strain", "axisymmetric", "1D"] = "3D",
+    kinematics: Literal[
+        "3D", "plane-strain", "plane-stress", "axisymmetric", "1D", "uniaxial-stress"
+    ] = "3D",
     tangent: bool = False,
 ) -> None:
     """Take one point of a material along a load path, to check its law before a run.
@@ -244,7 +250,8 @@ def element(
         IDs of load paths, in order. A path may be repeated.
     kinematics
         Which strains are possible: ``3D``; ``plane-strain`` (none out of the plane xy);
-        ``axisymmetric`` (x the radius, y the axis, z around it); ``1D`` (exx only).
+        ``plane-stress`` (no stress szz); ``axisymmetric`` (x the radius, y the axis, z around it);
+        ``1D`` (exx only); ``uniaxial-stress`` (stress sxx only).
     tangent
         Whether to print the tangent of the last increment: derivatives of the Cauchy stress with
         respect to strains and angles of shear. The angles are twice the tensor strains.
@@ -281,7 +288,11 @@ def element(
             argument="material",
             expected="a material that deforms",
         )
-    point = Point(material.law, KINEMATICS[kinematics])
+    law, kin = material.whole, KINEMATICS.get(kinematics)
+    if kin is None:
+        law = ThinInLargeIncrements(law)
+        kin = PlaneStrain() if kinematics == "plane-stress" else Line()
+    point = Point(law, kin)
     paths = (first, *more)
     for number, path in enumerate(paths):
         _check_components(path, point, kinematics, number)

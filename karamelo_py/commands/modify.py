@@ -3,6 +3,7 @@
 from typing import Any
 
 from karamelo_py.commands.materials import judge
+from karamelo_py.commands.thin import fit_to_domain
 from karamelo_py.language import registry
 from karamelo_py.language.signature import Argument, parameters, remade
 from karamelo_py.points.kinematics import Space
@@ -107,6 +108,8 @@ def _names(part: MaterialPart) -> set[str]:
 def _changed(hub: Hub, entry: MaterialPart, given: dict, numbers: tuple) -> MaterialPart:
     made, given = remade(hub, entry.kind, entry.id, entry.style, given, numbers)
     after = type(entry)(entry.kind, entry.style, made, given)
+    if isinstance(after, Material):
+        fit_to_domain(hub, after)
     after.id, after.place = entry.id, entry.place
     return after
 

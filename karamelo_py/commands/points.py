@@ -187,7 +187,7 @@ def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
 
 def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
     """The initial state of the points of a solid that are `kept`."""
-    volume = solid.volume0 / solid.x0[:, 0] if solid.domain.axisymmetric else solid.volume0
+    volume = solid.volume0 / solid.domain.depth(solid.x0[:])
     return Placement(
         x0=solid.x0[kept],
         volume=volume[kept],

@@ -141,7 +141,7 @@ def yields(law: Any) -> bool:
 def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
     """List the solids that may vibrate, with their motions."""
     solids = list(s.hub.solids.values())
-    bodies = [(one, solids[one.number].material.law) for one in s.motions if s.waves > 0]
+    bodies = [(one, solids[one.number].material.whole) for one in s.motions if s.waves > 0]
     return [(one, law) for one, law in bodies if rings(law)]
 
 
@@ -281,7 +281,7 @@ def pressed_evenly(s: Any, one: BodyMotion) -> bool:
     It then fills a box. Each plate holds all nodes of one side in the direction across it.
     """
     lattice, solid = lattice_at(s, one), list(s.hub.solids.values())[one.number]
-    box = sides(one, solid).prod()
+    box = sides(one, solid).prod() * s.hub.domain.thickness
     if s.hub.domain.axisymmetric or np.sum(solid.volume0) < (1 - 1e-6) * box:
         return False
     pressed = set()

@@ -99,7 +99,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     hoop = None
     if radius is not None:
         hoop = np.stack([weight(k)[near] / radius[near] for k in pairs], 1)
-    shear = _shear_share(law_on(solid.material.law, solid.h, solid.T0), kin)
+    shear = _shear_share(law_on(solid.material.whole, solid.h, solid.T0), kin)
     root = np.sqrt(mass[seen])
     root[root == 0] = inf
 

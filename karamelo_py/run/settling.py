@@ -41,7 +41,7 @@ def expected(scene: Any) -> Settling:
     for one in scene.motions if g[k] else ():
         solid = solids[one.number]
         c = timestep.elastic_speed(scene.simulation, solid)[0]
-        if yields(solid.material.law) or not (c > 0 and _clamped(scene, one, k)):
+        if yields(solid.material.whole) or not (c > 0 and _clamped(scene, one, k)):
             continue
         length = float(sides(one, solid)[k])
         carried = sum(other.mass for other in scene.motions if _rests(other, one, g, k, solid.h))

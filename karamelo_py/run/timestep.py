@@ -77,7 +77,7 @@ def _keeps_velocities(hub: Hub) -> bool:
 
 
 def _deforming(hub: Hub) -> list[Any]:
-    laws = [solid.material.law for solid in hub.solids.values()]
+    laws = [solid.material.whole for solid in hub.solids.values()]
     return [law for law in laws if not can(law, constrained_velocity)]
 
 
@@ -362,7 +362,7 @@ def fastest_wave(simulation: Any) -> float:
 
 def elastic_speed(simulation: Any, solid: Any) -> tuple[float, bool]:
     """Find the fastest wave of an undeformed solid without viscosity, and whether it is viscous."""
-    law, viscous = law_on(solid.material.law, solid.h, solid.T0), False
+    law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
     if not isinstance(getattr(law, "viscosity", Absent()), Absent):
         law, viscous = law._replace(viscosity=Absent()), True
     if getattr(getattr(law, "strength", None), "mu", 0) > 0:

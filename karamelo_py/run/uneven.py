@@ -40,7 +40,7 @@ def expected(scene: Any) -> Uneven:
     if not (scene.moves and scene.linear and scene.waves > 0 and lasting):
         return most
     solids = list(scene.hub.solids.values())
-    bodies = [one for one in scene.motions if rings(solids[one.number].material.law)]
+    bodies = [one for one in scene.motions if rings(solids[one.number].material.whole)]
     if not bodies:
         return most
     own = [solids[one.number] for one in bodies]

@@ -19,6 +19,8 @@ class Domain:
     """
 
     axisymmetric = False  # x is a radius and y the axis
+    thin = False  # no stress across the body: plane stress, or uniaxial stress in 1D
+    thickness = 1.0  # of the body in 2D, its cross-section in 1D
     place: Place | None = None
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
@@ -39,6 +41,13 @@ class Domain:
         """Distance from a face within which a point lies on it."""
         size = self.h if self.h is not None else float((self.hi - self.lo).max()) * 1e-3
         return RELATIVE_TOLERANCE * size
+
+    def depth(self, x: np.ndarray) -> np.ndarray | float:
+        """Extent of the body out of its plane at positions `x` (n, d): the radius, or a thickness.
+
+        Volumes and areas in 2D and 1D have it as a factor. A radius stands for one radian.
+        """
+        return x[:, 0].astype(float) if self.axisymmetric else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         """Test which positions `x` (n, >= dimension) lie in the closed box: (n,) bool."""

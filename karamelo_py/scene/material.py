@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import Named
+from karamelo_py.points.laws.thin import Thin
 
 
 class MaterialPart(Named):
@@ -36,13 +37,24 @@ class Material(MaterialPart):
 
     script_kind = "the ID of a material"
     catalogue = "materials"
+    thin = False  # its bodies bear no stress across
+
+    @property
+    def whole(self) -> NamedTuple:
+        """The law in three dimensions."""
+        return self.laws[self.kind]
+
+    @property
+    def law(self) -> NamedTuple:
+        """The law that the points of its bodies have."""
+        return Thin(self.whole) if self.thin else self.whole
 
     @property
     def words(self) -> str:
         """ID, style, and the styles of its parts: ``steel (eos-strength: linear, plastic)``."""
         styles = [
             registry.name_of(kind, type(part))
-            for kind, part in zip(self.law._fields, self.law, strict=True)
+            for kind, part in zip(self.whole._fields, self.whole, strict=True)
             if isinstance(part, tuple) and part and registry.names(kind)
         ]
         parts = ", ".join(styles)

@@ -79,7 +79,7 @@ class Solid(Named):
                 "eos-strength",
             )
         T0 = self.T0 if can(self.material.law, initial_heat) else None
-        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.law), default=math.inf)
+        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.whole), default=math.inf)
         if T0 is not None and T0 < 0:
             hub.warn(
                 f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
@@ -128,6 +128,8 @@ class Solid(Named):
                     expected=f"a {self.described().split()[0]} at x >= 0",
                 )
             volume = volume * radius
+        elif self.domain.thin:
+            volume = volume * self.domain.thickness
         # As in `Placement`, but volumes are per radian if axisymmetric. Equal values are stored
         # once. All arrays are read-only.
         self.places = placement.x0

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import sys
 from collections import namedtuple
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
@@ -43,6 +43,14 @@ def law_kind(law: NamedTuple) -> tuple[type, ...]:
     """
     parts = [law_kind(part) for part in law if isinstance(part, tuple)]
     return type(law), *(kind for part in parts for kind in part)
+
+
+def law_parts(law: tuple) -> Iterator[tuple]:
+    """The law and all its parts."""
+    yield law
+    for part in law:
+        if isinstance(part, tuple):
+            yield from law_parts(part)
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
@@ -70,8 +78,16 @@ def column(part: type, name: str, what: Callable | NamedTuple) -> None:
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
     """The output columns of a law, those from its parts first: name, and tag for `shown`."""
-    kinds = reversed(law_kind(law))
-    return {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
+    own = _columns.get(type(law), {})
+    kinds = reversed(law_kind(law)[1:])
+    found = {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
+    return {name: of_part(law, what) for name, what in found.items()} | own
+
+
+@point_function(otherwise=True)
+def of_part(law, what):
+    """The tag by which `law` shows the column `what` of one of its parts."""
+    return what
 
 
 @point_function()
@@ -143,6 +159,12 @@ def wave_speed_squared(law, kin, state):
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
     """Upper bound of `wave_speed_squared`, if that is cheaper: most points are slower anyway."""
+    return wave_speed_squared(law, kin, state)
+
+
+@point_function(otherwise=True)
+def shear_part(law, kin, state):
+    """The part 2 G / rho of `wave_speed_squared`, or more: thin bodies have slower waves."""
     return wave_speed_squared(law, kin, state)
 
 

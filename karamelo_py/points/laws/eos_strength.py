@@ -474,6 +474,12 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     return damped(squared, viscous)
 
 
+@laws.shear_part.on(EosStrength)
+def _shear_part_eos_strength(law, kin, state):
+    shear = 2 * strengths.shear_modulus(law.strength) * borne_share(law, state.m.damage)
+    return shear * laws.specific_volume(law.eos) * state.J
+
+
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
     """Return the energy released by unloading at this temperature, without plastic work."""

@@ -115,6 +115,11 @@ def _wave_speed_squared_linear_elastic(law, kin, state):
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
+@laws.shear_part.on(LinearElastic)
+def _shear_part_linear_elastic(law, kin, state):
+    return 2 * law.G * law.specific_volume * state.J
+
+
 @laws.elastic_strain.on(LinearElastic)
 def _elastic_strain_linear_elastic(law, kin, state):
     # Hooke's law is isotropic and rotates with the point, so the strain follows from the stress.

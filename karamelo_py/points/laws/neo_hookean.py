@@ -67,6 +67,11 @@ def _wave_speed_bound_neo_hookean(law, kin, state):
     return speed_squared(law, state.F, max(law.lam / J, -law.lam * J * exp(-2)))
 
 
+@laws.shear_part.on(NeoHookean)
+def _shear_part_neo_hookean(law, kin, state):
+    return speed_squared(law, state.F, 0)
+
+
 def speed_squared(law, F, bulk):
     stretch = F.left_cauchy_green().largest_row_sum()
     return (law.G * (1 + stretch) + max(bulk, 0)) * law.specific_volume

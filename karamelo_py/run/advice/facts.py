@@ -12,7 +12,7 @@ import numpy as np
 
 from karamelo_py.language import registry, rules
 from karamelo_py.points import transfers
-from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws import can, constrained_velocity, law_parts
 from karamelo_py.run import settling, timestep, uneven
 from karamelo_py.run.body_motion import (
     BodyMotion,
@@ -67,7 +67,7 @@ class SceneFacts:
         self.linear = jumps and self.basis.nodes_per_cell == 1
         solids = hub.solids.values()
         # Whether laws store all work, and sustain tension.
-        self.elastic = [s for s in solids if getattr(s.material.law, "rebounds", False)]
+        self.elastic = [s for s in solids if getattr(s.material.whole, "rebounds", False)]
         # About one point per cell and direction.
         self.single = [s.id for s in solids if timestep.one_a_cell(s)]
         self.sparse = bool(self.single)
@@ -329,10 +329,3 @@ def script_text(hub: Hub) -> str:
 def is_zero(formula: Any) -> bool:
     """Tell whether a formula is not given, or always 0."""
     return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
-
-
-def law_parts(law: Any) -> Iterator[Any]:
-    yield law
-    for part in law:
-        if isinstance(part, tuple):
-            yield from law_parts(part)

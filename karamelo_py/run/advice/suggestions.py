@@ -75,7 +75,7 @@ def _averaging(hub: Hub, simulation: Any) -> Words:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
-        law = solid.material.law
+        law = solid.material.whole
         moduli = (getattr(law, "lam", None), getattr(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return

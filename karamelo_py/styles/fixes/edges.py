@@ -56,8 +56,7 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
             rows = np.flatnonzero(inside & ~region.inside(x0 + 2 * half * out))
             middle = x0[rows] + half[rows] * out
             area = np.delete(2 * half[rows], axis, axis=1).prod(axis=1)
-            if hub.domain.axisymmetric:
-                area = area * middle[:, 0]
+            area = area * hub.domain.depth(middle)
             ones = np.ones(len(rows), np.int64)
             found.append(Faces(ids[rows], axis * ones, sign * ones, area, middle))
     return joined(found)
@@ -156,18 +155,18 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     for axis in range(d):
         some = np.flatnonzero(np.abs(pieces.area[:, axis]) > least)
         of_axis, place = pieces.area[some, axis], pieces.middle[some]
-        radius = place[:, 0] if solid.domain.axisymmetric else 1.0
+        depth = solid.domain.depth(place)
         signs, axes = np.sign(of_axis).astype(np.int64), np.full(len(some), axis)
-        found.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * radius, place))
+        found.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * depth, place))
     return joined(found)
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     """Find the surface of a region at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
-    radius = pieces.middle[:, 0] if solid.domain.axisymmetric else 1.0
     none = np.zeros(len(pieces.point), np.int64)
-    return Faces(pieces.point, none, none, pieces.length * radius, pieces.middle)
+    area = pieces.length * solid.domain.depth(pieces.middle)
+    return Faces(pieces.point, none, none, area, pieces.middle)
 
 
 class OnEdge(Fix):

@@ -158,8 +158,8 @@ class FacesOfPoints(HeatFix):
         area = 0.0
         for ids in self.group.pieces():
             volume, x = volumes_before(hub, ids), places_before(hub, ids)
-            round_ = hub.domain.axisymmetric
-            area += float((np.sqrt(volume * x[:, 0]) if round_ else volume ** (1 - 1 / d)).sum())
+            depth = hub.domain.depth(x)
+            area += float((depth * (volume / depth) ** (1 - 1 / d)).sum())
         per = {2: " per thickness", 3: ""}[d]
         words = (
             f"fix {self.style} '{self.id}': {len(self.group)} points cover an area of {area:.4g}"

@@ -123,12 +123,14 @@ class PairContact(Gripping):
             found.append(rows[:count].copy())
         return found
 
-    @staticmethod
-    def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
+    def _known(
+        self, simulation: Any, block: Block, rows: np.ndarray, grip: Any
+    ) -> np.ndarray:
         """Numbers, masses, radii, positions and velocities of some points, and their grip."""
         kin, x = simulation.kin, block.points.x[simulation.now]
         found = np.empty((len(rows), 3 + 2 * kin.dimension))
         pairs.collect(kin, x, block.points, block.laws, rows, found)
+        found[:, 2] *= self.hub.domain.thickness ** (-1 / kin.dimension)
         return found if grip is None else np.concatenate([found, grip[:, rows].T], axis=1)
 
     def _push(
@@ -229,7 +231,7 @@ class ContactMinimizePenetration(PairContact):
 
 def plane_modulus(solid: Solid, argument: str) -> float:
     """E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
-    law = elastic_law(solid.material.law)
+    law = elastic_law(solid.material.whole)
     G, lam = getattr(law, "G", None), getattr(law, "lam", None)
     if G is None or lam is None or not G > 0:
         raise ScriptError(

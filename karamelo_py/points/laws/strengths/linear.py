@@ -84,7 +84,7 @@ COUNTS = 0.05  # of the viscosity of the fluid
 
 def _viscosity(strength, scene):
     """Find the kinematic viscosity, 0 where it reaches no further than a cell in the run."""
-    laws = [solid.material.law for solid in scene.hub.solids.values()]
+    laws = [solid.material.whole for solid in scene.hub.solids.values()]
     own = [law for law in laws if getattr(law, "strength", None) is strength]
     nu = max((float(strength.mu * specific_volume(law)) for law in own), default=0.0)
     seen = scene.d > 1 and sqrt(nu * scene.duration) > scene.hub.domain.h

@@ -58,14 +58,13 @@ class ToolFix(PointForces):
 
     def side(self, points: PointsView) -> np.ndarray:
         """Edges (n,) of the cubes of the points."""
-        return (points.column("volume") / self._radius(points)) ** (1 / self.hub.domain.dimension)
+        domain = self.hub.domain
+        return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
 
     def face(self, points: PointsView) -> np.ndarray:
         """Areas (n,) of a face of these cubes, per radian in axisymmetry."""
-        return self.side(points) ** (self.hub.domain.dimension - 1) * self._radius(points)
-
-    def _radius(self, points: PointsView) -> np.ndarray | float:
-        return points.position[:, 0].astype(float) if self.hub.domain.axisymmetric else 1.0
+        domain = self.hub.domain
+        return self.side(points) ** (domain.dimension - 1) * domain.depth(points.position)
 
     def stiffness(self, points: PointsView) -> np.ndarray:
         """Shear moduli (n,), reduced by damage."""
@@ -75,7 +74,7 @@ class ToolFix(PointForces):
 
 def _shear_modulus(solid: Solid) -> float:
     """The shear modulus of a solid, 0 if it has none."""
-    law: Any = elastic_law(solid.material.law)
+    law: Any = elastic_law(solid.material.whole)
     return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
 
 

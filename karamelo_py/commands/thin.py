@@ -1,0 +1,116 @@
+"""Commands for thin bodies: plane_stress, uniaxial_stress."""
+
+from typing import Annotated, Any
+
+from karamelo_py.language.signature import Positive
+from karamelo_py.points.laws import law_parts, moves_as_told
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
+from karamelo_py.script.errors import ScriptError
+
+
+def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive] = 1.0) -> None:
+    """Make a 2D scene a thin plate, without stress across it.
+
+    Parameters
+    ----------
+    active
+        ``true``, or ``false`` for plane strain (the default).
+    thickness
+        Initial thickness of the plate.
+
+    Example
+    -------
+    dimension(2, 0, 10, 0, 30, 0.5)
+    plane_stress(true, thickness=0.2)
+
+    Notes
+    -----
+    Comes before the first material. Each law finds the strain across the plate for which the stress
+    szz vanishes. The column ``thickness`` is the present thickness over the initial one. Masses,
+    forces and energies are those of the whole thickness. Liquids, gases and loose grains are
+    refused: without stress across they have no strength. anti_volumetric_locking is refused too;
+    plane stress does not lock.
+
+    See Also
+    --------
+    uniaxial_stress, axisymmetric, material
+    """
+    _set(hub, active, "plane_stress", 2, thickness)
+
+
+def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] = 1.0) -> None:
+    """Make a 1D scene a bar, without stress across it.
+
+    Parameters
+    ----------
+    active
+        ``true``, or ``false`` for uniaxial strain (the default).
+    area
+        Initial cross-section of the bar.
+
+    Example
+    -------
+    dimension(1, 0, 10, 0.5)
+    uniaxial_stress(true, area=1e-4)
+
+    Notes
+    -----
+    Comes before the first material. Each law finds the strain across the bar, equal in y and z, for
+    which the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces
+    and energies are those of the whole cross-section. Refusals are those of plane_stress.
+
+    See Also
+    --------
+    plane_stress, dimension
+    """
+    _set(hub, active, "uniaxial_stress", 1, area)
+
+
+def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float) -> None:
+    domain = require_domain(hub)
+    if domain.dimension != dimension or (active and domain.axisymmetric):
+        kind = "an axisymmetric one" if domain.axisymmetric else f"{domain.dimension}D"
+        raise ScriptError(
+            f"{command} is for {dimension}D scenes, and this one is {kind}",
+            argument="active",
+            expected=f"dimension({dimension}, ...) before {command}(true)"
+            if domain.dimension != dimension
+            else "axisymmetric(false)",
+            hint={1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
+            if not domain.axisymmetric
+            else None,
+        )
+    if hub.materials and active != domain.thin:
+        first = next(iter(hub.materials))
+        raise ScriptError(
+            f"material '{first}' is defined already",
+            argument="active",
+            expected=f"{command}({'true' if active else 'false'}) before the first material",
+        )
+    if hub.solids:
+        raise ScriptError(
+            "the points of solids have their masses already",
+            argument="active",
+            expected=f"{command} before the first solid",
+        )
+    domain.thin, domain.thickness = active, float(thickness) if active else 1.0
+
+
+def fit_to_domain(hub: Hub, material: Material) -> None:
+    """Make a material thin if the bodies of the scene are."""
+    if hub.domain is None or not hub.domain.thin or moves_as_told(material.whole):
+        return
+    parts = law_parts(material.whole)
+    if any(getattr(part, "flows", False) and not _coheres(part) for part in parts):
+        raise ScriptError(
+            "without stress across the body this material has no strength",
+            argument="style",
+            expected="a solid that sustains tension, or plane strain",
+        )
+    material.thin = True
+
+
+def _coheres(part: Any) -> bool:
+    return getattr(part, "cohesion", 0) > 0

@@ -1,0 +1,187 @@
+"""Laws of thin bodies: plane stress in 2D, uniaxial stress in 1D.
+
+The wrapped law sees all three directions, with the tensors of `Axisymmetric`: xx, xy, yx, yy and
+zz. The strain increment q across the body is found such that the stress across it vanishes; in 1D
+it is the same in y and z. A secant method takes a fixed number of trials, so that points in lanes
+need no branches. What stress is left enters the next step (de Borst 1991; Klinkel & Govindjee
+2002).
+"""
+
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import real, where
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, nothing
+
+WHOLE = Axisymmetric()  # kinematics of the wrapped law
+ENOUGH = 10  # trials of q for increments of any size
+FURTHEST = 0.3  # change of the stretch across in a trial
+FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over rho c^2
+
+
+class Thin(NamedTuple):
+    """A law in a body whose faces bear no stress.
+
+    Attributes
+    ----------
+    law
+        The law in three dimensions.
+    """
+
+    law: Any
+
+    in_lanes = True
+    trials = 3  # of q in a step: increments are small
+
+
+class ThinInLargeIncrements(Thin):
+    """A thin body under increments of any size."""
+
+    __slots__ = ()
+    trials = ENOUGH
+
+
+class State(NamedTuple):
+    """State of a point."""
+
+    whole: Any  # of the wrapped law
+    across: Any  # stretch across the body: thickness over initial thickness
+
+
+class Within(NamedTuple):
+    """Tag of an output column of the wrapped law."""
+
+    column: Any
+
+
+def across(kin, dl, q):
+    """The increment `dl` in the body, with q across it."""
+    if isinstance(dl, LargeIncrement):
+        return large(across(kin, dl.dl, q))
+    none = real(0, q)
+    numbers = (*dl, q) if kin.dimension == 2 else (dl[0], none, none, q, q)
+    return WHOLE.Tensor._make(numbers)
+
+
+@laws.initial_state.on(Thin)
+def _initial_state_thin(law, kin, like):
+    return State(laws.initial_state(law.law, WHOLE, like), 1)
+
+
+@laws.advance.on(Thin)
+def _advance_thin(law, kin, state, dl, dt):
+    inner, old = law.law, state.whole
+    volume = laws.specific_volume(inner) * laws.jacobian(inner, WHOLE, old)
+    modulus = laws.wave_speed_squared(inner, WHOLE, old) / volume
+
+    def tried(q):
+        new = laws.advance(inner, WHOLE, old, across(kin, dl, q), dt)
+        return new, laws.cauchy_stress(inner, WHOLE, new)[2]
+
+    q, slope = modulus - modulus, modulus
+    new, stress = tried(q)
+    for _ in range((ENOUGH if isinstance(dl, LargeIncrement) else law.trials) - 1):
+        furthest, left = FURTHEST * (1 + q), stress
+        step = max(min(-stress / slope, furthest), -furthest)
+        q = q + step
+        new, stress = tried(q)
+        secant = (stress - left) / where(step == 0, 1, step)
+        usable = (secant > FLATTEST * modulus) & (secant < STEEPEST * modulus)
+        slope = where(usable, secant, slope)
+    return State(new, state.across * (1 + q))
+
+
+def _whole(function):
+    """Let a function of (law, kin, state) take the wrapped law and its state."""
+    function.on(Thin)(lambda law, kin, state: function(law.law, WHOLE, state.whole))
+
+
+for _function in (
+    laws.jacobian,
+    laws.energy_density,
+    laws.dissipated_energy,
+    laws.damage,
+    laws.damage_initiation,
+    laws.temperature,
+    laws.plastic_strain,
+):
+    _whole(_function)
+
+laws.by_rates.on(Thin)(lambda law: laws.by_rates(law.law))
+laws.specific_volume.on(Thin)(lambda law: laws.specific_volume(law.law))
+laws.heat_capacity.on(Thin)(lambda law, like: laws.heat_capacity(law.law, like))
+laws.conductivity.on(Thin)(lambda law, like: laws.conductivity(law.law, like))
+
+
+@laws.wave_speed_squared.on(Thin)
+def _wave_speed_squared_thin(law, kin, state):
+    return _slower(law, kin, state, laws.wave_speed_squared(law.law, WHOLE, state.whole))
+
+
+@laws.wave_speed_bound.on(Thin)
+def _wave_speed_bound_thin(law, kin, state):
+    return _slower(law, kin, state, laws.wave_speed_bound(law.law, WHOLE, state.whole))
+
+
+def _slower(law, kin, state, squared):
+    """Squared wave speed of a body that is free across, from its value without strain across.
+
+    Hooke's law has 2 G + lambda there; a plate 2 G + 2 G lambda / (2 G + lambda) = E / (1 - nu^2),
+    a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.
+    """
+    shear = min(laws.shear_part(law.law, WHOLE, state.whole), squared)
+    rest = squared - shear
+    across = shear + (3 - kin.dimension) * rest
+    return shear + rest * shear / where(across > 0, across, 1)
+
+
+def _in_body(kin, s):
+    """The components that the kinematics of the body has."""
+    return kin.Symmetric._make(s[: len(kin.symmetric_names)])
+
+
+@laws.kirchhoff_stress.on(Thin)
+def _kirchhoff_stress_thin(law, kin, state):
+    return _in_body(kin, laws.kirchhoff_stress(law.law, WHOLE, state.whole))
+
+
+@laws.cauchy_stress.on(Thin)
+def _cauchy_stress_thin(law, kin, state):
+    return _in_body(kin, laws.cauchy_stress(law.law, WHOLE, state.whole))
+
+
+@laws.elastic_strain.on(Thin)
+def _elastic_strain_thin(law, kin, state):
+    return _in_body(kin, laws.elastic_strain(law.law, WHOLE, state.whole))
+
+
+@laws.with_temperature.on(Thin)
+def _with_temperature_thin(law, kin, state, T):
+    return state._replace(whole=laws.with_temperature(law.law, WHOLE, state.whole, T))
+
+
+@laws.warmed.on(Thin)
+def _warmed_thin(law, kin, state, heat):
+    return state._replace(whole=laws.warmed(law.law, WHOLE, state.whole, heat))
+
+
+@laws.with_stress.on(Thin)
+def _with_stress_thin(law, kin, state, stress):
+    s = WHOLE.Symmetric._make((*stress, *nothing(WHOLE)[len(stress) :]))
+    return state._replace(whole=laws.with_stress(law.law, WHOLE, state.whole, s))
+
+
+laws.shown.on(Within)(
+    lambda what, law, kin, state: laws.shown(what.column, law.law, WHOLE, state.whole)
+)
+laws.of_part.on(Thin)(lambda law, what: Within(what))
+
+
+@laws.number
+@laws.point_function()
+def thickness(law, kin, state):
+    """Thickness of a thin body over its initial thickness."""
+
+
+thickness.on(Thin)(lambda law, kin, state: state.across)
+laws.column(Thin, "thickness", thickness)
