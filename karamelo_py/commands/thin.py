@@ -29,7 +29,7 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
     -----
     Comes before the first material. Each law finds the strain across the plate for which the stress
     szz vanishes. The column ``thickness`` is the present thickness over the initial one. Masses,
-    forces and energies are those of the whole thickness. Liquids, gases and loose grains are
+    forces and energies refer to the whole thickness. Liquids, gases and loose grains are
     refused: without stress across they have no strength. anti_volumetric_locking is refused too;
     plane stress does not lock.
 
@@ -59,7 +59,8 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
     -----
     Comes before the first material. Each law finds the strain across the bar, equal in y and z, for
     which the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces
-    and energies are those of the whole cross-section. Refusals are those of plane_stress.
+    and energies refer to the whole cross-section. The same materials are refused as in
+    plane_stress.
 
     See Also
     --------

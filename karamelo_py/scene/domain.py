@@ -45,7 +45,7 @@ class Domain:
     def depth(self, x: np.ndarray) -> np.ndarray | float:
         """Extent of the body out of its plane at positions `x` (n, d): the radius, or a thickness.
 
-        Volumes and areas in 2D and 1D have it as a factor. A radius stands for one radian.
+        Volumes and areas in 2D and 1D have it as a factor. Radii are per radian.
         """
         return x[:, 0].astype(float) if self.axisymmetric else self.thickness
 

@@ -37,7 +37,7 @@ class Material(MaterialPart):
 
     script_kind = "the ID of a material"
     catalogue = "materials"
-    thin = False  # its bodies bear no stress across
+    thin = False  # its bodies have no stress across
 
     @property
     def whole(self) -> NamedTuple:
@@ -46,7 +46,7 @@ class Material(MaterialPart):
 
     @property
     def law(self) -> NamedTuple:
-        """The law that the points of its bodies have."""
+        """The law of its points."""
         return Thin(self.whole) if self.thin else self.whole
 
     @property

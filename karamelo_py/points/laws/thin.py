@@ -20,7 +20,7 @@ FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over r
 
 
 class Thin(NamedTuple):
-    """A law in a body whose faces bear no stress.
+    """A law in a body without stress on its faces.
 
     Attributes
     ----------
@@ -91,9 +91,22 @@ def _advance_thin(law, kin, state, dl, dt):
     return State(new, state.across * (1 + q))
 
 
-def _whole(function):
+def _by_state(function):
     """Let a function of (law, kin, state) take the wrapped law and its state."""
-    function.on(Thin)(lambda law, kin, state: function(law.law, WHOLE, state.whole))
+
+    def of_whole(law, kin, state):
+        return function(law.law, WHOLE, state.whole)
+
+    function.on(Thin)(of_whole)
+
+
+def _by_law(function):
+    """Let a function of a law, and perhaps a number, take the wrapped law."""
+
+    def of_whole(law, *like):
+        return function(law.law, *like)
+
+    function.on(Thin)(of_whole)
 
 
 for _function in (
@@ -105,12 +118,9 @@ for _function in (
     laws.temperature,
     laws.plastic_strain,
 ):
-    _whole(_function)
-
-laws.by_rates.on(Thin)(lambda law: laws.by_rates(law.law))
-laws.specific_volume.on(Thin)(lambda law: laws.specific_volume(law.law))
-laws.heat_capacity.on(Thin)(lambda law, like: laws.heat_capacity(law.law, like))
-laws.conductivity.on(Thin)(lambda law, like: laws.conductivity(law.law, like))
+    _by_state(_function)
+for _function in (laws.by_rates, laws.specific_volume, laws.heat_capacity, laws.conductivity):
+    _by_law(_function)
 
 
 @laws.wave_speed_squared.on(Thin)
@@ -171,10 +181,14 @@ def _with_stress_thin(law, kin, state, stress):
     return state._replace(whole=laws.with_stress(law.law, WHOLE, state.whole, s))
 
 
-laws.shown.on(Within)(
-    lambda what, law, kin, state: laws.shown(what.column, law.law, WHOLE, state.whole)
-)
-laws.of_part.on(Thin)(lambda law, what: Within(what))
+@laws.shown.on(Within)
+def _shown_within(what, law, kin, state):
+    return laws.shown(what.column, law.law, WHOLE, state.whole)
+
+
+@laws.of_part.on(Thin)
+def _of_part_thin(law, what):
+    return Within(what)
 
 
 @laws.number
@@ -183,5 +197,9 @@ def thickness(law, kin, state):
     """Thickness of a thin body over its initial thickness."""
 
 
-thickness.on(Thin)(lambda law, kin, state: state.across)
+@thickness.on(Thin)
+def _thickness_thin(law, kin, state):
+    return state.across
+
+
 laws.column(Thin, "thickness", thickness)
