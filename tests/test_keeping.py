@@ -79,7 +79,7 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys, starts_are_chea
     assert cells["PIC", "leapfrog"].startswith("refused")
     # The cause that the program names beforehand for TPIC with linear functions stands below.
     assert "[" in cells["TPIC", "musl"]
-    assert "affine noise: TPIC with linear functions" in text
+    assert "affine noise: TPIC with the basis linear" in text
     assert "refused: 2 of 4" in capsys.readouterr().out
 
 

@@ -114,12 +114,12 @@ def test_averaged_volumes_about_an_axis(run_script, away):
         ("soil that vibrates", {"nu": 0.25, "phi": 40, "averaged": "false"}, False),
         ("soil that vibrates", {"nu": 0.45, "psi": 10}, False),
         ("soil that vibrates", {"nu": 0.45, "scheme": "quasi-static"}, False),
-        ("averaged volumes in load steps", {"scheme": "quasi-static"}, True),
-        ("averaged volumes in load steps", {"scheme": "quasi-static", "psi": 10}, False),
-        ("averaged volumes in load steps", {}, False),
-        ("averaged volumes with splines", {"basis": "quadratic-spline", "psi": 30}, True),
-        ("averaged volumes with splines", {"basis": "quadratic-spline"}, False),
-        ("averaged volumes with splines", {"psi": 30}, False),
+        ("F-bar in load steps", {"scheme": "quasi-static"}, True),
+        ("F-bar in load steps", {"scheme": "quasi-static", "psi": 10}, False),
+        ("F-bar in load steps", {}, False),
+        ("F-bar with splines", {"basis": "quadratic-spline", "psi": 30}, True),
+        ("F-bar with splines", {"basis": "quadratic-spline"}, False),
+        ("F-bar with splines", {"psi": 30}, False),
     ],
 )
 def test_what_sand_cannot_do_is_said(run_interpreted, name, numbers, told):

@@ -18,5 +18,5 @@ CASE = Case(
     exact=1.0,
     measure=height,
     source="no viscosity, Lamb 1932",
-    advice="liquids with linear functions",
+    advice="liquids with a linear basis",
 )

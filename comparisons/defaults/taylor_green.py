@@ -7,5 +7,5 @@ CASE = Case(
     exact=0.0,
     measure=lambda result: result.log.off[-1],
     source="Taylor & Green 1937",
-    advice="liquids with linear functions",
+    advice="liquids with a linear basis",
 )

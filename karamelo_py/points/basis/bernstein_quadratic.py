@@ -32,9 +32,9 @@ known_failure(
     BernsteinQuadratic,
     "points that cross cells",
     when=lambda basis, scene: scene.moves,
-    reason="the gradients of Bernstein-quadratic functions jump at cell faces, and points that "
-    "cross one feel false forces as large as their stress",
-    cure="method tlmpm, or quadratic-spline in the place of the basis",
+    reason="gradients of the basis Bernstein-quadratic jump at cell faces, and points that "
+    "cross one get spurious forces as large as their stress",
+    cure="method tlmpm, or quadratic-spline",
 )
 
 

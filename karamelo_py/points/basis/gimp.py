@@ -77,11 +77,11 @@ class CPGIMPDiagonal(_Following):
 
 known_failure(
     CPGIMPDiagonal,
-    "boxes in a turn",
+    "rotating boxes",
     when=lambda basis, scene: scene.turns,
-    reason="bodies will turn by about {scene.turn:.2g} rad, and boxes of the size |F_ii| shrink "
-    "with the cosine of that",
-    cure="the variant stretch in the place of diagonal",
+    reason="bodies will rotate by about {scene.turn:.2g} rad, and boxes of the size |F_ii| shrink "
+    "with the cosine of the angle",
+    cure="variant stretch instead of diagonal",
 )
 
 

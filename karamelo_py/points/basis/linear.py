@@ -34,9 +34,9 @@ known_failure(
     Linear,
     "bodies that break without reason",
     when=lambda basis, scene: scene.moves and scene.elastic and scene.strain > STRETCH,
-    reason="bodies will strain by about {scene.strain:.1g} (from their speed and weight), and with "
-    "linear functions points that lie a cell apart no longer hold together",
-    cure="method tlmpm or ulcpdi, or a spline in the place of the basis",
+    reason="strains will be about {scene.strain:.1g} (from speed and weight); with a linear basis, "
+    "points more than a cell apart separate (numerical fracture)",
+    cure="method tlmpm or ulcpdi, or a spline basis",
 )
 
 
@@ -53,10 +53,10 @@ known_failure(
     Linear,
     "repeated contact",
     when=_meet_again,
-    reason="{scene.transfer_name} with linear functions gains energy at each impact of elastic "
-    "bodies, and these have the time to meet again and again (two disks in a box for 50 impacts: "
-    "up to 1.1 times the energy, with a share of 0.99 two to four times)",
-    cure=f"quadratic-spline in the place of the basis, or dt_factor({SMALL_SHARE:g})",
+    reason="{scene.transfer_name} with a linear basis gains energy at each impact of elastic "
+    "bodies, and there is time for many impacts (two disks in a box, 50 impacts: up to 1.1 times "
+    "the energy; two to four times with a FLIP coefficient of 0.99)",
+    cure=f"quadratic-spline, or dt_factor({SMALL_SHARE:g})",
 )
 CROSSING = "stress lost across cells"
 CURE = "cpgimp or quadratic-spline instead of linear, with FLIP 0.99 (pressure within 3 %)"
@@ -64,10 +64,9 @@ known_failure(
     Linear,
     CROSSING,
     when=lambda basis, scene: scene.crossing.lost > TOLD,
-    reason="matter that is struck, or has a stress at first, will move at "
-    "{scene.crossing.speed:.3g} through {scene.crossing.cells:.2g} cells while it is stressed, and "
-    "with linear functions its pressure falls by 10 to 35 % in each: by some "
-    "{scene.crossing.percent:.0f} % in all",
+    reason="material under impact or initial stress will move at {scene.crossing.speed:.3g} "
+    "through {scene.crossing.cells:.2g} cells while stressed; with a linear basis its pressure "
+    "falls by 10 to 35 % in each, about {scene.crossing.percent:.0f} % in all",
     cure=CURE,
 )
 known_failure(
@@ -76,27 +75,27 @@ known_failure(
     when=lambda basis, scene: scene.settling.cells > 0,
     reason="at rest, weight compresses solid '{scene.settling.name}' by "
     "{scene.settling.strain:.2g} of its length, and its end moves by {scene.settling.cells:.2g} "
-    "cells; stressed points that cross cells of a linear basis lose stress: the body vibrates "
-    "under the sudden load and comes to rest 20 % (at 0.26 cells) to 70 % (at 0.64) too far",
+    "cells; stressed points that cross cells of a linear basis lose stress, so the body comes to "
+    "rest 20 % (at 0.26 cells) to 70 % (at 0.64) too far",
     cure="cpgimp or quadratic-spline instead of linear, or tlmpm",
 )
 known_failure(
     Linear,
     "hourglasses",
     when=lambda basis, scene: not scene.moves and scene.d > 1 and bool(scene.single),
-    reason="one point per cell (solid '{scene.single[0]}') with linear functions that never move "
-    "feels no hourglass: its nodes may go to and fro without any force",
-    cure="{scene.corners} points per cell, or Bernstein-quadratic in the place of the basis",
+    reason="one point per cell (solid '{scene.single[0]}') with a linear basis in the total frame "
+    "does not resist hourglass modes: nodes oscillate without any force",
+    cure="{scene.corners} points per cell, or Bernstein-quadratic",
 )
 known_failure(
     Linear,
     "one row of points",
     when=lambda basis, scene: scene.bent_row,
-    reason="solid '{solid}' is {cells:.2g} cells thick and has one row of points across, which "
-    "cannot bend: its points have the same strain on both sides (a cantilever of half a cell bends "
-    "by 0.0004 of beam theory)",
-    cure="cells of a quarter of its thickness, with two points in each direction (two rows in half "
-    "a cell reach 0.38 of beam theory)",
+    reason="solid '{solid}' is {cells:.2g} cells thick with one row of points across, which has no "
+    "bending stiffness to resolve: strain is the same on both sides (a cantilever of half a cell "
+    "bends by 0.0004 of beam theory)",
+    cure="cells of a quarter of its thickness, with two points per direction (two rows in half a "
+    "cell reach 0.38 of beam theory)",
 )
 
 

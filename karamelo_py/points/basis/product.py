@@ -199,7 +199,7 @@ def wide(basis: type) -> None:
         basis,
         when=_seen,
         cost="{scene.basis_name} sees {nodes} nodes per point; in a total Lagrangian method no "
-        "point crosses cells, and linear functions, which see {scene.corners}, have the same order",
+        "point crosses cells, and a linear basis, with {scene.corners} nodes, has the same order",
         instead="linear in method(...); karamelo-py sweep shows the errors of both",
     )
 

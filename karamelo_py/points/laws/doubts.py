@@ -65,23 +65,23 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
     if flow > G > 0:
         yield (
             f"it yields at {flow:.3g}, above its shear modulus {G:.3g}: at a strain that no solid "
-            "bears without yielding",
-            "the shear modulus stands first, then the yield stress",
+            "reaches without yielding",
+            "the shear modulus comes first, then the yield stress",
         )
     elif hard > G > 0:
         yield (
-            f"at a plastic strain of 1 it bears {hard:.3g}, above its shear modulus {G:.3g}",
-            "the modulus of hardening in the units of the others",
+            f"its flow stress at a plastic strain of 1 is {hard:.3g}, above its modulus {G:.3g}",
+            "give the hardening modulus in the units of the other moduli",
         )
     if (rate := getattr(getattr(strength, "rate", None), "C", 0.0)) > 1:
         yield (
             f"its flow stress rises by {rate:g} times itself for e times the rate",
-            "C of metals is 0.01",
+            "C is about 0.01 for metals",
         )
     if getattr(strength, "mu_s", 0.0) > COEFFICIENT:
         yield (
             f"its coefficient of friction is {strength.mu_s:g}",
-            "coefficients are tangents of angles: 0.38 of glass beads",
+            "coefficients are tangents of angles: 0.38 for glass beads",
         )
     friction = getattr(strength, "friction", 0.0)
     if isinstance(friction, float) and 0 < friction < sin(radians(SMALL)):
@@ -93,16 +93,16 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
     damage, eos = law.damage, law.eos
     shear = getattr(damage, "d1", 0.0) + getattr(damage, "d2", 0.0)
     if shear > TOUGH:
-        yield f"it fails in shear at a plastic strain of {shear:.3g}", "strains are no per cent"
+        yield f"it fails in shear at a plastic strain of {shear:.3g}", "strains are not in per cent"
     if getattr(damage, "d3", 0.0) > 0:
         yield (
-            f"with d3 = {damage.d3:g} it bears more plastic strain in tension than in compression",
+            f"with d3 = {damage.d3:g} its failure strain is larger in tension than in compression",
             "d3 of metals is below 0 here: some programs have exp(-d3 t)",
         )
     if getattr(eos, "S", 0.0) > STEEP:
         yield (
             f"the slope S of its shock speed is {eos.S:g}",
-            "S has no unit: 1 to 2 of metals, and c0 stands before it",
+            "S has no unit: 1 to 2 for metals, and c0 comes before it",
         )
     coefficients = [getattr(law.viscosity, name, 0.0) for name in ("Q1", "Q2")]
     if max(coefficients) > THICK:
@@ -148,10 +148,10 @@ def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]
             yield (
                 f"a plastic strain of 1 warms it by {warmer:.2g} kelvin",
                 "the heat capacity cp is per mass and kelvin, in the units of the stresses: "
-                "500 of steel in m, kg, s; 5e8 in mm, t, s",
+                "500 for steel in m, kg, s; 5e8 in mm, t, s",
             )
 
 
 def _doubts_of_expansion(alpha: float, what: str) -> Iterator[tuple[str, str]]:
     if not EXPANSION[0] < abs(alpha) < EXPANSION[1]:
-        yield f"it expands by {alpha:.3g} a kelvin", f"{what}; that of steel is 1.2e-5"
+        yield f"it expands by {alpha:.3g} a kelvin", f"{what}; for steel it is 1.2e-5"

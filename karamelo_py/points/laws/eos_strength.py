@@ -258,10 +258,10 @@ known_failure(
     EosStrength,
     "locking",
     when=_locks,
-    reason="plastic flow of material '{owner.id}' keeps its volume, and {scene.basis_name} "
-    "functions without averaged volumes cannot follow it around a corner: the load goes on rising "
-    "beyond the limit load (a footing bears 6.3 to 6.7 c B in the place of 5.1)",
-    cure="anti_volumetric_locking(true), or quadratic-spline in the place of the basis",
+    reason="material '{owner.id}' flows at constant volume, which the basis {scene.basis_name} "
+    "without F-bar cannot represent around a corner: the load rises past the limit load (a footing "
+    "carries 6.3 to 6.7 c B instead of 5.1)",
+    cure="anti_volumetric_locking(true), or quadratic-spline",
 )
 
 

@@ -30,11 +30,10 @@ def tell_of_locking(law: type) -> None:
         law,
         "locking",
         when=keeps_volume,
-        reason="Poisson's ratio of material '{owner.id}' is {nu:.9g}, and {scene.basis_name} "
-        "functions without averaged volumes cannot bend or spread and keep the volume of all "
-        "points: bodies are too stiff (a strip of 8 cells on a block by 19 % with 0.49, 87 % with "
-        "0.499)",
-        cure="anti_volumetric_locking(true), or quadratic-spline in the place of the basis",
+        reason="Poisson's ratio of material '{owner.id}' is {nu:.9g}; the basis {scene.basis_name} "
+        "without F-bar cannot bend or spread at constant volume, so bodies are too stiff (a strip "
+        "of 8 cells on a block by 19 % with 0.49, 87 % with 0.499)",
+        cure="anti_volumetric_locking(true), or quadratic-spline",
     )
 
 

@@ -137,23 +137,23 @@ def _left_out(moment, scene):
     return scene.moments and scene.vanishing and kept and not _inside_out(moment, scene)
 
 
-WITH = "{scene.transfer_name} with {scene.basis_name} functions"
+WITH = "{scene.transfer_name} with the basis {scene.basis_name}"
 TURNS = 1.5  # revolutions from which a body gains a relevant fraction of energy
-SMOOTH = "quadratic-spline in the place of the basis, or method tlmpm"
+SMOOTH = "quadratic-spline, or method tlmpm"
 known_failure(
     Moment,
     "affine noise",
     when=_inside_out,
-    reason=f"{WITH} gains energy where points cross cells, at any step, with every scheme, until "
-    "the run stops (a disk that drifts turns inside out after a few dozen steps)",
+    reason=f"{WITH} gains energy where points cross cells, for any step and scheme, until the run "
+    "stops (a drifting disk turns inside out after a few dozen steps)",
     cure=SMOOTH,
 )
 known_failure(
     Moment,
     "affine noise",
     when=_left_out,
-    reason=f"{WITH} gains energy, since the velocity that deforms the points leaves their moments "
-    "out (a disk in space by a sixth in a turn)",
+    reason=f"{WITH} gains energy, because the velocity that deforms the points omits their "
+    "moments (a disk in 3D: 17 % per revolution)",
     cure=SMOOTH,
 )
 known_failure(
@@ -165,8 +165,8 @@ known_failure(
         and scene.free_turns > TURNS
         and not (_inside_out(moment, scene) or _left_out(moment, scene))
     ),
-    reason=f"a body turns freely, {{scene.free_turns:.2g}} times, and {WITH} gains energy in each: "
-    "a disk of 4 to 8 cells across the radius breaks within 5 to 7 turns",
+    reason=f"a body rotates freely, {{scene.free_turns:.2g}} times, and {WITH} gains energy in "
+    "each revolution: a disk with 4 to 8 cells across the radius breaks within 5 to 7",
     cure=SMOOTH,
 )
 noise.turns(Moment)

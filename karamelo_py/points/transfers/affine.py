@@ -103,10 +103,10 @@ known_failure(
     ASFLIP,
     "loose points",
     when=lambda asflip, scene: asflip.beta > SEPARATE and scene.moves and bool(scene.elastic),
-    reason="ASFLIP moves points apart where they are not pressed together, and solid "
-    "'{scene.elastic[0].id}' bears tension: its points lose their places (two rings that bounce "
-    "keep a tenth of their speed, with beta = 0.1 as much as with AFLIP)",
-    cure=f"AFLIP in the place of ASFLIP, or beta = {SEPARATE:g} behind its share",
+    reason="ASFLIP separates points that are not compressed, and solid '{scene.elastic[0].id}' "
+    "sustains tension: its points lose their order (two bouncing rings retain 10 % of their "
+    "speed; with beta = 0.1 as much as with AFLIP)",
+    cure=f"AFLIP instead of ASFLIP, or beta = {SEPARATE:g} after the FLIP coefficient",
 )
 
 

@@ -123,10 +123,10 @@ def swings(transfer: type) -> None:
             and scene.vibration.strain > SWING
             and scene.vibration.periods > 2
         ),
-        reason="a body will vibrate by about {scene.vibration.strain:.1g} of strain for about "
-        "{scene.vibration.periods:.0f} periods, and with {scene.transfer_name} elastic bodies that "
-        "do so while they move through the grid break after 2 to 50 periods (by 0.14, drifting)",
-        cure="method tlmpm, or scheme(usl) with two points per cell and direction, which damps",
+        reason="a body will vibrate with a strain of about {scene.vibration.strain:.1g} for about "
+        "{scene.vibration.periods:.0f} periods; with {scene.transfer_name}, elastic bodies that "
+        "vibrate while they move through the grid break after 2 to 50 periods (at 0.14, drifting)",
+        cure="method tlmpm, or scheme(usl), which damps, with two points per direction",
     )
 
 
@@ -146,18 +146,18 @@ def slows(transfer: type) -> None:
         transfer,
         "angular momentum",
         when=_turns_away,
-        reason="a body turns freely, {scene.free_turns:.2g} times, and {scene.transfer_name} takes "
-        "some of its angular momentum: a tenth in the first turn with 4 cells across the radius, "
-        "2 % with 8, then more and more; after ten turns little is left",
-        cure="method tlmpm with APIC, or APIC with quadratic-spline; with ulcpdi and R4, APIC in "
-        "the place of {scene.transfer_name}",
+        reason="a body rotates freely, {scene.free_turns:.2g} times, and {scene.transfer_name} "
+        "loses angular momentum: in the first revolution 10 % with 4 cells across the radius, "
+        "2 % with 8, after ten nearly all",
+        cure="method tlmpm with APIC, or APIC with quadratic-spline; with ulcpdi and R4, APIC "
+        "instead of {scene.transfer_name}",
     )
     gain(
         transfer,
         when=lambda transfer, scene: _turns_away(transfer, scene) and {"share": 0.5},
-        cause="a body has turned freely, {scene.free_turns:.2g} times, and its points, which "
-        "{scene.transfer_name} moves with another velocity than their own, come out of step",
-        cure="APIC in the place of {scene.transfer_name}, best in method tlmpm",
+        cause="a body has rotated freely, {scene.free_turns:.2g} times; {scene.transfer_name} "
+        "moves points with a velocity that differs from their own",
+        cure="APIC instead of {scene.transfer_name}, best with method tlmpm",
     )
 
 
@@ -187,18 +187,17 @@ def lags(transfer: type) -> None:
         transfer,
         "slow rotation",
         when=_lags,
-        reason="a body turns freely, {scene.lag.turns:.2g} times, and {scene.transfer_name} moves "
-        "its points by the velocity of the grid, which turns about {scene.lag.percent:.2g} % more "
-        "slowly than the body",
-        cure="APIC in the place of {scene.transfer_name}: rotation and energy within 0.1 %",
+        reason="a body rotates freely, {scene.lag.turns:.2g} times; {scene.transfer_name} moves "
+        "its points with the grid velocity, which rotates {scene.lag.percent:.2g} % too slowly",
+        cure="APIC instead of {scene.transfer_name} (rotation and energy within 0.1 %)",
     )
     known_failure(
         transfer,
         "braked rotation",
         when=_brakes,
-        reason="a body turns freely, {scene.lag.turns:.2g} times, and FLIP {part.alpha:g} will "
-        "take about {gone:.0f} % of the energy of that",
-        cure="APIC in the place of {scene.transfer_name}, or FLIP 1",
+        reason="a body rotates freely, {scene.lag.turns:.2g} times, and FLIP {part.alpha:g} will "
+        "remove about {gone:.0f} % of its rotational energy",
+        cure="APIC instead of {scene.transfer_name}, or FLIP 1",
     )
 
 
@@ -206,8 +205,8 @@ known_failure(
     PIC,
     "angular momentum",
     when=lambda pic, scene: scene.turns,
-    reason="PIC takes a per cent or more of the angular momentum of a turning body in every step",
-    cure="APIC, or FLIP, in the place of PIC",
+    reason="PIC removes 1 % or more of the angular momentum of a rotating body in every step",
+    cure="APIC or FLIP instead of PIC",
 )
 take_nodal_velocity(PIC)
 

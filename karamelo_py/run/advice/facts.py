@@ -115,7 +115,7 @@ class SceneFacts:
 
     @cached_property
     def rotation(self) -> Noise | None:
-        """Estimate the noise of a turn through the grid, at most."""
+        """Estimate the noise of a rotation through the grid, at most."""
         return turn_of(self)
 
     @cached_property

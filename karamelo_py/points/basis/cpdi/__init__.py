@@ -75,11 +75,11 @@ known_failure(
     ConvectedDomain,
     "domains in large bending",
     when=_torn_by_bending,
-    reason="bodies will strain by about {scene.bending:.1g} if they bend (from their speed and "
-    "weight), and CPDI domains with {scene.transfer_name} at {scene.share:.2g} of the stable step "
-    "gain energy then, fold or come apart, on fine grids the sooner (a soft cantilever: 1.6 times "
-    "the energy with 16 cells of height)",
-    cure="dt_factor(0.1), which keeps the energy of such a beam to 0.1 % (R4), or method tlmpm",
+    reason="bending strains will be about {scene.bending:.1g} (from speed and weight); "
+    "CPDI domains with {scene.transfer_name} at {scene.share:.2g} of the stable step then gain "
+    "energy, fold or separate, sooner on fine grids (a soft cantilever with 16 cells of height: "
+    "1.6 times the energy)",
+    cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
 # By dimension, the minimum reach of domains in cells: in 2D points scatter to the nodes next to

@@ -91,21 +91,21 @@ def _whirls(eos, scene):
 
 known_failure(
     Tait,
-    "liquids with linear functions",
+    "liquids with a linear basis",
     when=_swings,
-    reason="a liquid swings or whirls for long, and {scene.transfer_name} with linear functions "
-    "gives false forces where points cross cells: waves of a tank are 8 % too slow and lose a "
-    "fifth of their height in two periods, velocities of a vortex are wrong by a quarter",
+    reason="a liquid sloshes or rotates for long, and {scene.transfer_name} with a linear basis "
+    "gives spurious forces where points cross cells: waves in a tank are 8 % too slow and lose 20 "
+    "% of their height in two periods, velocities in a vortex are wrong by 25 %",
     cure="method(ulmpm, APIC, quadratic-spline): 1 % and 3 % for waves, 6 % for vortices",
 )
 known_failure(
     Tait,
-    "whirls with FLIP",
+    "vortices with FLIP",
     when=_whirls,
-    reason="points of a liquid whirl past each other, and {scene.transfer_name} keeps of their "
-    "velocities what the grid does not see: those of a vortex are wrong by 16 to 24 % where it has "
-    "20 cells, by 8 to 18 % with 40, once it has gone round by its own size",
-    cure="APIC in the place of {scene.transfer_name}: 6 %",
+    reason="in a vortex, {scene.transfer_name} retains velocity noise in the null space of the "
+    "grid: velocities are wrong by 16 to 24 % with 20 cells across, and 8 to 18 % with 40, once "
+    "it has moved by its size",
+    cure="APIC instead of {scene.transfer_name} (6 %)",
 )
 
 
@@ -213,9 +213,7 @@ def _shocks(eos, scene):
     if not scene.moves or ratio < STEP:
         return None
     if scene.linear:
-        what = (
-            f"{scene.transfer_name} with linear functions loses a third of the pressure, and more"
-        )
+        what = f"{scene.transfer_name} with a linear basis loses a third of the pressure or more"
     elif ratio < STRONG or scene.scheme.traits.bears_drift:
         return None
     else:
@@ -244,9 +242,9 @@ known_failure(
     IdealGas,
     "sound in a gas",
     when=_sound,
-    reason="where points stay in their cells, their volumes change and those of the cells do not: "
-    "with {scene.basis_name} functions sound has {speed:.2g} of its speed",
-    cure="ugimp, cpgimp or quadratic-spline in the place of the basis, or method tlmpm",
+    reason="while points stay in their cells, their volumes change but cell volumes do not: with "
+    "the basis {scene.basis_name}, sound has {speed:.2g} of its speed",
+    cure="ugimp, cpgimp or quadratic-spline, or method tlmpm",
 )
 
 

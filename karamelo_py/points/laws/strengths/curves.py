@@ -217,7 +217,7 @@ def _check_formula(law: FlowStress) -> None:
                     f"T = {law.initial_temperature:g}",
                     argument="Y",
                     expected="a number for every plastic strain and rate from 0 on",
-                    hint="max(epdot, 1) or the like keeps a rate off 0; T=... begins at another T",
+                    hint="max(epdot, 1) excludes a zero rate; T=... begins at another T",
                 )
     if not value(law, 1e-6, 1.0, law.initial_temperature) > 0:
         raise ScriptError("the flow stress is not above 0 at first", argument="Y")

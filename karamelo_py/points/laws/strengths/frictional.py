@@ -131,47 +131,46 @@ def frictional(strength: type) -> None:
         when=lambda strength, scene: (
             scene.locks and not scene.even and {"place": scene.method.place}
         ),
-        reason="plastic flow of soil gives its cells a volume, and {scene.basis_name} functions "
-        "without averaged volumes cannot follow: limit loads are a tenth to a third too high, "
-        "and slopes stand that should slide (heaps that flow spread as far as they should)",
-        cure="quadratic-spline; or anti_volumetric_locking(true), and method tlmpm where soil that "
-        "dilates keeps its neighbours, as below a footing: points that cross cells take a tenth of "
-        "such loads",
+        reason="plastic flow of soil prescribes volume changes, which the basis {scene.basis_name} "
+        "without F-bar cannot follow: limit loads are 10 to 33 % too high, and slopes stay up that "
+        "should slide (the run-out of flowing heaps is right)",
+        cure="quadratic-spline; or anti_volumetric_locking(true), with method tlmpm if dilating "
+        "soil does not mix, as below a footing: points that cross cells cost 10 % of such loads",
     )
     known_failure(
         strength,
         "soil that vibrates",
         when=_vibrates,
-        reason="with Poisson's ratio {nu:.2g} and little dilatancy soil that yields feeds "
-        "vibrations, which shake its strength away: the active pressure of sand with a friction of "
-        "30 degrees and a ratio of 0.45 drifted from 1/3 of the weight to 0.56, or to 0.73 with "
-        "averaged volumes, in 4500 steps",
+        reason="with Poisson's ratio {nu:.2g} and little dilatancy, yielding soil amplifies "
+        "vibrations and loses strength: the active pressure of sand with a friction of 30 degrees "
+        "and a ratio of 0.45 drifted from 1/3 of the weight to 0.56, or 0.73 with F-bar, in 4500 "
+        "steps",
         cure="psi={psi:.2g} (0.333), or Poisson's ratio {most:.2f} or less",
     )
     known_failure(
         strength,
-        "averaged volumes in load steps",
+        "F-bar in load steps",
         when=_averages_in_load_steps,
-        reason="load steps average volumes, and soil of little dilatancy loses strength by it: "
+        reason="in load steps with F-bar, soil of little dilatancy loses strength: "
         "the active and passive pressures of sand with a friction of 30 degrees were 0.40 and 1.8 "
         "instead of 1/3 and 3 (0.57 and no equilibrium with splines)",
-        cure="anti_volumetric_locking(false) (0.333 and 3.04), or psi={psi:.2g} with linear "
-        "functions",
+        cure="anti_volumetric_locking(false) (0.333 and 3.04), or psi={psi:.2g} with a linear "
+        "basis",
     )
     known_failure(
         strength,
-        "averaged volumes with splines",
+        "F-bar with splines",
         when=_averages_splines,
-        reason="{scene.basis_name} functions need no averaged volumes in soil that dilates, and "
-        "with them limit loads are too low: a footing bore 13.7 for 14.8 times the cohesion, and "
-        "5.6 for 6.4 times the surcharge without cohesion (friction and dilatancy of 20 degrees)",
+        reason="in dilating soil the basis {scene.basis_name} needs no F-bar, which makes limit "
+        "loads too low: a footing carried 13.7 instead of 14.8 times the cohesion, and without "
+        "cohesion 5.6 instead of 6.4 times the surcharge (friction and dilatancy of 20 degrees)",
         cure="anti_volumetric_locking(false) (14.7 and 6.1)",
     )
 
 
-ENOUGH = 1 / 3  # dilatancy over friction from where neither was seen, as sines
-# f (f - G/(K + G/3)) from where vibrations were seen to grow in walls of sand, with averaged
-# volumes and without; these need steep friction and no cohesion, too.
+ENOUGH = 1 / 3  # dilatancy over friction, as sines, from which neither occurred
+# f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
+# latter need steep friction and no cohesion, too.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
 
 

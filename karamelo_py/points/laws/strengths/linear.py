@@ -112,16 +112,15 @@ known_failure(
     Viscous,
     "viscosity of the grid",
     when=_slows,
-    reason="{scene.transfer_name} takes {pic:.2g} of velocities from the grid in each step, which "
-    "is a kinematic viscosity of {added:.2g}: {more:.0f} % of that of the fluid, {nu:.2g}, comes "
-    "on top of it",
+    reason="{scene.transfer_name} takes a fraction {pic:.2g} of velocities from the grid in each "
+    "step, which adds a kinematic viscosity of {added:.2g}: {more:.0f} % of the fluid's, {nu:.2g}",
     cure=FOR_FLUIDS,
 )
 known_failure(
     Viscous,
     "rigid walls and splines",
     when=_reaches,
-    reason="a rigid solid drags a viscous fluid, and with {scene.basis_name} functions it reaches "
+    reason="a rigid solid drags a viscous fluid, and with {scene.basis_name} it extends "
     "0.75 of a cell into it: between plates the force is 18 % too large with 10 cells, 8 % with 20",
     cure=FOR_FLUIDS,
 )

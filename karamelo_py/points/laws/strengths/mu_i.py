@@ -68,7 +68,7 @@ class MuI(NamedTuple):
         """Return the law, unless friction decreases with the rate: such flow is unstable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
-                f"the friction of fast flow, {self.mu_2:g}, is below that of slow flow",
+                f"the friction of fast flow, {self.mu_2:g}, is below the friction of slow flow",
                 argument="mu_2",
                 expected=f"a number of at least mu_s = {self.mu_s:g}",
             )
@@ -84,11 +84,11 @@ known_failure(
     MuI,
     "pressure of grains",
     when=_jumps,
-    reason="points of grains that flow past each other cross cells, and with {scene.transfer_name} "
-    "and linear functions their pressure, and so their friction, is anything from 0 to twice "
-    "what it should be (flow down a plane, any size of cells)",
-    cure="method(ulmpm, TPIC, quadratic-spline), or APIC: within a tenth, but for the surface and "
-    "the cell on the floor; speeds there are up to a sixth too low",
+    reason="points of flowing grains cross cells; with {scene.transfer_name} and a linear basis "
+    "their pressure, and thus friction, is anything from 0 to twice the right value (flow down a "
+    "plane, any cell size)",
+    cure="method(ulmpm, TPIC, quadratic-spline), or APIC: within 10 %, except at the surface and "
+    "in the cell on the floor, where speeds are up to 17 % too low",
 )
 
 
@@ -122,10 +122,10 @@ known_failure(
     MuI,
     "slow grains",
     when=_slows,
-    reason="{scene.transfer_name} takes a share of {pic:.2g} of velocities from the grid in each "
-    "step, which is a kinematic viscosity of {added:.2g}, and that of the grains is about "
-    "{grains:.2g}: they flow too slowly (by 6 % with FLIP 0.99 and 46 % with 0.9 down a plane of 6 "
-    "cells, in the time in which they move by 3 times their height)",
+    reason="{scene.transfer_name} takes a fraction {pic:.2g} of velocities from the grid in each "
+    "step, which adds a kinematic viscosity of {added:.2g} to the grains' {grains:.2g}: they flow "
+    "too slowly (by 6 % with FLIP 0.99 and 46 % with 0.9, in a layer of 6 cells down a plane, "
+    "after 3 times its height)",
     cure="TPIC or APIC with quadratic-spline (within 3 %), or FLIP with 1",
 )
 remembers(MuI, ep=0.0, inertial=0.0)
