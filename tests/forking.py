@@ -2,7 +2,8 @@
 
 ``python forking.py SOCKET`` is that process. ``python forking.py SOCKET word ...`` hands it what
 Python would be given, ``-m karamelo_py.app.cli word ...`` or ``-c code word ...``, and ends as that
-does: a script of this line is started as Python is. What it starts itself is Python.
+does, with the same environment: a script of this line is started as Python is. What it starts
+itself is Python.
 """
 
 import os
@@ -15,7 +16,8 @@ def ask(path: str, words: list[str]) -> int:
     """Have something done here, in this folder and with the input and output of this process."""
     with socket.socket(socket.AF_UNIX) as link:
         link.connect(path)
-        said = [os.getcwd(), os.environ.get("PYTHONPATH", ""), *words]
+        variables = [f"{name}={value}" for name, value in os.environ.items()]
+        said = [os.getcwd(), str(len(variables)), *variables, *words]
         socket.send_fds(link, ["\0".join(said).encode()], [0, 1, 2])
         answer = link.recv(1)
     return answer[0] if answer else 1
@@ -28,9 +30,12 @@ def do(said: list[str]) -> int:
 
     from karamelo_py.app.start import main
 
-    folder, paths, *words = said
+    folder, count, *words = said
     os.chdir(folder)
-    sys.path[:0] = paths.split(os.pathsep)
+    os.environ.clear()
+    os.environ.update(word.split("=", 1) for word in words[: int(count)])
+    del words[: int(count)]
+    sys.path[:0] = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     while words[0] == "-W":
         action, _, message = words[1].partition(":")
         warnings.filterwarnings(action, message)
