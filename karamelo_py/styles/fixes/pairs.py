@@ -123,9 +123,7 @@ class PairContact(Gripping):
             found.append(rows[:count].copy())
         return found
 
-    def _known(
-        self, simulation: Any, block: Block, rows: np.ndarray, grip: Any
-    ) -> np.ndarray:
+    def _known(self, simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
         """Numbers, masses, radii, positions and velocities of some points, and their grip."""
         kin, x = simulation.kin, block.points.x[simulation.now]
         found = np.empty((len(rows), 3 + 2 * kin.dimension))
