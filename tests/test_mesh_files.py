@@ -1,12 +1,16 @@
 """Meshes as other programs write them: volumes that follow from the files by hand."""
 
 import math
+import re
+import signal
+from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 from hubs import SmallHub
 
+from karamelo_py.scene.meshes.by_gmsh import begin
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError
@@ -202,10 +206,23 @@ def test_files_of_gmsh_as_gmsh_reads_them(tmp_path):
     assert not (tmp_path / "ran").exists()
 
 
+def test_a_closed_socket_ends_no_run_after_gmsh(tmp_path):
+    """Gmsh resets SIGPIPE, which then killed a run whose live page was closed."""
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    status = Path("/proc/self/status")
+    if not status.exists():
+        pytest.skip("only Linux tells which signals are ignored")
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)
+    (tmp_path / "a.msh").write_text(GMSH)
+    volume(tmp_path / "a.msh", 2)
+    ignored = re.search(r"^SigIgn:\s*(\w+)", status.read_text(), re.M)[1]
+    assert int(ignored, 16) & 1 << signal.SIGPIPE - 1
+
+
 @pytest.mark.parametrize("ending", ["step", "brep"])
 def test_options_next_to_a_cad_file_run_nothing(ending, tmp_path):
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
-    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    begin(gmsh)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
@@ -225,7 +242,7 @@ def test_curved_elements_of_every_order_have_their_exact_volume(hull, order, tmp
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     if hull == "wedge" and order > 2:
         pytest.skip("Gmsh cannot read prisms of order 3 that it has written")
-    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    begin(gmsh)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         d = SHAPES[hull].dimension

@@ -15,6 +15,7 @@ from test_scene_script import message
 
 from karamelo_py.app.cli import main
 from karamelo_py.run.lower.memory import known
+from karamelo_py.scene.meshes.by_gmsh import begin
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError
@@ -266,7 +267,7 @@ def plate(tmp_path_factory):
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     folder = tmp_path_factory.mktemp("plate")
     (folder / "plate.geo").write_text(GEOMETRY)
-    gmsh.initialize([], readConfigFiles=False, interruptible=False)
+    begin(gmsh)
     gmsh.option.setNumber("General.Terminal", 0)
     gmsh.open(str(folder / "plate.geo"))
     gmsh.model.mesh.generate(2)

@@ -3,6 +3,7 @@
 import contextlib
 import re
 import shutil
+import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,7 +32,7 @@ def _model(path: Path) -> Iterator[Any]:
         raise NoGmsh(str(error)) from None
     mine = not gmsh.isInitialized()
     if mine:
-        gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+        begin(gmsh)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.open(str(path))
@@ -41,6 +42,18 @@ def _model(path: Path) -> Iterator[Any]:
     finally:
         if mine:
             gmsh.finalize()
+
+
+def begin(gmsh: Any) -> None:
+    """Initialize Gmsh.
+
+    It resets SIGPIPE, and a live page that is closed, or a pipe, would end the program.
+    """
+    before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
+    gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
+    if before is not None:
+        with contextlib.suppress(ValueError):  # only the main thread may set it
+            signal.signal(signal.SIGPIPE, before)
 
 
 @contextlib.contextmanager
