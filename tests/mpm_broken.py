@@ -11,6 +11,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import scalar
 from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.table import ACCELERATE, SUMS
+from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import along, register
 from karamelo_py.points.laws import (
@@ -26,7 +27,7 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return, updated_memory
-from karamelo_py.points.transfers import updated_velocity
+from karamelo_py.points.transfers import TransferTraits, updated_velocity
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Compute, Fix, heat_hook, node_hook, point_hook, vector_hook
 from karamelo_py.schemes.traits import SchemeTraits
@@ -468,9 +469,7 @@ for kind, number in ((Endless, inf), (Uncountable, nan)):
 
 # --- parts of a step
 class Basis(NamedTuple):
-    cells = nodes_per_cell = 1
-    least_nodes = 2
-    steady_moment = steep_edge = True
+    traits = BasisTraits(cells=1, least_nodes=2, steady_moment=True, steep_edge=True)
 
 
 class Pathless(Basis): ...
@@ -482,8 +481,22 @@ class Tuple(Basis): ...
 class Vague(NamedTuple): ...
 
 
+class Distorted(Basis):
+    gradient_jump = True
+
+
 class Lazy(NamedTuple):
-    inverts_spread = False
+    traits = TransferTraits()
+
+
+class Loose(Lazy):
+    inverts_spread = True
+
+
+class Stray(NamedTuple):
+    G: float
+
+    ring = False
 
 
 class Rowless(NamedTuple): ...

@@ -59,7 +59,7 @@ def made(basis, kin, size, real=float):
     """The grid under the basis: the lattice, and what kernels read."""
     d = kin.dimension
     hi = [lo + n * H for lo, n in zip(LO, size, strict=True)]
-    lattice = Lattice(d, LO[:d], hi[:d], H, basis.nodes_per_cell, basis.least_nodes)
+    lattice = Lattice(d, LO[:d], hi[:d], H, basis.traits.nodes_per_cell, basis.traits.least_nodes)
     return lattice, lattice.numbers(real)
 
 
@@ -219,12 +219,12 @@ def test_nodes_lie_within_the_span_of_a_cell(basis, size):
             for half in (0.01, 0.25, 0.5):
                 place = place_of(basis, Line(), x, (half,) * 3)
                 seen.update(stencil_of(basis, Line(), grid, place)[0].tolist())
-        n = basis.nodes_per_cell
+        n = basis.traits.nodes_per_cell
         # Beside a wall the span is the same, but lies further inside.
-        assert max(seen) - min(seen) <= max(basis.cells, basis.least_nodes - 1) * n
+        assert max(seen) - min(seen) <= max(basis.traits.cells, basis.traits.least_nodes - 1) * n
         if 2 <= cell <= last - 2:
-            assert min(seen) >= (cell - (basis.cells > 1)) * n
-            assert max(seen) <= (cell - (basis.cells > 1) + basis.cells) * n
+            assert min(seen) >= (cell - (basis.traits.cells > 1)) * n
+            assert max(seen) <= (cell - (basis.traits.cells > 1) + basis.traits.cells) * n
 
 
 def types(basis, r, kind):

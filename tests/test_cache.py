@@ -27,7 +27,7 @@ from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.kernels.step import step
 from karamelo_py.kernels.table import each_node
 from karamelo_py.output.console import Console
-from karamelo_py.run.runner import Timings
+from karamelo_py.run.timings import Timings
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

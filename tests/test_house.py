@@ -92,8 +92,22 @@ def long_signatures() -> int:
     return sum(len(one.posonlyargs) + len(one.args) > 5 for one in own)
 
 
+def guesses() -> int:
+    """Attributes that are read with a default: `getattr(x, "name", default)`."""
+    calls = (node for _, node in nodes(ast.Call))
+    return sum(ast.unparse(call.func) == "getattr" and len(call.args) == 3 for call in calls)
+
+
+def untyped_in_run() -> int:
+    """Uses of `Any` in run/."""
+    names = ((path, node.id) for path, node in nodes(ast.Name))
+    return sum(name == "Any" and room_of(path) == "run" for path, name in names)
+
+
 COUNTS = {
     "functions of kernels and points with more than five parameters": long_signatures,
+    "getattr with a default": guesses,
+    "Any in run/": untyped_in_run,
     "point functions that are lambdas": lambdas,
     "functions named `_`": unnamed_functions,
     "names that several classes have": lambda: len(shared_class_names()),

@@ -449,7 +449,7 @@ def test_weights_gather_and_scatter(kind, by, spread):
     else:
         x = np.concatenate([x, np.repeat(domain[:, None], n, axis=1)])
     x[2:] *= 1 + 0.1 * rng.uniform(size=(len(x) - 2, n))
-    per_cell = basis.nodes_per_cell
+    per_cell = basis.traits.nodes_per_cell
     step = per_cell * GRID.ny + 1
     grid = GRID._replace(step_x=step)
     count = (per_cell * GRID.nx + 1) * step

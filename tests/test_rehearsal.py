@@ -9,7 +9,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.advice import known_failures
-from karamelo_py.run.runner import Runner
+from karamelo_py.run.loop import RunLoop
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 
@@ -226,6 +226,6 @@ def test_advice_knows_the_runs_behind_each(runs, later, tmp_path, monkeypatch):
         found.append([step.span[1] for step in known_failures.later_steps(hub)])
         hub.runs.append({})
 
-    monkeypatch.setattr(Runner, "run", note)
+    monkeypatch.setattr(RunLoop, "run", note)
     Interpreter(hub).run_text(BLOCK + runs)
     assert found == later

@@ -162,9 +162,11 @@ def test_it_is_never_more_than_check_says_and_most_of_it(run_interpreted, monkey
     """Of what would run nothing is refused: check counts the arrays as they are."""
     hub = Hub(Console(quiet=True))
     hub.checking = True
-    monkeypatch.setattr("karamelo_py.run.runner.report", lambda *_: None)
-    monkeypatch.setattr("karamelo_py.run.runner.known_failures.warn", lambda *_: None)
-    monkeypatch.setattr("karamelo_py.run.runner.known_failures.warn_about_length", lambda *_: None)
+    monkeypatch.setattr("karamelo_py.commands.run.report", lambda *_: None)
+    monkeypatch.setattr("karamelo_py.commands.run.known_failures.warn", lambda *_: None)
+    monkeypatch.setattr(
+        "karamelo_py.commands.run.known_failures.warn_about_length", lambda *_: None
+    )
     hub.interpreter = Interpreter(hub)
     with suppress(Quit):
         hub.interpreter.run_file(str(INPUTS / f"in.{script}"))

@@ -74,7 +74,7 @@ class Met:
     def __init__(self, basis, kin, x):
         d = kin.dimension
         hi = [lo + n * H for lo, n in zip(LO, CELLS, strict=True)]
-        lattice = Lattice(d, LO, hi, H, type(basis).nodes_per_cell, type(basis).least_nodes)
+        lattice = Lattice(d, LO, hi, H, basis.traits.nodes_per_cell, basis.traits.least_nodes)
         self.basis, self.kin, self.grid = basis, kin, lattice.numbers(float)
         self.stencil = locate(basis, kin, self.grid, x)
         entries = [entry(basis, kin, self.grid, self.stencil, k) for k in self.count]

@@ -117,7 +117,7 @@ def main() -> None:
     # Before the bases are there, which register it: a tenth of what steps take.
     product._entry_product = remembered(product._entry_product)
     from karamelo_py.app import cli
-    from karamelo_py.run import runner  # noqa: F401
+    from karamelo_py.run import loop  # noqa: F401
 
     cli._parser = functools.cache(cli._parser)  # a third of what a tiny scene takes
     gc.freeze()  # scenes make many objects, among which alone cycles have to be looked for

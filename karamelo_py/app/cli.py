@@ -363,8 +363,8 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
 
         from karamelo_py.language.interpreter import Interpreter
         from karamelo_py.output.console import Console
+        from karamelo_py.run.loop import Interrupted
         from karamelo_py.run.lower.card import use_card
-        from karamelo_py.run.runner import Interrupted
         from karamelo_py.scene.hub import Hub
     begun()
     # Errors of the program replace NumPy's warnings.

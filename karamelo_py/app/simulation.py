@@ -26,9 +26,9 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output import record
 from karamelo_py.output.console import Console
 from karamelo_py.output.fields import unknown_column
+from karamelo_py.run.loop import Interrupted
 from karamelo_py.run.lower.card import take_card, use_card
 from karamelo_py.run.mpi.comm import launched
-from karamelo_py.run.runner import Interrupted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import set_columns
 from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, instead, nearest
@@ -147,7 +147,7 @@ class PointColumns(Columns):
 
     def __setitem__(self, name: str, values: Any) -> None:
         with _as_simulation_error():
-            if self._hub.running is not None:
+            if self._hub.in_run:
                 raise ScriptError(
                     f"points['{name}'] cannot be set within a run",
                     hint="between two runs, or by the argument of the function of fix python",

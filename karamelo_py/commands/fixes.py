@@ -13,7 +13,7 @@ from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError, instead
 from karamelo_py.script.expressions import SEEDS, Expression
 from karamelo_py.styles.computes.means import CenterOfMass
-from karamelo_py.styles.fixes.measuring import COME_FIRST, Measuring
+from karamelo_py.styles.fixes.measuring import Measuring
 
 
 def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
@@ -273,11 +273,7 @@ def _total(hub: Hub, name: str, group: AnyGroup, direction: str) -> Expression:
     """The value of the fix that measures it, which is made on first use."""
     ID = f"{name}({group.id})"
     if ID not in hub.fixes:
-        others = dict(hub.fixes)
-        if name in COME_FIRST:
-            hub.fixes.clear()
         _file(hub, hub.fixes, ID, Measuring(hub, group, name), name)
-        hub.fixes.update(others)
     return Expression.seed(f"{ID}_{direction}")
 
 

@@ -17,7 +17,7 @@ from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Respons
 from karamelo_py.run.lower.check_plugins import try_law
 from karamelo_py.scene.hub import Catalogue, Hub
 from karamelo_py.scene.material import Material, MaterialPart
-from karamelo_py.scene.plugins import attributed, check_columns
+from karamelo_py.scene.plugins import attributed, check_law
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
 
@@ -128,7 +128,7 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     entry = (Material if kind == "material" else MaterialPart)(kind, style, made, given)
     if isinstance(entry, Material):
         fit_to_domain(hub, entry)
-    check_columns(hub, f"{kind} {style}", entry.law)
+    check_law(hub, f"{kind} {style}", entry.law)
     catalogue.add(ID, entry)
 
 

@@ -1,21 +1,66 @@
 """Commands that run the simulation, and that write and read files to resume from."""
 
-from math import isnan
+from math import inf, isnan
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from karamelo_py.language.kinds import kind_of
 from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Positive
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
+from karamelo_py.run.advice import known_failures
+from karamelo_py.run.advice.listener import Narrator
+from karamelo_py.run.advice.report import report
 from karamelo_py.run.checkpoint import restart_file
-from karamelo_py.run.runner import carry_out
+from karamelo_py.run.loop import RunLoop
+from karamelo_py.run.lower.build import check_scene
+from karamelo_py.run.lower.card import refuse, take_card
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Pause, Quit, ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 OnTrouble = Literal["stop", "halve"]
 _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
+
+
+def carry_out(hub: Hub, **length: Any) -> None:
+    """Carry out a run command of a `length` (see `RunLoop`), or what stands for it now.
+
+    A rehearsal takes note of it, a program stops in front of it, and ``check`` reports in its
+    place; a run that was over in the file that a script goes on from is passed over.
+    """
+    run = RunLoop(hub, **length, advice=Narrator(hub))
+    check_scene(hub)
+    if hub.rehearsing:
+        hub.begun += 1
+        if hub.settings.card:
+            refuse(hub)
+        span = run.end_time - hub.update.time, inf if run.steps is None else run.steps
+        if not hub.update.scheme.traits.implicit:
+            hub.later.append(known_failures.step_of(hub, run.rollback.halve, span))
+        hub.in_runs += hub.lasting()
+        return
+    if hub.pausing:
+        raise Pause
+    hub.begun += 1
+    hub.rehearse()
+    if hub.checking:
+        report(hub, run.end_time)
+        run.tell(lambda to: to.begun(run, hub.simulation))
+        hub.simulation.refuse()
+        if hub.simulation.implicit:
+            hub.simulation.load_steps.refuse_all_loose()
+        raise Quit
+    take_card(hub)
+    replay = hub.interpreter.replay
+    if replay is None or replay.at_end:
+        run.run()
+        return
+    after = hub.restart.content["runs"][len(hub.runs)]
+    for name, value in after.items():
+        if name in hub.values:
+            hub.values.set(name, value)
+    hub.runs.append(after)
 
 
 def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:

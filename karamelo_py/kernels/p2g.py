@@ -142,7 +142,7 @@ class SquaredMass(SummedField):
     @staticmethod
     def needed(basis: Any) -> bool:
         """Return True if a basis makes light nodes that affect the gradient."""
-        return basis.steep_edge
+        return basis.traits.steep_edge
 
 
 class Centre(SummedField):

@@ -25,7 +25,7 @@ from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.points.transfers import Moment
+from karamelo_py.points.transfers import stores_moment
 from karamelo_py.points.transfers.xpic import XPIC
 
 
@@ -342,7 +342,7 @@ def light_node(s):
     frame where points have moments: what comes back through these is all of the node's velocity,
     and any limit makes it grow. The step knows such nodes there.
     """
-    if Moment in getattr(s.transfer, "point_fields", ()) and not s.frame.moves:
+    if stores_moment(s.transfer) and not s.frame.moves:
         return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
     clock = s.control.clock[0]
     courant = clock.rate * s.control.values[arrays.DT] / clock.spacing

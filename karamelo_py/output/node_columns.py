@@ -91,7 +91,7 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
         i, last = lattice.places(nodes.ids[own])[:, axis], lattice.shape[axis] - 1
         if splines:
             found[own] = np.minimum(2, i) - np.minimum(2, last - i)
-        elif basis.nodes_per_cell == 2:
+        elif basis.traits.nodes_per_cell == 2:
             found[own] = i % 2
     return found
 

@@ -293,7 +293,7 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
     points = part.points
     kept = fields.field(points.fields, Moment)
     moment = kept.copy()
-    if getattr(s.transfer, "keeps_gradient", False):
+    if s.transfer.traits.keeps_gradient:
         where = points.x[s.control.clock[0].now] if points.home is None else points.home
         export.export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
     if not s.frame.moves:

@@ -30,9 +30,9 @@ CUBIC = Borne((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1, damps
 
 def borne(basis: Any) -> Borne:
     """Return the limits of a basis: its own, or those for similar bases."""
-    usual = BOXES if basis.steep_edge else QUADRATIC
-    usual = JUMPS if getattr(basis, "gradient_jumps", False) else usual
-    return getattr(basis, "borne", usual)
+    traits = basis.traits
+    usual = BOXES if traits.steep_edge else QUADRATIC
+    return traits.borne or (JUMPS if traits.gradient_jumps else usual)
 
 
 GROWS = "velocity noise in the null space of the grid grows with each cell"

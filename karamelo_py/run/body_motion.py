@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
-from karamelo_py.points.laws import law_kind
+from karamelo_py.points.laws import law_kind, law_traits, parameter
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.noise import borne
 from karamelo_py.run.boxes import unique
@@ -126,16 +126,16 @@ class Noise(NamedTuple):
 
 def rings(law: Any) -> bool:
     """Return True if a body of this law vibrates: not fluids and flowing materials."""
-    if getattr(law, "rebounds", False):
+    if law_traits(law).rebounds:
         return True
-    strength = getattr(law, "strength", None)
-    silent = strength is None or not getattr(strength, "rings", True)
+    strength = parameter(law, "strength", None)
+    silent = strength is None or not law_traits(strength).rings
     return not silent and shear_modulus(strength) > 0
 
 
 def yields(law: Any) -> bool:
     """Return True if an impact is dissipated by plastic flow."""
-    return not any(getattr(kind, "rebounds", False) for kind in law_kind(law))
+    return not any(law_traits(kind).rebounds for kind in law_kind(law))
 
 
 def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
-from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
+from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion, sides
 
@@ -42,7 +42,7 @@ class Crossing(NamedTuple):
 def loses(scene: Any) -> bool:
     """Return True if stress is lost in the scene; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in scene.hub.solids.values()]
-    flows = (any(getattr(kind, "any_speed", False) for kind in law_kind(law)) for law in laws)
+    flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not scene.scheme.traits.implicit
     return explicit and scene.moves and scene.linear and not any(flows)
 

@@ -20,6 +20,7 @@ from karamelo_py.points.laws import (
     can,
     constrained_velocity,
     initial_state,
+    parameter,
     specific_volume,
     wave_speed_squared,
 )
@@ -138,8 +139,8 @@ def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -
 
 def _shear_share(law: Any, kin: Any) -> float:
     """Return the shear modulus over the P-wave modulus: 1/2 (Poisson's ratio 0) at most."""
-    strength = getattr(law, "strength", None)
-    G = getattr(law, "G", None) or (shear_modulus(strength) if strength else inf)
+    strength = parameter(law, "strength", None)
+    G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
     return min(float(G / stiffness), 0.5)
 

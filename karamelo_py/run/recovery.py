@@ -1,21 +1,21 @@
 """Recovery of a run after a failed step or an energy gain: halve the step, or end the run."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.diagnosis import energy, explain
-from karamelo_py.run.diagnosis.trouble import Trouble, when
-from karamelo_py.run.timestep import LimitsTold, own_step_instead
+from karamelo_py.run.listening import Trouble, when
+from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 5  # at most, in a run
 RETURNS = 2  # at most, to one state before an energy gain: two halvings without effect are enough
@@ -39,26 +39,22 @@ class OthersWait(Exception):
 class RollBack:
     """The last good state of a run, and the return to it, to `halve` the step or to end."""
 
-    def __init__(self, hub: Hub, *, halve: bool):
-        self.hub, self.halve, self.place = hub, halve, hub.place
-        self.point = RollbackPoint(hub)
-        self.halvings = self.returns = 0
+    def __init__(self, hub: Hub, tell: Callable, *, halve: bool):
+        self.hub, self.tell, self.place = hub, tell, hub.place
+        self.halve, self.point = halve, RollbackPoint(hub, halve)
 
-    def begin(self, simulation: Any, first_step: int, *, ruined: bool, looks_always: bool) -> None:
+    def begin(self, simulation: Simulation, first_step: int, ruined: bool, looks: bool) -> None:
         """Begin with the present state, or with the good one of the resumed file.
 
         A step above the limit may have spoilt the present state (`ruined`); values of parts may be
-        read between any two steps (`looks_always`).
+        read between any two steps (`looks`).
         """
-        self.simulation, self.first_step, self._always = simulation, first_step, looks_always
-        # Said of the first state: a later one is ruined, and its limit with it.
-        self.smaller = "a smaller time step" if ruined else own_step_instead(self.hub)
-        self.smaller *= explain.is_too_large(simulation)
+        self.simulation, self.first_step, self._always = simulation, first_step, looks
+        self.too_large = explain.is_too_large(simulation)
         # Deleted points would not come back.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
         self.begun_at = -1 if lost else simulation.step
-        self._limits = None if simulation.implicit else LimitsTold(simulation)
         if not self.point.arrays:
             self._keep()
 
@@ -69,13 +65,9 @@ class RollBack:
         step = self.simulation.step
         # When states are stored must not depend on the speed of steps: runs return to them.
         # Load steps take long: none is repeated.
-        often = (
-            step % self.simulation.states_every == 0
-            or step == self.first_step + 1
-            or self.simulation.implicit
-        )
-        due = step != self.point.step and often
-        if due and energy.grown_little(self.simulation):
+        often = self.simulation.implicit or step == self.first_step + 1
+        often |= step % self.simulation.states_every == 0
+        if often and step != self.point.step and energy.grown_little(self.simulation):
             self._keep()
         else:
             self.point.note(always=self._always)
@@ -86,24 +78,14 @@ class RollBack:
         if status != DONE:
             if status == STOPPED and boundary.delete_leaving(hub, simulation, self.point.arrays):
                 self._keep()
-            elif not self._halve_step(status=status):
+            elif not self._halve_step(status):
                 self._stop(status)
             return False
-        found = None if simulation.told_of_growth else energy.words_of_growth(hub, simulation)
-        if found is not None:
-            if self.returns < RETURNS and self._halve_step(found):
-                self.returns += 1
-                energy.forget_growth(simulation)
-                return False
-            hub.warn(found.message, hint=found.fix, code=found.code, cause=found.cause)
-            simulation.told_of_growth = True
-        self.tell_of_loss(WITHIN)
-        if (
-            self._limits
-            and simulation.step % simulation.states_every == 0
-            and (words := self._limits.words())
-        ):
-            hub.console.say(render_message("note", words))
+        grown = not simulation.told_of_growth and energy.has_grown(simulation)
+        if grown and self.point.returns < RETURNS and self._halve_step(DONE):
+            self.point.returns += 1
+            energy.forget_growth(simulation)
+            return False
         return True
 
     def act_between_steps(self) -> None:
@@ -113,42 +95,39 @@ class RollBack:
         if sum(fix.between_steps() for fix in due):
             self._keep()
 
-    def tell_of_loss(self, within: float) -> None:
-        """Warn once of an energy loss above a fraction of the largest energy."""
-        hub, simulation = self.hub, self.simulation
-        lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
-        if lost is not None:
-            hub.warn(lost.message, hint=lost.fix, code=lost.code, cause=lost.cause)
-            simulation.told_of_loss = True
-
     def _keep(self) -> None:
         self.point.keep(self.simulation)
-        self.returns = 0
+        self.point.returns = 0
 
-    def _halve_step(self, found: Trouble | None = None, status: int = DONE) -> bool:
+    def _halve_step(self, status: int) -> bool:
         """Return to the last good state with half the step, if the script allows it."""
-        hub, simulation = self.hub, self.simulation
-        if not self.halve or self.halvings == HALVINGS:
+        simulation, point = self.simulation, self.point
+        if not self.halve or point.halvings == HALVINGS:
             return False
         if status == STOPPED and self._points_only_leave():
             return False
-        found = found or explain.trouble(hub, simulation, status)
-        self.halvings += 1
+        found = self._explained(status)
         # Rows of log and dumps written since are removed with their states.
-        self.point.return_to(simulation, cut=True)
-        self.point.forget_later()
-        simulation.halve_step(self.halvings)
-        while simulation.above_limit() and self.halvings < HALVINGS:
+        point.return_to(simulation, cut=True)
+        while True:
+            point.halvings += 1
+            simulation.halve_step(point.halvings)
             # Steps above the limit would fail again.
-            self.halvings += 1
-            simulation.halve_step(self.halvings)
-        hub.warn(
-            f"{found.message}. Back to {when(simulation)}, with 1/{2**self.halvings} of the step",
+            if point.halvings == HALVINGS or not simulation.above_limit():
+                break
+        self.hub.warn(
+            f"{found.message}. Back to {when(simulation)}, with 1/{2**point.halvings} of the step",
             place=self.place,
             code=found.code,
             cause=found.cause,
         )
         return True
+
+    def _explained(self, status: int, *, too_large: bool = False) -> Trouble:
+        """Have a listener explain what went wrong."""
+        simulation = self.simulation
+        found = self.tell(lambda to: to.wrong(simulation, status, too_large=too_large))
+        return found or Trouble(f"a step has failed ({when(simulation)})", SMALLER_STEP, "point")
 
     def _points_only_leave(self) -> bool:
         """Return True if points leave without an energy gain: no smaller step prevents this."""
@@ -172,9 +151,8 @@ class RollBack:
         the last state that has no fault itself. If the step was too large from the start, it is the
         initial state: no later state is good.
         """
-        too_large = self.smaller and not self.simulation.control.clock[0].watch_limit
-        smaller = self.smaller if too_large else ""
-        found = explain.trouble(self.hub, self.simulation, status, smaller)
+        too_large = self.too_large and not self.simulation.control.clock[0].watch_limit
+        found = self._explained(status, too_large=too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):
             resume = self._keep_start(status) if too_large else self._keep_good(status)

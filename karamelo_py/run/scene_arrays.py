@@ -23,6 +23,7 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.access import NodesByNumber
 from karamelo_py.run.checkpoint import arrays as checkpoint
+from karamelo_py.run.checkpoint.parts import RollbackPoint
 from karamelo_py.run.lower.build import State, check_scene, lower, thread_count, warms_by_friction
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
@@ -75,7 +76,7 @@ class SceneArrays:
         self.key = scene_key(hub)
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
-        check_room(hub, copied=previous is None and hub.running is not None)
+        check_room(hub, copied=previous is None and bool(hub.in_run))
         # Processes begin with equal ranges of the ids: sorting distributes them by tiles.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
@@ -98,6 +99,7 @@ class SceneArrays:
         self.followed = False  # whether the clock knows the balance of energy up to it
         self.told_of_growth = False  # since the balance of energy is followed
         self.told_of_loss = False
+        self.rollback: RollbackPoint | None = None  # of the last run
         self.mapped = False  # whether the nodes show a state of this simulation
         for solid in hub.solids.values():
             if solid.initial and (state is None or solid.first_id >= state.count):

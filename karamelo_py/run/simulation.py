@@ -42,6 +42,7 @@ class Simulation(SceneArrays):
         self.beginning: list = []  # fixes of the first step that act in this run
 
     states_every = 100  # steps between two states that a run can go back to
+    between: Callable[[str], bool] | None = None
     taken_up = False  # a step continues with other arrays after its first stage
 
     @cached_property
@@ -261,8 +262,12 @@ class Simulation(SceneArrays):
         clock[:] = present
         return energy
 
-    def advance(self, count: int) -> int:
-        """Take up to `count` steps (to the end time at most); DONE, or why it stopped."""
+    def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
+        """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
+
+        Load steps call `between` with words of how far one is; if it returns True, they end.
+        """
+        self.between = between
         self.control.clock[0].wrong = 0  # from earlier steps that were not undone
         with self.comm.joint():
             if self.subdomain is None:
@@ -347,7 +352,7 @@ class Simulation(SceneArrays):
     def _make_ready(self) -> None:
         """Prepare the hooks of the fixes, and contact, for a run."""
         # Fixes act once before the first step, in it, or in every step.
-        fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.acts_last)
+        fixes = sorted(self.hub.fixes.values(), key=lambda fix: fix.order)
         lasting = [fix for fix in fixes if not fix.first_step_only]
         new = [fix for fix in fixes if fix.first_step_only and fix not in self.begun]
         self.python = PythonHooks(self, lasting)

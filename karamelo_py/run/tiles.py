@@ -54,9 +54,9 @@ class Tiles:
         if self.long:
             self.size[-1] *= LONGER
             self.node_size[:] = 1, 1, self.size[-1]
-        self.per_cell = type(basis).nodes_per_cell
-        self.least_nodes = type(basis).least_nodes
-        self.beyond = type(basis).cells // 2  # nodes that points see beyond those of their cell
+        self.per_cell = basis.traits.nodes_per_cell
+        self.least_nodes = basis.traits.least_nodes
+        self.beyond = basis.traits.cells // 2  # nodes that points see beyond those of their cell
         self.sorts = self.sets = 0  # number of sorts; sets of buffers
         self.rows = 0  # of the buffers, for the boxes of all tiles
         self.occupied = 0  # tiles that hold points

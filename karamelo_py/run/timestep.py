@@ -14,11 +14,13 @@ from karamelo_py.points.laws import (
     can,
     constrained_velocity,
     initial_state,
+    law_traits,
+    parameter,
     wave_speed_squared,
 )
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.strengths import shear_modulus
-from karamelo_py.points.transfers import Moment
+from karamelo_py.points.transfers import flip_coefficient, stores_moment
 from karamelo_py.run.body_motion import motions
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.traits import USUAL
@@ -48,11 +50,11 @@ def keeping_share(hub: Hub) -> float:
     table of the documentation: at most 10 % in 50 periods.
     """
     update = hub.update
-    alpha = getattr(update.transfer, "alpha", 0.0)
+    alpha = flip_coefficient(update.transfer)
     if not update.method.frame.moves or not alpha > 0.9:
         return USUAL
-    basis = update.method.basis
-    kind = getattr(basis, "gradient_jumps", False) * basis.nodes_per_cell
+    basis = update.method.basis.traits
+    kind = basis.nodes_per_cell if basis.gradient_jumps else 0
     keeping = update.scheme.traits.keeping or ((USUAL, USUAL),) * 3
     share = keeping[kind][sparse(hub)]
     if alpha > 0.99:
@@ -60,18 +62,13 @@ def keeping_share(hub: Hub) -> float:
     return max(share, DAMPED) if sparse(hub) else USUAL
 
 
-def keeps_moments(hub: Hub) -> bool:
-    """Return True if points store moments or gradients of their velocity."""
-    return Moment in getattr(hub.update.transfer, "point_fields", ())
-
-
 def _keeps_velocities(hub: Hub) -> bool:
     """Return True if FLIP-like points move through the grid, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
-        and getattr(update.transfer, "alpha", 0.0) > 0.9
-        and not keeps_moments(hub)
+        and flip_coefficient(update.transfer) > 0.9
+        and not stores_moment(hub.update.transfer)
         and min(update.scheme.traits.courant) >= 1
     )
 
@@ -83,10 +80,8 @@ def _deforming(hub: Hub) -> list[Any]:
 
 def _flows(law: Any) -> bool:
     """Return True if a body of this law has no stable shape, like liquids and soils."""
-    strength = getattr(law, "strength", None)
-    return strength is not None and (
-        getattr(strength, "flows", False) or not shear_modulus(strength) > 0
-    )
+    strength = parameter(law, "strength", None)
+    return strength is not None and (law_traits(strength).flows or not shear_modulus(strength) > 0)
 
 
 def lone_point(hub: Hub) -> float:
@@ -98,12 +93,12 @@ def lone_point(hub: Hub) -> float:
     a gas then store no moments (`kernels.loss.in_company`).
     """
     update = hub.update
-    keeps = keeps_moments(hub) and update.method.frame.moves
-    stiff = getattr(update.method.basis, "lone", None)
+    keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
+    stiff = update.method.basis.traits.lone
     flowing = any(_flows(law) and not can(law, taken_heat) for law in _deforming(hub))
     if not (keeps and stiff and flowing):
         return inf
-    by_gradient = not getattr(update.transfer, "inverts_spread", False)
+    by_gradient = not update.transfer.traits.inverts_spread
     return LONE * 2 / sqrt(stiff[by_gradient] * hub.domain.dimension)
 
 
@@ -114,14 +109,14 @@ def bears_drift(hub: Hub) -> bool:
     smooth basis functions (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks
     fracture sooner with these steps.
     """
-    basis, scheme = hub.update.method.basis, hub.update.scheme
+    basis, scheme = hub.update.method.basis.traits, hub.update.scheme
     laws = _deforming(hub)
     return (
         _keeps_velocities(hub)
         and len(laws) == 1  # one elastic or metallic solid
         and not _flows(laws[0])
-        and not getattr(basis, "gradient_jumps", False)
-        and (getattr(basis, "bears_drift", False) or scheme.traits.bears_drift)
+        and not basis.gradient_jumps
+        and (basis.bears_drift or scheme.traits.bears_drift)
         and keeping_share(hub) == USUAL
     )
 
@@ -135,8 +130,8 @@ def own_weight_of_drift(hub: Hub) -> float:
     """
     if bears_drift(hub):
         return 0.0
-    basis = hub.update.method.basis
-    boxes = getattr(basis, "steep_edge", False) and basis.cells > 1
+    basis = hub.update.method.basis.traits
+    boxes = basis.steep_edge and basis.cells > 1
     fed = boxes and _keeps_velocities(hub) and not hub.update.scheme.traits.bears_drift
     return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
@@ -157,7 +152,8 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
     In the total frame the nodes of a thin or round body reduce it for points with moments.
     """
     update = hub.update
-    if keeps_moments(hub) and not (update.method.frame.moves or update.scheme.traits.implicit):
+    other = update.scheme.traits.implicit or update.method.frame.moves
+    if stores_moment(update.transfer) and not other:
         return min(_courant_of_scheme(hub, longer=longer), hub.simulation.light_nodes)
     return _courant_of_scheme(hub, longer=longer)
 
@@ -168,16 +164,16 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
     two, one = scheme.traits.courant
     if min(two, one) < 1:
         # Nodes between the corners of cells raise the highest frequency.
-        nodes = 0.7 if method.basis.nodes_per_cell > 1 else 1
+        nodes = 0.7 if method.basis.traits.nodes_per_cell > 1 else 1
         return (one if sparse(hub) else two) * nodes
     if not method.frame.moves:
-        return getattr(method.basis, "courant_total", 1.0)
+        return method.basis.traits.courant_total
     if not longer:
         return 1.0
-    still = getattr(method.basis, "courant_still", 1.0)
+    basis = method.basis.traits
     if scheme.traits.strained_before == 1:
-        return min(still, getattr(method.basis, "courant_strained_first", inf))
-    return still
+        return min(basis.courant_still, basis.courant_strained_first)
+    return basis.courant_still
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
@@ -188,7 +184,7 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     """
     method, share = hub.update.method, keeping_share(hub)
     # Transfers of moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic ones.
-    still &= method.frame.moves and not keeps_moments(hub)
+    still &= method.frame.moves and not stores_moment(hub.update.transfer)
     if still:
         # A lone point with a linear basis is stable up to 0.8 h/c in 3D.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
@@ -333,28 +329,6 @@ def ruling_limit(simulation: Any) -> str:
     return "waves"
 
 
-class LimitsTold:
-    """Report changes of the limit of the step: each name once, and a limit that has halved."""
-
-    def __init__(self, simulation: Any):
-        self.simulation, self.names = simulation, {ruling_limit(simulation)}
-        self.least = simulation.limit
-
-    def words(self) -> str:
-        """Describe a change since the last report; empty if there is none."""
-        simulation = self.simulation
-        name, limit, before = ruling_limit(simulation), simulation.limit, self.least
-        halved = not limit > 0.5 * before
-        if name in NO_LIMITS or (name in self.names and not halved):
-            return ""
-        self.names.add(name)
-        self.least = min(limit, before)
-        return (
-            f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by {name} "
-            f"now: {limit:.4g} is stable, {before:.4g} before"
-        )
-
-
 def fastest_wave(simulation: Any) -> float:
     """Find the fastest wave in the undeformed materials, without viscosity."""
     return max(elastic_speed(simulation, solid)[0] for solid in simulation.hub.solids.values())
@@ -363,9 +337,9 @@ def fastest_wave(simulation: Any) -> float:
 def elastic_speed(simulation: Any, solid: Any) -> tuple[float, bool]:
     """Find the fastest wave of an undeformed solid without viscosity, and whether it is viscous."""
     law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
-    if not isinstance(getattr(law, "viscosity", Absent()), Absent):
+    if not isinstance(parameter(law, "viscosity", Absent()), Absent):
         law, viscous = law._replace(viscosity=Absent()), True
-    if getattr(getattr(law, "strength", None), "mu", 0) > 0:
+    if parameter(parameter(law, "strength"), "mu") > 0:
         law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
     kin = simulation.kin
     return sqrt(float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))), viscous

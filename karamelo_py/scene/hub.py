@@ -218,8 +218,9 @@ class Hub:
         self.output = Output(self)
         self.fields = Fields(self)
         self.functions: dict[str, Any] = {}  # in Python, that a program has given
-        self.running: Any = None  # the run in progress
-        self._fits_run: Any = None  # the last one that found the arrays to fit the scene
+        self.in_run = 0  # the number of the run in progress, if there is one
+        self.listeners: list[Any] = []  # of runs (`run.listening.Listener`)
+        self._fits_run = 0  # the last one that found the arrays to fit the scene
         self.runs: list[dict[str, float]] = []  # published values at the end of each so far
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []  # times and messages, for live pages
@@ -241,8 +242,8 @@ class Hub:
     @property
     def simulation(self) -> Any:
         """The arrays of the scene as it is now, made when first asked for; a run changes none."""
-        run, known = self.running, self._simulation
-        if known is not None and run is not None and run is self._fits_run:
+        run, known = self.in_run, self._simulation
+        if known is not None and run and run == self._fits_run:
             return known
         self._fits_run = run
         if known is None or not known.fits(self):

@@ -38,6 +38,7 @@ __all__ = [
 ]
 
 
+FIRST, USUAL, LAST = range(3)  # among the fixes that act at a stage, else as in the script
 FROM_PYTHON = 3e-4  # seconds per call of a Python hook, without its work
 
 
@@ -104,7 +105,7 @@ class Fix(Publisher):
     faces_of: Any = None  # present faces of a tool that consists of faces, (m, d, d)
     accelerates = False  # its formulas are forces per mass, such as gravity
     brakes = False  # dissipates energy
-    acts_last = False  # acts after all others at each stage, wherever the script defines it
+    order = USUAL  # FIRST or LAST at each stage, wherever the script defines it
     # Its Python hooks add no energy: they store, transfer or dissipate it. Otherwise the energy
     # balance is not monitored.
     conserves = False

@@ -32,19 +32,18 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.point_table import declared_columns
 from karamelo_py.points import laws
+from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.kinematics import KINEMATICS
-from karamelo_py.points.transfers import updated_velocity
+from karamelo_py.points.laws import LawTraits, law_traits
+from karamelo_py.points.transfers import TransferTraits, updated_velocity
 from karamelo_py.scene.modify import Fix
 from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import FAILURES
 from karamelo_py.script.values import in_a_row
 
-# Attributes that the class of a part must define.
-SAID = {
-    "basis": ("cells", "nodes_per_cell", "least_nodes", "steady_moment", "steep_edge"),
-    "transfer": ("inverts_spread",),
-    "scheme": ("rows", "traits"),
-}
+# Attributes that the class of a part must have.
+SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "traits")}
+TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
 ROWS = (
     table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
     table.Check,
@@ -203,22 +202,32 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
     family, kind = name.partition(" ")[0], type(part)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
     what = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""
+    if family in TRAITS and not what:
+        what = _wrong_traits(kind, kind.traits, TRAITS[family])
     if family == "transfer" and not updated_velocity.defined(kind):
         what = what or f"updated_velocity is not defined for {kind.__name__}"
     if family == "scheme" and not what:
-        loose = [name for name in SchemeTraits._fields if hasattr(kind, name)]
         strange = [row for row in kind.rows if not isinstance(row, ROWS)]
-        if not isinstance(kind.traits, SchemeTraits):
-            what = f"its traits are {kind.traits!r}, and no SchemeTraits(...)"
-        elif loose:
-            what = f"{loose[0]} is one of its traits: traits = SchemeTraits({loose[0]}=...)"
-        elif strange:
+        if strange:
             what = f"{strange[0]!r} in its rows is not a row of a scheme"
         elif not any(isinstance(row, table.Scatter) for row in kind.rows):
             what = "none of its rows is a Scatter: nothing reaches the grid"
     if what:
         raise faults.fault(name, what, hub.place)
     check_fields(hub, name, part, hub.place)
+
+
+def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
+    """Say what is wrong with the traits of a class: another type, or some outside of them."""
+    if not isinstance(traits, wanted):
+        return f"its traits are {traits!r}, and no {wanted.__name__}(...)"
+    names = wanted._fields  # type: ignore[attr-defined]
+    for name in sorted(set(dir(kind)) - {"traits", *getattr(kind, "_fields", ())}):
+        close = [] if name.startswith("_") else get_close_matches(name, names, 1, ALIKE)
+        if close:
+            means = "is" if name in names else "looks like"
+            return f"{name} {means} one of its traits: traits = {wanted.__name__}({close[0]}=...)"
+    return ""
 
 
 def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
@@ -240,8 +249,10 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
                     raise faults.fault(name, what, place)
 
 
-def check_columns(hub: Scene, name: str, law: Any) -> None:
-    """Refuse a law, or part of a law, with a column name that is in use."""
+def check_law(hub: Scene, name: str, law: Any) -> None:
+    """Refuse a law, or a part of one, with wrong traits, or whose columns mean something else."""
+    if is_foreign(type(law)) and (what := _wrong_traits(type(law), law_traits(law), LawTraits)):
+        raise faults.fault(name, what, hub.place)
     for column in laws.columns_of(law):
         if shows := _shows(hub, column, None):
             raise faults.fault(name, f"the column '{column}' is {shows}", hub.place)

@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import can, law_kind, specific_volume
+from karamelo_py.points.laws import can, law_kind, parameter, specific_volume
 from karamelo_py.points.laws.doubts import reference_temperatures
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain, require_domain
@@ -79,7 +79,7 @@ class Solid(Named):
                 "eos-strength",
             )
         T0 = self.T0 if can(self.material.law, initial_heat) else None
-        Tm = min((getattr(part, "Tm", math.inf) for part in self.material.whole), default=math.inf)
+        Tm = min((parameter(part, "Tm", math.inf) for part in self.material.whole), default=math.inf)
         if T0 is not None and T0 < 0:
             hub.warn(
                 f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",

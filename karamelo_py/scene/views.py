@@ -387,7 +387,7 @@ class PointsView(View):
                 slopes = np.nan_to_num(gradient(s.frame.moves, simulation.hub.domain.h / 16)).T
             given = np.zeros((d * d, len(rows)), kept.dtype)
             given[here] = slopes[:, own]
-            if not s.transfer.keeps_gradient:
+            if not s.transfer.traits.keeps_gradient:
                 # B = D grad v, as computed from nodes
                 places = points.x[simulation.now] if points.home is None else points.home
                 where = np.ascontiguousarray(places[:, rows])

@@ -6,10 +6,6 @@ from typing import Any, NamedTuple
 USUAL = 0.9  # of the stable step, which the program takes where nothing asks for less
 
 
-def _none(scheme: Any) -> str:
-    return ""
-
-
 class SchemeTraits(NamedTuple):
     """Traits of a scheme; a plug-in gives those that differ from these defaults."""
 
@@ -31,4 +27,4 @@ class SchemeTraits(NamedTuple):
     # Vibrations are damped, with two points per cell and direction.
     damps: bool = False
     # What damps vibrations through the parameters of the scheme; empty if nothing does.
-    damping: Callable[[Any], str] = _none
+    damping: Callable[[Any], str] = lambda scheme: ""

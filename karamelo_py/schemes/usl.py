@@ -47,7 +47,7 @@ class USL(NamedTuple):
 
 def _thin_edges(scheme, scene):
     """Return True if boxes have edges on which moments act."""
-    boxes = scene.basis.steep_edge and scene.basis.cells > 1
+    boxes = scene.basis.traits.steep_edge and scene.basis.traits.cells > 1
     return scene.moments and boxes and not gradient_weight.defined(type(scene.transfer))
 
 

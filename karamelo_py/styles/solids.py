@@ -89,7 +89,7 @@ class RegionSolid(Solid):
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.region = region
         self.ppc = ppc
-        corners = {"corners", "half_edges"} & {*getattr(hub.update.method.basis, "shape", ())}
+        corners = {"corners", "half_edges"} & {*hub.update.method.basis.traits.shape}
         method = hub.update.method
         # Whole boxes make steps that affect contact; shapes from files have a known mass.
         stepped = method.fields_per_solid and not region.aligned

@@ -18,6 +18,7 @@ from karamelo_py.app.live.frames import Frame, KeptFrames, plain
 from karamelo_py.app.live.server import Server
 from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.run.diagnosis import energy
+from karamelo_py.run.listening import Listener
 from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
@@ -37,7 +38,7 @@ class Row(NamedTuple):
     log: dict[str, float]
 
 
-class RunPage(Rhythmic):
+class RunPage(Rhythmic, Listener):
     """Shows a run in browsers: goes on in the rhythm of the log, and holds it where it is paused.
 
     Parameters
@@ -66,6 +67,11 @@ class RunPage(Rhythmic):
              "column": self._choose},
         )  # fmt: skip
         hub.output.pages.append(self)
+        hub.listeners.append(self)
+
+    def signalled(self, number: int) -> None:
+        """Hold the run no longer."""
+        self._paused = False
 
     # ---- in the run's own thread ----------------------------------------------------------------
 
@@ -131,8 +137,6 @@ class RunPage(Rhythmic):
             if time.perf_counter() - left > GRACE:
                 self._paused = False
                 self.hub.console.say("the live page that held the run is closed: it goes on")
-            if self.hub.running is not None and self.hub.running.signal:
-                self._paused = False
             if shown != self._column:
                 shown = self._column
                 self._take_again()
@@ -176,7 +180,7 @@ class RunPage(Rhythmic):
     def _choose(self, words: Mapping[str, str]) -> None:
         if words.get("name") in self.hub.fields.particle_names():
             self._column = words["name"]
-            if self._rows and self.hub.running is None:  # nothing else would show it
+            if self._rows and not self.hub.in_run:  # nothing else would show it
                 self._take_again()
 
     def _pause(self, _: Mapping[str, str]) -> None:
@@ -192,5 +196,5 @@ class RunPage(Rhythmic):
 
     def _stop(self, _: Mapping[str, str]) -> None:
         """Interrupt the run, if one goes on, as Ctrl-C does: the last state is written."""
-        if self.hub.running is not None:
+        if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

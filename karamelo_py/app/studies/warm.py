@@ -154,7 +154,7 @@ def begin() -> NoReturn:
     gc.disable()
     link = socket.socket(fileno=os.dup(0))
     import karamelo_py.app.cli
-    import karamelo_py.run.runner  # noqa: F401
+    import karamelo_py.run.loop  # noqa: F401
 
     keep(link)
 

@@ -12,46 +12,44 @@ stencil
     the result of `locate`.
 
 A basis that is a product of one function per direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`. This also sets the defaults of these attributes:
-
-cells
-    number of cells that the nodes of all points of a cell span (1: the corners of the cell only);
-nodes_per_cell
-    1, or 2 if there are nodes between the corners of cells;
-least_nodes
-    smallest number of nodes of the grid per direction;
-steady_moment
-    whether D of the affine transfers stays away from zero everywhere;
-gradient_jumps
-    whether gradients jump at cell faces (default: no). Points that cross cells then add energy to a
-    body, less with a smaller step;
-courant_still, courant_total
-    the stable step over h/c while points stay at their positions, in the updated frame, and in the
-    total frame (default: 1);
-courant_strained_first
-    bound of `courant_still` if the strain comes before the forces, as in usf (default: none);
-lone
-    stiffness of a point with no other point at its nodes, for functions with smooth gradients: h^2
-    / D and the largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls;
-bears_drift
-    whether drifting bodies conserve energy with the step of bodies at rest, also with musl and usf
-    (default: no);
-borne
-    how far bodies may drift and rotate and conserve energy (`noise.Borne`; default: as for similar
-    functions);
-steep_edge
-    whether |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes. usl then limits
-    the effect of light nodes on the strain.
-
-A basis with point domains lists their stored parts, and thus the initial arrays:
-
-shape
-    names of the parts, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
-    ``deformation`` (F in 2D or in 3D) and ``corners`` (of its `element`, an
-    :class:`~karamelo_py.points.basis.cpdi.Element`).
+:func:`karamelo_py.points.basis.product.register`. Each has `traits`
+(:class:`BasisTraits`); one whose points have domains with corners also
+has `element`, an :class:`~karamelo_py.points.basis.cpdi.Element`.
 """
 
+from math import inf
+from typing import NamedTuple
+
 from karamelo_py.compiler.compile import point_function
+from karamelo_py.points.noise import Borne
+
+
+class BasisTraits(NamedTuple):
+    """Traits of a basis; the first four have no default."""
+
+    cells: int  # that the nodes of all points of a cell span; 1: the corners of the cell only
+    least_nodes: int  # of the grid per direction
+    steady_moment: bool  # D of the affine transfers stays away from zero everywhere
+    # |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes. usl then limits the
+    # effect of light nodes on the strain.
+    steep_edge: bool
+    nodes_per_cell: int = 1  # 2 if there are nodes between the corners of cells
+    # Gradients jump at cell faces. Points that cross cells then add energy to a body, less with a
+    # smaller step.
+    gradient_jumps: bool = False
+    # Stable step over h/c while points stay at their positions: in the updated frame, and its bound
+    # if the strain comes before the forces, as in usf; in the total frame.
+    courant_still: float = 1.0
+    courant_strained_first: float = inf
+    courant_total: float = 1.0
+    # Stiffness of a point with no other point at its nodes, for smooth gradients: h^2 / D, and the
+    # largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls.
+    lone: tuple[float, float] | None = None
+    bears_drift: bool = False  # drifting bodies conserve energy with the step of bodies at rest
+    borne: Borne | None = None  # how far they may drift and rotate; None: as for similar functions
+    # Stored parts of the domain of a point, in order: ``half_size`` (d numbers), ``half_edges`` (d
+    # vectors), ``deformation`` (F in 2D or in 3D), ``corners`` (of the `element` of the basis).
+    shape: tuple[str, ...] = ()
 
 
 @point_function()
@@ -114,7 +112,7 @@ def first_node(basis, like):
 
 def shape_size(basis: type, d: int) -> int:
     """Count the numbers of a place after the position, in `d` dimensions."""
-    shape = getattr(basis, "shape", ())
+    shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
     return sum(sizes[part] for part in shape)

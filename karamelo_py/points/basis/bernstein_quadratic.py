@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import leave_moment_out, mapped_again
+from karamelo_py.points.basis import BasisTraits, leave_moment_out, mapped_again
 from karamelo_py.points.basis.product import Along, along, register, spacing
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -20,12 +20,16 @@ class BernsteinQuadratic(NamedTuple):
     method(tlmpm, FLIP, Bernstein-quadratic, 0.99)
     """
 
-    cells = 1
-    nodes_per_cell = 2
-    steady_moment = False  # D of the affine transfers vanishes at the corners of cells
-    steep_edge = True
     in_lanes = True
-    gradient_jumps = True
+    # D of the affine transfers vanishes at the corners of cells.
+    traits = BasisTraits(
+        cells=1,
+        least_nodes=3,
+        nodes_per_cell=2,
+        steady_moment=False,
+        steep_edge=True,
+        gradient_jumps=True,
+    )
 
 
 known_failure(

@@ -7,6 +7,7 @@ from karamelo_py.compiler.compile import Weighted, index
 from karamelo_py.compiler.powers import power
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
+from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.product import Along, along, node_number, register, wide
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
@@ -14,17 +15,16 @@ from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 # Range of half sizes for weights, in cells.
 LEAST = 1e-3
 MOST = 1.0
+STRETCHED = "half_size", "half_size", "deformation"  # present and initial half sizes, F
 
 
 class _Box(NamedTuple):
     """Base of these bases."""
 
-    cells = 3
-    nodes_per_cell = 1
-    least_nodes = 4
-    steady_moment = True
-    steep_edge = True
     in_lanes = True
+    traits = BasisTraits(
+        cells=3, least_nodes=4, steady_moment=True, steep_edge=True, shape=("half_size",)
+    )
 
 
 class UGIMP(_Box):
@@ -38,8 +38,6 @@ class UGIMP(_Box):
     -------
     method(ulmpm, FLIP, ugimp, 0.99)
     """
-
-    shape = ("half_size",)
 
 
 class _Following(_Box):
@@ -57,7 +55,6 @@ class CPGIMPDet(_Following):
     """
 
     __slots__ = ()
-    shape = ("half_size",)
 
 
 class CPGIMPDiagonal(_Following):
@@ -71,8 +68,8 @@ class CPGIMPDiagonal(_Following):
     """
 
     __slots__ = ()
-    steady_moment = False  # D of the affine transfers nearly vanishes with the box
-    shape = ("half_size", "half_size", "deformation")  # present and initial half sizes, F
+    # D of the affine transfers nearly vanishes with the box.
+    traits = _Box.traits._replace(steady_moment=False, shape=STRETCHED)
 
 
 known_failure(
@@ -97,7 +94,7 @@ class CPGIMPStretch(_Following):
     """
 
     __slots__ = ()
-    shape = ("half_size", "half_size", "deformation")  # present and initial half sizes, F
+    traits = _Box.traits._replace(shape=STRETCHED)
 
 
 class CPGIMPCorners(_Following):
@@ -114,7 +111,6 @@ class CPGIMPCorners(_Following):
     """
 
     __slots__ = ()
-    shape = ("half_size",)
 
 
 class CPGIMP(_Box):

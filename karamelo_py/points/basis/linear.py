@@ -3,9 +3,10 @@
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import leave_moment_out, mapped_again
+from karamelo_py.points.basis import BasisTraits, leave_moment_out, mapped_again
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
+from karamelo_py.points.transfers import flip_coefficient
 
 STRETCH = 0.3  # strain beyond which points a cell apart separate
 SMALL_SHARE = 0.3  # of the stable step, with which impacts conserve energy
@@ -24,10 +25,11 @@ class Linear(NamedTuple):
     method(ulmpm, FLIP, linear, 1)
     """
 
-    steady_moment = False  # D of the affine transfers vanishes at the nodes
-    steep_edge = True
-    gradient_jumps = True
     in_lanes = True
+    # D of the affine transfers vanishes at the nodes.
+    traits = BasisTraits(
+        cells=1, least_nodes=2, steady_moment=False, steep_edge=True, gradient_jumps=True
+    )
 
 
 known_failure(
@@ -45,7 +47,7 @@ def _meet_again(basis, scene):
     domain, share = scene.hub.domain, scene.hub.update.dt_factor
     far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
     small = share is not None and share <= SMALL_SHARE
-    kept = scene.moves and getattr(scene.transfer, "alpha", 0.0) > 0.9 and not small
+    kept = scene.moves and flip_coefficient(scene.transfer) > 0.9 and not small
     return kept and len(scene.elastic) > 1 and scene.fastest * scene.duration > far
 
 

@@ -177,14 +177,7 @@ def _affine_weight_product(basis, kin, grid, stencil, k):
 
 
 def register(basis: type, width: int) -> None:
-    """Give `basis` (a class with `along`, `width` nodes per direction) every point function.
-
-    Also sets default attributes.
-    """
-    cells = 1 if width == 2 else 3
-    usual = {"cells": cells, "nodes_per_cell": 1, "least_nodes": width, "steady_moment": True}
-    for name, value in usual.items():
-        setattr(basis, name, getattr(basis, name, value))
+    """Give `basis` (a class with `along`, `width` nodes per direction) every point function."""
     basis.line_nodes = width
     locate.on(basis)(_locate_product)
     support.on(basis)(_support_product)
@@ -205,4 +198,4 @@ def wide(basis: type) -> None:
 
 
 def _seen(basis: Any, scene: Any) -> dict[str, int] | None:
-    return None if scene.moves else {"nodes": (basis.cells + 1) ** scene.d}
+    return None if scene.moves else {"nodes": (basis.traits.cells + 1) ** scene.d}

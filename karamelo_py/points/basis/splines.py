@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import all_lanes, point_function, where
-from karamelo_py.points.basis import first_node, product, walled
+from karamelo_py.points.basis import BasisTraits, first_node, product, walled
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC
 
@@ -21,7 +21,6 @@ class AtWalls(NamedTuple):
 
     faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN; 0 without a wall
 
-    steep_edge = False
     in_lanes = True
 
 
@@ -57,13 +56,17 @@ class QuadraticSpline(NamedTuple):
     method(ulmpm, APIC, quadratic-spline)
     """
 
-    steep_edge = False
     in_lanes = True
-    lone = (4.0, 6.0)
-    # Of the stable step while points stay at their positions. From the highest frequency of a free
-    # block: up to 1.8 to 2.6 h/c in 1D, 1.58 to 2.5 in 2D, 1.4 to 2.4 in 3D, over positions,
-    # spacings, walls and Poisson's ratios up to 0.49.
-    courant_still = 1.25
+    # courant_still is from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5
+    # in 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
+    traits = BasisTraits(
+        cells=3,
+        least_nodes=3,
+        steady_moment=True,
+        steep_edge=False,
+        lone=(4.0, 6.0),
+        courant_still=1.25,
+    )
 
 
 @product.along.on(QuadraticSpline)
@@ -127,6 +130,7 @@ class QuadraticSplineAtWalls(AtWalls):
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
     """Give a basis `of` with walls inside the grid the functions of the one without."""
+    of.traits = basis.traits
     walled.on(basis)(lambda basis, faces: of(faces))
     walls_beside.on(of)(_walls_beside_at_walls)
     for function in functions:
@@ -153,23 +157,27 @@ class CubicSpline(NamedTuple):
     method(ulmpm, FLIP, cubic-spline, 0.99)
     """
 
-    steep_edge = False
     in_lanes = True
-    lone = (3.0, 3.14)
-    # Of the stable step if points stay in their cells. The shortest waves are nearly averaged
-    # away: a shaken block is stable up to 2.1 to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to
-    # 2.4 in 2D and 1.4 to 2.3 in 3D (Poisson's ratio 0.45 and 0).
-    courant_total = 1.25
-    # The same in the updated frame, while points stay at their positions, from the highest
-    # frequency of a free block: 1.9 to 2.7, 1.84 to 2.6 and 1.46 to 2.7, over positions, spacings,
-    # walls, ratios up to 0.49.
-    courant_still = 1.4
-    # With usf a ball of 3 cells radius gained 46 % in 200/c with the longer step, 1 % with 0.9 h/c.
-    # This is not instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at 0.03, none at 0.001):
-    # strains lacked (dt grad v)^2. They have it since; the bound was not measured again.
-    courant_strained_first = 1.0
-    bears_drift = True
-    borne = CUBIC
+    # courant_total: the shortest waves are nearly averaged away. A shaken block is stable up to 2.1
+    # to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D and 1.4 to 2.3 in 3D (Poisson's
+    # ratio 0.45 and 0). courant_still, from the highest frequency of a free block: 1.9 to 2.7, 1.84
+    # to 2.6 and 1.46 to 2.7, over positions, spacings, walls and ratios up to 0.49.
+    # courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the longer
+    # step, 1 % with 0.9 h/c. This is no instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at
+    # 0.03, none at 0.001): strains lacked (dt grad v)^2. They have it since; the bound was not
+    # measured again.
+    traits = BasisTraits(
+        cells=3,
+        least_nodes=4,
+        steady_moment=True,
+        steep_edge=False,
+        lone=(3.0, 3.14),
+        courant_total=1.25,
+        courant_still=1.4,
+        courant_strained_first=1.0,
+        bears_drift=True,
+        borne=CUBIC,
+    )
 
 
 @product.along.on(CubicSpline)

@@ -23,7 +23,7 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
         Half the size of a point, in cells.
     """
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
-    if getattr(basis, "shape", ()):
+    if basis.traits.shape:
         hats = np.maximum(1 - np.abs(x), 0)
         box = np.ones(max(round(2 * half * ENTRIES), 1) | 1)
         return x, np.convolve(hats, box / len(box), mode="same")
@@ -54,7 +54,7 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
         See `profile`.
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
-    if type(basis).nodes_per_cell > 1:
+    if basis.traits.nodes_per_cell > 1:
         # The basis functions differ between nodes: the gap is unknown, and fields touch on contact.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)

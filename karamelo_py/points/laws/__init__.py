@@ -14,8 +14,8 @@ A law with ``in_lanes``, as all its parts must have, is computed for several poi
 point functions do not branch on numbers of a point, except with `where`; those that do are named in
 ``scalarised``. Points of other laws are processed one by one.
 
-A law with ``rebounds`` sustains tension and returns all the work done on it; in a composed law the
-strength has this attribute.
+Laws and their parts whose ``traits`` differ from the usual ones have them as a class attribute
+(:class:`LawTraits`).
 
 Output columns of a law are declared next to it (`column`).
 """
@@ -25,9 +25,29 @@ from __future__ import annotations
 import sys
 from collections import namedtuple
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real
+
+
+class LawTraits(NamedTuple):
+    """Traits of a law, or of a part of one."""
+
+    rebounds: bool = False  # sustains tension and returns all the work done on it
+    flows: bool = False  # holds no shape, as liquids and soils
+    rings: bool = True  # vibrates, unless it has no shear modulus
+    any_speed: bool = False  # may move many times faster than its waves, as gases
+    least_density: float = 10.0  # kg/m^3, below which units are likely wrong
+
+
+def law_traits(part: Any) -> LawTraits:
+    """Return the traits of a law, of a part of one, or of its class."""
+    return getattr(part, "traits", LawTraits())
+
+
+def parameter(part: Any, name: str, otherwise: Any = 0.0) -> Any:
+    """Return a parameter of a law, or of a part of one, by its name."""
+    return part._asdict().get(name, otherwise) if isinstance(part, tuple) else otherwise
 
 
 class Absent(NamedTuple):

@@ -19,6 +19,7 @@ from karamelo_py.points.kinematics import (
     tr,
     von_mises,
 )
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
 from karamelo_py.script.errors import ScriptError
 
@@ -72,8 +73,7 @@ class CamClay(NamedTuple):
     """
 
     in_lanes = True
-    flows = True
-    rings = False
+    traits = LawTraits(flows=True, rings=False)
 
     specific_volume: float  # reference volume per mass
     G: float

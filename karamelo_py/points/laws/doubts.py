@@ -9,6 +9,7 @@ from karamelo_py.points.laws import (
     can,
     constrained_velocity,
     initial_state,
+    parameter,
     specific_volume,
     wave_speed_squared,
 )
@@ -30,7 +31,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     """Yield each implausibility of a law, and the likely intention."""
     if can(law, constrained_velocity):
         return
-    if hasattr(getattr(law, "strength", None), "cell_size"):
+    if hasattr(parameter(law, "strength"), "cell_size"):
         # Viscosity damps waves by the cell size, which is not known yet.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
@@ -41,7 +42,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
             f"{1 / squared:.2g} times its modulus {squared * density:.3g}",
             "the density comes before the modulus",
         )
-    if alpha := getattr(getattr(law, "heat", None), "alpha", 0.0):
+    if alpha := parameter(parameter(law, "heat"), "alpha"):
         yield from _doubts_of_expansion(alpha, "the coefficient of linear expansion")
     if isinstance(law, EosStrength):
         yield from _doubts_of_parts(law, state)
@@ -49,15 +50,15 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
 
 def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
     strength, memory = law.strength, state.m.strength
-    G, K = getattr(strength, "G", 0.0), bulk_modulus(law.eos, 1.0, state.m.energy, state.m.heat)
+    G, K = parameter(strength, "G"), bulk_modulus(law.eos, 1.0, state.m.energy, state.m.heat)
     nu = (3 * K - 2 * G) / (2 * (3 * K + G)) if K > 0 else 0.0
     if nu < 0:
         yield (
             f"its bulk modulus {K:.3g} and shear modulus {G:.3g} make Poisson's ratio {nu:.3g}",
             f"for nu = 0.3 a bulk modulus of {2.167 * G:.3g}, by density and speed of the eos",
         )
-    flow = getattr(strength, "yield_stress", 0.0)
-    hard = flow + getattr(strength, "H", 0.0)
+    flow = parameter(strength, "yield_stress")
+    hard = flow + parameter(strength, "H")
     if flow_stress.defined(type(strength)):
         known = precompute(strength, memory, state.m.heat)
         flow, _ = flow_stress(strength, memory, known, 0.0, state.m.heat, 1.0)
@@ -73,17 +74,17 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
             f"its flow stress at a plastic strain of 1 is {hard:.3g}, above its modulus {G:.3g}",
             "give the hardening modulus in the units of the other moduli",
         )
-    if (rate := getattr(getattr(strength, "rate", None), "C", 0.0)) > 1:
+    if (rate := parameter(parameter(strength, "rate"), "C")) > 1:
         yield (
             f"its flow stress rises by {rate:g} times itself for e times the rate",
             "C is about 0.01 for metals",
         )
-    if getattr(strength, "mu_s", 0.0) > COEFFICIENT:
+    if parameter(strength, "mu_s") > COEFFICIENT:
         yield (
             f"its coefficient of friction is {strength.mu_s:g}",
             "coefficients are tangents of angles: 0.38 for glass beads",
         )
-    friction = getattr(strength, "friction", 0.0)
+    friction = parameter(strength, "friction")
     if isinstance(friction, float) and 0 < friction < sin(radians(SMALL)):
         yield (
             f"its angle of friction is about {degrees(asin(friction)):.2g} degrees",
@@ -91,20 +92,20 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
         )
     yield from _doubts_of_heat(law, K, flow)
     damage, eos = law.damage, law.eos
-    shear = getattr(damage, "d1", 0.0) + getattr(damage, "d2", 0.0)
+    shear = parameter(damage, "d1") + parameter(damage, "d2")
     if shear > TOUGH:
         yield f"it fails in shear at a plastic strain of {shear:.3g}", "strains are not in per cent"
-    if getattr(damage, "d3", 0.0) > 0:
+    if parameter(damage, "d3") > 0:
         yield (
             f"with d3 = {damage.d3:g} its failure strain is larger in tension than in compression",
             "d3 of metals is below 0 here: some programs have exp(-d3 t)",
         )
-    if getattr(eos, "S", 0.0) > STEEP:
+    if parameter(eos, "S") > STEEP:
         yield (
             f"the slope S of its shock speed is {eos.S:g}",
             "S has no unit: 1 to 2 for metals, and c0 comes before it",
         )
-    coefficients = [getattr(law.viscosity, name, 0.0) for name in ("Q1", "Q2")]
+    coefficients = [parameter(law.viscosity, name) for name in ("Q1", "Q2")]
     if max(coefficients) > THICK:
         yield (
             f"its artificial viscosity has the coefficients {coefficients[0]:g} and "
@@ -115,14 +116,14 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
 
 def reference_temperatures(law: Any) -> dict[str, float]:
     """Return the reference temperatures of the parts of a law, if it has a temperature."""
-    heat, softening = getattr(law, "temperature", None), getattr(law, "strength", None)
+    heat, softening = parameter(law, "temperature"), parameter(law, "strength")
     if not hasattr(heat, "T0"):
         return {}
     found = {"T0 of the temperature": heat.T0}
     for name, part, counts in (
-        ("Tr of the strength", getattr(softening, "softening", None), 1.0),
-        ("Tr of the damage", law.damage, getattr(law.damage, "d5", 0.0)),
-        ("Tr of the eos", law.eos, getattr(law.eos, "thermal", 0.0)),
+        ("Tr of the strength", parameter(softening, "softening"), 1.0),
+        ("Tr of the damage", law.damage, parameter(law.damage, "d5")),
+        ("Tr of the eos", law.eos, parameter(law.eos, "thermal")),
     ):
         if hasattr(part, "Tr") and counts:
             found[name] = part.Tr
@@ -138,7 +139,7 @@ def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]
             + ", ".join(f"{name} is {T:g}" for name, T in counted.items()),
             "kelvin throughout, or degrees Celsius throughout",
         )
-    if K > 0 and getattr(heat, "alpha", 0.0):
+    if K > 0 and parameter(heat, "alpha"):
         yield from _doubts_of_expansion(
             heat.alpha / (3 * K), f"alpha is 3 K = {3 * K:.3g} times the coefficient of expansion"
         )

@@ -5,6 +5,7 @@ from typing import Annotated, Any, NamedTuple
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import det, unit
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
 
@@ -13,7 +14,7 @@ class ElasticLaw(NamedTuple):
     """Elastic solid with Young's modulus and Poisson's ratio, optionally with a temperature."""
 
     in_lanes = True
-    rebounds = True
+    traits = LawTraits(rebounds=True)
 
     specific_volume: float  # reference volume per mass
     lam: float  # Lame's first parameter

@@ -17,7 +17,7 @@ from karamelo_py.language.rules import known_failure, suggestion
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr, von_mises
-from karamelo_py.points.laws import Absent, can, column, eos, strengths
+from karamelo_py.points.laws import Absent, can, column, eos, law_traits, parameter, strengths
 from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
 from karamelo_py.points.laws.further import (
     chained,
@@ -179,7 +179,7 @@ def _idle_damage(law, scene):
 
 def _idle_heat(law, scene):
     """Report a temperature that affects neither strength, pressure nor damage, and is not read."""
-    pressures = getattr(law.eos, "thermal", 0), getattr(law.temperature, "alpha", 1)
+    pressures = parameter(law.eos, "thermal"), parameter(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
     if presses or not heat or scene.reads_temperature:
@@ -333,7 +333,7 @@ def carried_along(law, kin, s, dl):
     """Update the deviatoric stress for an increment, and return the strain that adds to it."""
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
-        elastic = getattr(law.strength, "rebounds", False)
+        elastic = law_traits(law.strength).rebounds
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
     # The difference contains the rotation of the old strain.
     e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))

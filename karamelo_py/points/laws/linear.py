@@ -6,6 +6,7 @@ from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import ElasticLaw
 
 
@@ -72,7 +73,7 @@ class FixedFrame(LinearElastic):
     """Linear elasticity whose stress does not rotate with the point (Karamelo's)."""
 
     __slots__ = ()
-    rebounds = False
+    traits = LawTraits()
     turns = False
 
 

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, symmetric_tensor
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.temperatures import Warm, initial_heat, thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
@@ -25,7 +26,7 @@ class Thermoelastic(NamedTuple):
     """An elastic law and its temperature; the state is the state of the elastic law, then T."""
 
     in_lanes = True
-    rebounds = True
+    traits = LawTraits(rebounds=True)
 
     elastic: Any
     heat: Any

@@ -9,26 +9,42 @@ v_pic
 dv
     sum_I N_I (v*_I - v_I), its change during the step
 
-Every class has these attributes:
-
-point_fields
-    the fields of points that it needs (:mod:`karamelo_py.compiler.fields`), such as `Moment`;
-inverts_spread
-    whether it divides by D = sum_I N_I (X_I - x)(X_I - x)^T, which vanishes for some bases.
+Every class has `traits`, and names the fields of points that it needs in `point_fields`.
 
 The default for undefined functions is PIC: nothing is stored, only v is mapped.
 """
 
+from typing import NamedTuple
+
 from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.fields import Field, planar
+from karamelo_py.compiler.fields import Field, declared, planar
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import noise
+
+
+class TransferTraits(NamedTuple):
+    """Traits of a transfer."""
+
+    inverts_spread: bool = False  # divides by D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
+    retains: bool = False  # points retain a fraction of their velocity: `alpha`, a parameter
+    per_time: bool = False  # alpha holds for a stable step, not for each
+    keeps_gradient: bool = False  # the `Moment` of a point is its velocity gradient
 
 
 class Moment(Field):
     """The tensor that points store in addition to velocity: its moment B or its gradient L."""
 
     shape = planar
+
+
+def flip_coefficient(transfer) -> float:
+    """Return the fraction of its velocity that a point retains in a step; 0 as in PIC."""
+    return transfer.alpha if transfer.traits.retains else 0.0
+
+
+def stores_moment(transfer) -> bool:
+    """Return True if points store moments or gradients of their velocity."""
+    return Moment in declared([transfer], "point_fields")
 
 
 @point_function()
@@ -128,12 +144,12 @@ def terms(transfer):
 
 def _inside_out(moment, scene):
     by_moments = gradient_weight.defined(type(scene.transfer))  # strains, as MLS has them
-    growing = not scene.transfer.inverts_spread or by_moments
+    growing = not scene.transfer.traits.inverts_spread or by_moments
     return scene.moments and scene.vanishing and growing
 
 
 def _left_out(moment, scene):
-    kept = scene.d == 3 or hasattr(scene.transfer, "alpha")
+    kept = scene.d == 3 or scene.transfer.traits.retains
     return scene.moments and scene.vanishing and kept and not _inside_out(moment, scene)
 
 

@@ -15,7 +15,7 @@ from karamelo_py.points import transfers
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.laws import jacobian
-from karamelo_py.points.transfers import Moment
+from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.flip import Share, blend, swings, take_nodal_velocity
 
 COMPRESSED = 1e-3  # volume fraction that a point has to lose to move with the grid
@@ -37,7 +37,7 @@ class APIC(NamedTuple):
     """
 
     point_fields = (Moment,)
-    inverts_spread = True
+    traits = TransferTraits(inverts_spread=True)
     in_lanes = True
 
 
@@ -60,7 +60,7 @@ class AFLIP(NamedTuple):
     alpha: Annotated[float, Share]
 
     point_fields = (Moment,)
-    inverts_spread = True
+    traits = TransferTraits(inverts_spread=True, retains=True)
     in_lanes = True
 
 
@@ -95,7 +95,7 @@ class ASFLIP(NamedTuple):
     beta: Annotated[float, In(0, 1)] = 1.0
 
     point_fields = (Moment,)
-    inverts_spread = True
+    traits = TransferTraits(inverts_spread=True, retains=True)
     in_lanes = True
 
 
@@ -140,7 +140,6 @@ def by_arms_alone(transfer, inverse_d):
 
 
 for _transfer in (APIC, AFLIP, ASFLIP):
-    _transfer.keeps_gradient = False
     transfers.nodal_momentum.on(_transfer)(nodal_momentum_affine)
     transfers.add_moment.on(_transfer)(add_moment_affine)
     transfers.affine_velocity.on(_transfer)(affine_velocity_of_moment)

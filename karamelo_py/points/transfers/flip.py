@@ -8,7 +8,7 @@ from karamelo_py.compiler.compile import real
 from karamelo_py.language.kinds import Constraint
 from karamelo_py.language.rules import gain, known_failure
 from karamelo_py.points import noise
-from karamelo_py.points.transfers import in_step, lost_shares, updated_velocity
+from karamelo_py.points.transfers import TransferTraits, in_step, lost_shares, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
@@ -28,7 +28,7 @@ class PIC(NamedTuple):
     method(ulmpm, PIC, linear)
     """
 
-    inverts_spread = False
+    traits = TransferTraits()
     in_lanes = True
 
 
@@ -52,7 +52,7 @@ class FLIP(NamedTuple):
 
     alpha: Annotated[float, Share]
 
-    inverts_spread = False
+    traits = TransferTraits(retains=True)
     in_lanes = True
     variants = MappingProxyType({"gradient-enhanced": "TFLIP"})
 
@@ -79,9 +79,8 @@ class FLIPPerTime(NamedTuple):
 
     alpha: Annotated[float, Share]
 
-    inverts_spread = False
+    traits = TransferTraits(retains=True, per_time=True)
     in_lanes = True
-    per_time = True  # alpha is for a stable step, not for each; optional elsewhere
 
 
 @in_step.on(FLIPPerTime)
@@ -172,7 +171,7 @@ def _brakes(transfer, scene):
     lag, simulation = scene.lag, scene.simulation
     if not lag.share > 0:
         return None
-    step = simulation.limit if getattr(transfer, "per_time", False) else simulation.dt
+    step = simulation.limit if transfer.traits.per_time else simulation.dt
     gone = 1 - exp(-2 * (1 - transfer.alpha) * lag.share * scene.duration / step)
     return {"gone": 100 * gone} if gone > BRAKED else None
 

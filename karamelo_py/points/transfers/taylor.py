@@ -12,7 +12,7 @@ from karamelo_py.points import transfers
 from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import Axisymmetric, outer
 from karamelo_py.points.kinematics import gradient as as_gradient
-from karamelo_py.points.transfers import Moment
+from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.affine import zero_planar
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 
@@ -31,7 +31,7 @@ class TPIC(NamedTuple):
     """
 
     point_fields = (Moment,)
-    inverts_spread = False
+    traits = TransferTraits(keeps_gradient=True)
     in_lanes = True
 
 
@@ -53,7 +53,7 @@ class TFLIP(NamedTuple):
     alpha: Annotated[float, Share]
 
     point_fields = (Moment,)
-    inverts_spread = False
+    traits = TransferTraits(retains=True, keeps_gradient=True)
     in_lanes = True
 
 
@@ -71,7 +71,7 @@ class MLS(NamedTuple):
     """
 
     point_fields = (Moment,)
-    inverts_spread = True
+    traits = TransferTraits(inverts_spread=True, keeps_gradient=True)
     in_lanes = True
 
 
@@ -88,7 +88,6 @@ def kept_velocity_gradient(transfer, L, inverse_d):
 
 
 for _transfer in (TPIC, TFLIP, MLS):
-    _transfer.keeps_gradient = True
     transfers.nodal_momentum.on(_transfer)(nodal_momentum_taylor)
     transfers.add_moment.on(_transfer)(add_moment_taylor)
     transfers.affine_velocity.on(_transfer)(kept_velocity_gradient)

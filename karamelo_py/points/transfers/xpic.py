@@ -6,7 +6,7 @@ from karamelo_py.compiler.fields import StepField, SummedField, vector
 from karamelo_py.language.kinds import In
 from karamelo_py.points.laws import can
 from karamelo_py.points.laws.eos import taken_heat
-from karamelo_py.points.transfers import terms, updated_velocity
+from karamelo_py.points.transfers import TransferTraits, terms, updated_velocity
 
 
 class TermOfSeries(StepField):
@@ -61,7 +61,7 @@ class XPIC(NamedTuple):
 
     point_fields = (TermOfSeries, Reflected)
     node_fields = (Series,)
-    inverts_spread = False
+    traits = TransferTraits()
     in_lanes = True
 
 

@@ -4,20 +4,18 @@ import re
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property
-from itertools import chain
 from math import isfinite, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.fields import declared
 from karamelo_py.language import registry, rules
 from karamelo_py.points import transfers
-from karamelo_py.points.laws import can, constrained_velocity, law_parts
+from karamelo_py.points.laws import can, constrained_velocity, law_parts, law_traits
+from karamelo_py.points.transfers import flip_coefficient, stores_moment
 from karamelo_py.run import settling, timestep, uneven
 from karamelo_py.run.body_motion import (
-    BodyMotion,
-    Lag,
-    Noise,
     drift_of,
     held,
     lag_of,
@@ -25,7 +23,7 @@ from karamelo_py.run.body_motion import (
     pressed_evenly,
     turn_of,
 )
-from karamelo_py.run.crossing import Crossing, expected
+from karamelo_py.run.crossing import expected
 from karamelo_py.run.neighbours import bent_row, parting
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
@@ -56,18 +54,18 @@ class SceneFacts:
         self.transfer_name = registry.name_of("transfer", type(self.transfer))
         self.d, self.corners = hub.domain.dimension, 2**hub.domain.dimension  # of a cell
         self.moves = self.method.frame.moves  # points move through the grid
-        keeps = timestep.keeps_moments(hub)
+        keeps = stores_moment(hub.update.transfer)
         self.moments = self.moves and keeps  # and store moments or gradients of their velocity
         # They move through places at which D of the affine transfers vanishes.
-        self.vanishing = self.moves and not self.basis.steady_moment
+        self.vanishing = self.moves and not self.basis.traits.steady_moment
         # The FLIP coefficient, for transfers that store only velocities.
-        self.kept = 0.0 if keeps else getattr(self.transfer, "alpha", 0.0)
+        self.kept = 0.0 if keeps else flip_coefficient(self.transfer)
         # Gradients jump at the faces of cells, with nodes at their corners alone.
-        jumps = getattr(self.basis, "gradient_jumps", False)
-        self.linear = jumps and self.basis.nodes_per_cell == 1
+        traits = self.basis.traits
+        self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
         solids = hub.solids.values()
         # Whether laws store all work, and sustain tension.
-        self.elastic = [s for s in solids if getattr(s.material.whole, "rebounds", False)]
+        self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
         # About one point per cell and direction.
         self.single = [s.id for s in solids if timestep.one_a_cell(s)]
         self.sparse = bool(self.single)
@@ -79,10 +77,9 @@ class SceneFacts:
         found += [(part, one) for one in materials for part in law_parts(one.law)]
         found += [(one, None) for one in (self.method, self.basis, self.transfer, self.scheme)]
         yield from found
-        fields = [
-            getattr(part, f"{at}_fields", ()) for part, _ in found for at in ("point", "node")
-        ]
-        yield from ((field, None) for field in dict.fromkeys(chain(*fields)))
+        owners = [part for part, _ in found]
+        kinds = declared(owners, "point_fields") + declared(owners, "node_fields")
+        yield from ((kind, None) for kind in dict.fromkeys(kinds))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
         """Tell what the rules of the parts say, of one kind, or of laws and first states alone."""
@@ -94,10 +91,13 @@ class SceneFacts:
                 said = list(rules.advice(kind, part, owner, self))
             yield from said
 
-    @cached_property
-    def text(self) -> str:
-        """Return the text of the script, without comments."""
-        return script_text(self.hub)
+    # Each of these is found once, when a rule asks for it.
+    text = cached_property(lambda self: script_text(self.hub))
+    motions = cached_property(lambda self: motions(self.simulation))
+    drift, rotation = cached_property(drift_of), cached_property(turn_of)
+    lag, crossing = cached_property(lag_of), cached_property(expected)
+    settling, uneven = cached_property(settling.expected), cached_property(uneven.expected)
+    bent_row, parting = cached_property(bent_row), cached_property(parting)
 
     @property
     def reads_temperature(self) -> bool:
@@ -105,45 +105,11 @@ class SceneFacts:
         return bool(re.search(r"average_temperature|(\b|_)T(max)?\b", self.text))
 
     @cached_property
-    def motions(self) -> list[BodyMotion]:
-        return motions(self.simulation)
-
-    @cached_property
-    def drift(self) -> Noise | None:
-        """Estimate the noise of a drift through the grid, at most."""
-        return drift_of(self)
-
-    @cached_property
-    def rotation(self) -> Noise | None:
-        """Estimate the noise of a rotation through the grid, at most."""
-        return turn_of(self)
-
-    @cached_property
     def turn(self) -> float:
         """Find the angle by which the solid that turns most would turn if none held it."""
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((one.spin for one in self.motions), default=0.0) * self.duration
-
-    @cached_property
-    def lag(self) -> Lag:
-        """Estimate the lag of the body that turns most and is held nowhere."""
-        return lag_of(self)
-
-    @cached_property
-    def crossing(self) -> Crossing:
-        """Estimate how far stressed matter will move through the grid."""
-        return expected(self)
-
-    @cached_property
-    def settling(self) -> settling.Settling:
-        """Estimate how far weight presses the softest body that is held at one end."""
-        return settling.expected(self)
-
-    @cached_property
-    def uneven(self) -> uneven.Uneven:
-        """Find a light body next to a heavy one with too long a step for their common nodes."""
-        return uneven.expected(self)
 
     @property
     def share_of_uneven(self) -> float:
@@ -158,7 +124,7 @@ class SceneFacts:
     @property
     def hats(self) -> bool:
         """Tell whether functions are hats, or hats over the domains of points."""
-        return self.linear or bool(getattr(self.basis, "shape", ()))
+        return self.linear or bool(self.basis.traits.shape)
 
     @property
     def locks(self) -> bool:
@@ -176,7 +142,7 @@ class SceneFacts:
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
-        dt = self.simulation.limit if getattr(self.transfer, "per_time", False) else 0.0
+        dt = self.simulation.limit if self.transfer.traits.per_time else 0.0
         dt = dt or self.simulation.dt
         return PIC * (1 - self.kept) * self.hub.domain.h**2 / dt if dt > 0 else 0.0
 
@@ -189,16 +155,6 @@ class SceneFacts:
         led = (fix for fix in led if not all(map(is_zero, fix.formulas)))
         moving = (rigid[m.number] and np.any([m.slow, m.fast]) for m in self.motions)
         return any(rigid) and (any(led) or any(moving))
-
-    @cached_property
-    def bent_row(self) -> dict[str, Any] | None:
-        """Find a slender body of one row of points that its weight bends."""
-        return bent_row(self)
-
-    @cached_property
-    def parting(self) -> dict[str, Any] | None:
-        """Find two bodies that begin within a cell of each other on one grid, and move apart."""
-        return parting(self)
 
     @property
     def turns(self) -> bool:

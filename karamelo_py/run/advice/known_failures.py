@@ -17,7 +17,7 @@ from karamelo_py.language.rules import Advice
 from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
-from karamelo_py.points.laws import can, constrained_velocity, law_kind, specific_volume
+from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts, is_zero
 from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS, formulas_of, refuse_endless_speeds
@@ -166,7 +166,7 @@ def warn_about_steps(
 
 def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
     laws = [solid.material.law for solid in s.hub.solids.values()]
-    solid = any(not any(getattr(k, "any_speed", False) for k in law_kind(law)) for law in laws)
+    solid = any(not any(law_traits(k).any_speed for k in law_kind(law)) for law in laws)
     if solid and s.speed > IMPOSSIBLE:
         yield Advice(
             f"{DOUBTED_UNITS}velocities",
@@ -184,7 +184,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
         law = solid.material.law
         density = units.si(DENSITY) / float(specific_volume(law))
         speed = units.si(VELOCITY) * timestep.elastic_speed(s.simulation, solid)[0]
-        least = min(getattr(kind, "least_density", DENSITIES[0]) for kind in law_kind(law))
+        least = min(law_traits(kind).least_density for kind in law_kind(law))
         odd = []
         if not least <= density <= DENSITIES[1]:
             odd.append(f"density is {density:.3g} kg/m^3")
@@ -319,7 +319,7 @@ def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
     """Tell whether no point lies within the reach of the nodes of a fix, seen as a box."""
     x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
     method, setup = hub.update.method, simulation.setup
-    reach = (method.basis.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)
+    reach = (method.basis.traits.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)
     lo, hi = x.min(axis=0) - reach, x.max(axis=0) + reach
 
     def near(points: PointTable) -> np.ndarray:

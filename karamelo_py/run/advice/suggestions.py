@@ -9,6 +9,7 @@ import numpy as np
 
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
+from karamelo_py.points.laws import parameter
 from karamelo_py.run.advice.facts import SceneFacts, is_zero, script_text
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -33,10 +34,7 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
-    rules = (
-        *(_unread, _unused, _of_parts, _averaging, _flat, _round, _mirrored),
-        *(_precision, _output),
-    )
+    rules = _unread, _of_parts, _averaging, _flat, _round, _precision, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
@@ -62,21 +60,12 @@ def _unread(hub: Hub, simulation: Any) -> Words:
                 )
 
 
-def _unused(hub: Hub, simulation: Any) -> Words:
-    """Find groups whose names appear only where they are defined."""
-    text = script_text(hub)
-    for ID in hub.groups:
-        made = len(re.findall(rf"\bgroup\s*\(\s*{re.escape(ID)}\s*,", text))
-        if 0 < len(re.findall(rf"(?<!\w){re.escape(ID)}(?!\w)", text)) <= made:
-            yield f"group {ID} is used by nothing", "leave it out, or name it in a fix"
-
-
 def _averaging(hub: Hub, simulation: Any) -> Words:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
         law = solid.material.whole
-        moduli = (getattr(law, "lam", None), getattr(law, "G", None))
+        moduli = (parameter(law, "lam", None), parameter(law, "G", None))
         if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
             return
     yield (
@@ -238,54 +227,6 @@ def _round(hub: Hub, simulation: Any) -> Words:
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
         "and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
     )
-
-
-def _mirrored(hub: Hub, simulation: Any) -> Words:
-    """Find scenes that are the same on both sides of a plane across an axis."""
-    domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
-    if len(hub.lattices) > 1 or not _acting(hub):
-        return
-    if not all(getattr(solid, "region", None) for solid in solids):
-        return  # they may come with velocities
-    for k in range(1 if domain.axisymmetric else 0, domain.dimension):
-        ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
-        middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
-        cells = (middle - domain.lo[k]) / domain.h
-        rest = [axis for axis in range(domain.dimension) if axis != k]
-        if abs(cells - round(cells)) > 1e-6 or not all(_given_alike(hub, k, rest)):
-            continue
-
-        def sides(x: np.ndarray, k: int = k, middle: float = middle) -> np.ndarray:
-            folded = x.copy()
-            folded[:, k] = np.abs(x[:, k] - middle)
-            return folded
-
-        if all(_both_sides(solid, sides) for solid in solids) and all(
-            _alike(hub, fix, sides) for fix in _acting(hub)
-        ):
-            yield (
-                f"the scene is the same on both sides of {AXES[k]} = {middle:g}: twice the points "
-                "(unless it is to buckle or to break unevenly); energies are halved, and functions "
-                "wider than linear ones move results by some per cent on coarse grids",
-                f"half of it, and the nodes at {AXES[k]} = {middle:g} held in {AXES[k]}",
-            )
-            return
-
-
-def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Tell of each fix whether it does nothing along direction k, and depends on no place there."""
-    for fix in _acting(hub):
-        given = _given(fix)
-        others = [given[j] for j in rest if j < len(given)]
-        yield (len(given) <= k or is_zero(given[k])) and not any(
-            _depends(act, AXES[k]) for act in (*others, fix.wall_friction)
-        )
-
-
-def _both_sides(solid: Any, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether each point of a solid has one on the other side."""
-    places = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
-    return bool((np.unique(places, axis=0, return_counts=True)[1] == 2).all())
 
 
 def _precision(hub: Hub, simulation: Any) -> Words:

@@ -225,8 +225,9 @@ def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     """The last good state of a run, and the states of parts there and at later steps."""
 
-    def __init__(self, hub: Hub) -> None:
-        self.hub = hub
+    def __init__(self, hub: Hub, halve: bool) -> None:
+        self.hub, self.halve = hub, halve  # whether the run may go back there
+        self.halvings = self.returns = 0  # of the step so far; to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}
@@ -241,10 +242,6 @@ class RollbackPoint:
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
 
-    def forget_later(self) -> None:
-        """Clear the memory of parts at earlier states, which are not needed any more."""
-        self._parts = {self.step: self.parts}
-
     def take(self, arrays: dict[str, np.ndarray], step: int, parts: PartStates) -> None:
         self.arrays, self.step, self._parts = arrays, step, {step: parts}
 
@@ -256,9 +253,11 @@ class RollbackPoint:
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: Any, *, cut: bool = False) -> None:
-        """Go back there; with `cut` outputs go on from there in their files."""
+        """Go back there; with `cut` outputs go on from there in their files, for good."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
+        if cut:
+            self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
         """Take the steps up to `end` once more, parts remembering it; how that ended."""

@@ -26,7 +26,7 @@ from karamelo_py.run.checkpoint.arrays import (
     take_stored,
     wholes,
 )
-from karamelo_py.run.checkpoint.parts import PartStates, parts_of
+from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, parts_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -67,14 +67,12 @@ def path_of(hub: Hub, file: Path) -> Path:
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
     """Write the present state of a scene, `within` a run or between two, and return the name."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
-    run = hub.running and hub.running.rollback
-    # The last good state, where the run in progress may go back to it.
-    point = run.point if run and run.halve and run.point.arrays else None
-    groups = {"state": stored(simulation)}
-    if point:
+    groups, point = {"state": stored(simulation)}, simulation.rollback if hub.in_run else None
+    if point and point.halve and point.arrays:
+        # The last good state, where the run in progress may go back to it.
         groups["good"] = stored(simulation, point.arrays)
     if comm.leads:
-        _write(hub, path, within, run, groups)
+        _write(hub, path, within, point, groups)
     else:
         for found in groups.values():
             for _ in found:
@@ -83,7 +81,7 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     return path
 
 
-def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Iterator]) -> None:
+def _write(hub: Hub, path: Path, within: bool, point: RollbackPoint | None, groups: dict) -> None:
     import h5py
 
     for _, part in parts_of(hub):
@@ -91,7 +89,7 @@ def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Itera
             part.filed()
     interpreter, states = hub.interpreter, {"parts": PartStates.of(hub)}
     if "good" in groups:
-        states["good parts"] = run.point.parts
+        states["good parts"] = point.parts
     content = {
         "within": within,
         "statements": interpreter.record.statements,
@@ -102,7 +100,7 @@ def _write(hub: Hub, path: Path, within: bool, run: Any, groups: dict[str, Itera
         "scene": described(hub),
         "values": {name: hub.values.get(name) for name in hub.values.names()},
         "begun": [ID for ID, fix in hub.fixes.items() if fix in hub.simulation.begun],
-        "run": run and [run.halvings, run.returns, run.point.step if "good" in groups else None],
+        "run": point and [point.halvings, point.returns, point.step if "good" in groups else None],
         **{name: [[*key, of] for key, of in one.parts.items()] for name, one in states.items()},
     }
     with whole(path) as out, h5py.File(out, "w", libver=CHECKED) as root:
@@ -237,8 +235,11 @@ class Restart:
         """Return True if no later run has followed the state of the file."""
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
-    def take(self, hub: Hub, *, outputs: bool) -> None:
-        """Put the scene into the state of the file; with `outputs` they go on in their files."""
+    def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
+        """Put the scene into the state of the file; with `outputs` they go on in their files.
+
+        Within a run `point` becomes the last good state that the file holds.
+        """
         check(hub, self)
         simulation, content = hub.simulation, self.content
         comm = hub.settings.comm
@@ -252,14 +253,11 @@ class Restart:
             raise
         simulation.begun = {fix for ID, fix in hub.fixes.items() if ID in content["begun"]}
         states.give(hub, cut=outputs, anew=not outputs)
-        if hub.running is None or content["run"] is None:
+        if point is None or content["run"] is None:
             return
-        run = hub.running.rollback
-        run.halvings, run.returns, good = content["run"]
-        if run.halve and good is not None:
-            run.point.take(
-                take_snapshot(simulation, self.path), good, self._parts("good parts", {})
-            )
+        point.halvings, point.returns, good = content["run"]
+        if point.halve and good is not None:
+            point.take(take_snapshot(simulation, self.path), good, self._parts("good parts", {}))
 
     def _parts(self, name: str, values: dict[str, float]) -> PartStates:
         import h5py

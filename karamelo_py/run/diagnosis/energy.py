@@ -10,9 +10,10 @@ from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run import timestep
 from karamelo_py.run.advice.facts import SceneFacts
-from karamelo_py.run.diagnosis.trouble import Trouble, when
+from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
@@ -60,7 +61,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
     basis = f"a {method.basis_name} basis"
-    moves, jumps = method.frame.moves, getattr(method.basis, "gradient_jumps", False)
+    moves, jumps = method.frame.moves, method.basis.traits.gradient_jumps
     if simulation.implicit:
         return _gain_of_implicit_steps(hub)
     share = simulation.dt / timestep.stable_step(hub, simulation, simulation.limit)
@@ -86,10 +87,10 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"undeformed state ({borne:.4g})",
             f"set_dt({timestep.USUAL * borne:.3g}) or less, or remove set_dt",
         )
-    if moves and jumps and update.transfer.inverts_spread:
+    if moves and jumps and update.transfer.traits.inverts_spread:
         return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
     gradients = SceneFacts(hub, simulation, simulation.time).moments
-    if jumps and gradients and not hasattr(update.transfer, "alpha"):
+    if jumps and gradients and not update.transfer.traits.retains:
         return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
         return "F-bar in the updated frame", "remove anti_volumetric_locking"
@@ -117,7 +118,7 @@ def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
     method, smaller = hub.update.method, "smaller steps (set_dt)"
     if method.fields_per_solid:
         return "contact that opens and closes from step to step", smaller
-    if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
+    if method.frame.moves and method.basis.traits.gradient_jumps:
         return (
             f"points crossing cells: the gradient of a {method.basis_name} basis is discontinuous",
             f"quadratic-spline, method tlmpm, or {smaller}",
@@ -158,18 +159,14 @@ def words_of_growth(hub: Hub, simulation: Any) -> Trouble | None:
     return Trouble(message, fix, "energy-gain", cause)
 
 
-def blends(transfer: Any) -> bool:
-    """Return True if points take a fraction of nodal velocities, which lack the unresolved part."""
-    return getattr(transfer, "alpha", 0) < 1
-
-
 def taken_by(hub: Hub) -> list[str]:
     """Name the script's choices that dissipate energy without a record."""
     found, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    if blends(transfer):
-        share = f" {transfer.alpha:g}" if hasattr(transfer, "alpha") else ""
+    # Nodal velocities lack the part that the grid does not resolve.
+    if flip_coefficient(transfer) < 1:
+        share = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
     if hub.update.method.fields_per_solid:
         # Contact reverses the motion that damping has reduced, within the step: nodes chatter, and
@@ -210,7 +207,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
         return f"scheme {name} damps vibrations", "scheme(musl)"
     if found := collides(hub):
         return found
-    if method.frame.moves and getattr(method.basis, "gradient_jumps", False):
+    if method.frame.moves and method.basis.traits.gradient_jumps:
         return (
             f"points crossing cells (the gradient of a {method.basis_name} basis is "
             "discontinuous), and velocity differences within a cell",
@@ -280,7 +277,7 @@ def words_of_change(hub: Hub, share: float) -> str:
     words = "the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
         transfer = hub.update.transfer
-        often = blends(transfer) and not getattr(transfer, "per_time", False)
+        often = flip_coefficient(transfer) < 1 and not transfer.traits.per_time
         if collides(hub):
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"

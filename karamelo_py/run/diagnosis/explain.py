@@ -12,7 +12,7 @@ from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.points.laws import by_rates
 from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.diagnosis.trouble import Trouble, when
+from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub

@@ -6,6 +6,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.implicit import gather, scatter
+from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.schemes.newmark import Surplus
@@ -137,7 +138,7 @@ class Motion:
         new = np.where(self.given, self.prescribed, free)
         if self.contact is not None:
             new = self.contact.stopped(new, self.movable)
-        kept = getattr(self.equations.s.transfer, "alpha", 0.0)
+        kept = flip_coefficient(self.equations.s.transfer)
         parts = zip(self.equations.blocks, self.equations.parts, self.old, strict=True)
         for block, (seen, _), old in parts:
             block.points.v[:] = kept * old

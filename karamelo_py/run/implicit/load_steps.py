@@ -160,12 +160,10 @@ class LoadSteps:
     def _interrupted(self, correction: int, residual: float) -> bool:
         """Show how far a step is; tell whether the user wants the run to end before it."""
         simulation = self.simulation
-        running = simulation.hub.running
-        if running is None:
+        if simulation.between is None:
             return False
         within = f"part {self.parts + 1}, correction {correction}, residual {residual:.1e}"
-        running.show_progress(simulation, within)
-        return bool(running.signal) and not simulation.begins
+        return simulation.between(within) and not simulation.begins
 
     def _limit_reached(self, reason: Failed) -> float:
         """End the run at the load that was reached; return its time."""

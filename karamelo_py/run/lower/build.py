@@ -28,13 +28,13 @@ from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.points.transfers import lost_shares
+from karamelo_py.points.transfers import flip_coefficient, lost_shares, stores_moment
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.tiles import Tiles
-from karamelo_py.run.timestep import keeps_moments, sparse
+from karamelo_py.run.timestep import sparse
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -129,7 +129,7 @@ def stable_conduction(hub: Hub) -> float:
     if not hub.update.thermal:
         return np.inf
     limits = [np.inf]
-    per_cell = hub.update.method.basis.nodes_per_cell
+    per_cell = hub.update.method.basis.traits.nodes_per_cell
     for solid in hub.solids.values():
         law = solid.material.law
         kappa = laws.conductivity(law, 1.0)
@@ -171,8 +171,8 @@ def lower(
         clock.last_contact_dt = previous.last_contact_dt
     clock.spacing = min(lattice.h for lattice in lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
-    clock.kept = getattr(transfer, "alpha", 0)
-    clock.kept_by_time = clock.kept * getattr(transfer, "per_time", False)
+    clock.kept = flip_coefficient(transfer)
+    clock.kept_by_time = clock.kept * transfer.traits.per_time
     clock.drift = np.inf  # the points are not sorted yet
     grids = table(lattices, real)
     if hub.update.boundary == "reflect":
@@ -223,7 +223,7 @@ def returns_loss(hub: Hub) -> bool:
     XPIC has its own way (`kernels.loss.reflect`).
     """
     transfer = hub.update.transfer
-    keeps_all = getattr(transfer, "alpha", 0) == 1 and not keeps_moments(hub)
+    keeps_all = flip_coefficient(transfer) == 1 and not stores_moment(transfer)
     if not lost_shares.defined(type(transfer)) or keeps_all:
         return False
     return any(laws.can(solid.material.law, taken_heat) for solid in hub.solids.values())

@@ -20,6 +20,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.product import Along, along
 from karamelo_py.points.kinematics import KINEMATICS, planar, tensor, vector
+from karamelo_py.points.laws import parameter
 from karamelo_py.points.laws.strengths import hardening, shear_response
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
@@ -175,7 +176,8 @@ def try_law(hub: Hub, material: Any, kin: Any = None, law: Any = None, one: Any 
 
 def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None:
     """Try what a strength of a plug-in yields at, after so much plastic strain."""
-    strength, kind = getattr(law, "strength", None), type(getattr(law, "strength", None))
+    strength = parameter(law, "strength")
+    kind = type(strength)
     if not (is_foreign(kind) and hardening.flow_stress.defined(kind)):
         return
     memory, heat, dt = state.m.strength, state.m.heat, strain / strain if strain else 1

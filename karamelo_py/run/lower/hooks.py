@@ -199,6 +199,8 @@ class PythonHooks:
 
     def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
         """Call what acts from Python on a setup: the own one where that is enough for all."""
+        if stage not in self.by_stage:
+            return
         if all(fix.point_by_point for fix, _ in self.by_stage[stage]):
             function(self, s, stage, *arguments)
         else:
@@ -261,8 +263,7 @@ def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
 @at_nodes.on(PythonHooks)
 def _at_nodes_python_hooks(hooks, stage, target, s):
     at_nodes(hooks.compiled, stage, target, s)
-    if stage in hooks.by_stage:
-        hooks.act(_on_nodes, s, stage, target)
+    hooks.act(_on_nodes, s, stage, target)
 
 
 @add_work.on(PythonHooks)
@@ -278,22 +279,19 @@ def _at_points_python_hooks(hooks, stage, then, s):
     if stage == INITIAL_INTEGRATE:
         hooks.simulation.clear_forces()
     at_points(hooks.compiled, stage, then, s)
-    if stage in hooks.by_stage:
-        hooks.act(_on_points, s, stage, then)
+    hooks.act(_on_points, s, stage, then)
 
 
 @at_heat_nodes.on(PythonHooks)
 def _at_heat_nodes_python_hooks(hooks, stage, target, s):
     at_heat_nodes(hooks.compiled, stage, target, s)
-    if stage in hooks.by_stage:
-        hooks.act(_on_heat_nodes, s, stage, target)
+    hooks.act(_on_heat_nodes, s, stage, target)
 
 
 @at_heated_points.on(PythonHooks)
 def _at_heated_points_python_hooks(hooks, s):
     at_heated_points(hooks.compiled, s)
-    if SUPPLY_HEAT in hooks.by_stage:
-        hooks.act(_on_points, s, SUPPLY_HEAT, 0)
+    hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
 def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:

@@ -165,7 +165,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
         ppc = getattr(solid, "ppc", 0)  # else nothing is known of the cells that it fills
         cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
-    d, per_cell = kin.dimension, hub.update.method.basis.nodes_per_cell**kin.dimension
+    d, per_cell = kin.dimension, hub.update.method.basis.traits.nodes_per_cell**kin.dimension
     of_node = np.dtype(real).itemsize * (
         arrays.SUMS_WIDTH[d] + arrays.UPDATE_WIDTH[d] + arrays.VELOCITY_WIDTH[d]
     )

@@ -22,7 +22,7 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, PointsView, node_hook
+from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction, vector
@@ -255,7 +255,7 @@ class LocalDamping(Fix):
 
     published = ("x", "y", "z")
     brakes = True
-    acts_last = True
+    order = LAST
 
     post_update_grid_state = node_hook(brake)
 

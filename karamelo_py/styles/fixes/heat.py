@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.output.point_table import places_before, volumes_before
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, heat_hook, node_hook
+from karamelo_py.scene.modify import LAST, Fix, heat_hook, node_hook
 from karamelo_py.scene.solid import COLD, WARM
 from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
@@ -244,7 +244,7 @@ class ConvectionParticles(FacesOfPoints):
     """
 
     on_edge = "edge_convection"
-    acts_last = True  # the supply of the other fixes bounds the temperatures for the watch
+    order = LAST  # the supply of the other fixes bounds the temperatures for the watch
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):

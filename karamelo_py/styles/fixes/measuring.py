@@ -5,7 +5,7 @@ import numpy as np
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, node_hook, point_hook
+from karamelo_py.scene.modify import FIRST, USUAL, Fix, node_hook, point_hook
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction
 
@@ -39,6 +39,7 @@ class Measuring(Fix):
     def __init__(self, hub: Hub, group: AnyGroup, name: str):
         super().__init__(hub, group)
         self.name = name
+        self.order = FIRST if name in COME_FIRST else USUAL
         if name in HOOKS:
             self.formulas = (Expression(0.0),) * hub.domain.dimension
             setattr(self, *HOOKS[name])

@@ -14,6 +14,7 @@ from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.bodies import Hertz, MinimizePenetration
+from karamelo_py.points.laws import parameter
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -230,7 +231,7 @@ class ContactMinimizePenetration(PairContact):
 def plane_modulus(solid: Solid, argument: str) -> float:
     """E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
     law = elastic_law(solid.material.whole)
-    G, lam = getattr(law, "G", None), getattr(law, "lam", None)
+    G, lam = parameter(law, "G", None), parameter(law, "lam", None)
     if G is None or lam is None or not G > 0:
         raise ScriptError(
             f"material '{solid.material.id}' of solid '{solid.id}' has no elastic moduli",

@@ -85,7 +85,7 @@ class Method:
     @property
     def regular_points(self) -> bool:
         """True if the points of a cell are equally spaced, so that their domains tile it."""
-        return bool(getattr(self.basis, "shape", ()))
+        return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Return the tag of contact between solids with separate velocity fields."""
@@ -147,7 +147,7 @@ class Method:
         n, d = half.shape
         unit = np.eye(d)
         parts = [np.empty((n, 0))]
-        for part in getattr(basis, "shape", ()):
+        for part in basis.traits.shape:
             if part == "corners":
                 corners = _corners(basis.element, solid)
                 parts.append(corners.reshape(n, corners.shape[1] * d))
@@ -163,14 +163,16 @@ class Method:
         self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float
     ) -> Lattice:
         basis = type(self.basis)
-        return Lattice(dimension, lo, hi, h, basis.nodes_per_cell, basis.least_nodes)
+        return Lattice(dimension, lo, hi, h, basis.traits.nodes_per_cell, basis.traits.least_nodes)
 
     def check(self, hub: Hub) -> None:
         """Refuse incompatible options; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
         if scheme.traits.implicit:
             return  # no part for these transfers
-        unsteady = transfer.inverts_spread and not basis.steady_moment and self.frame.moves
+        unsteady = (
+            transfer.traits.inverts_spread and not basis.traits.steady_moment and self.frame.moves
+        )
         if unsteady and not scheme.traits.maps_velocity_again:
             raise ScriptError(
                 f"{registry.name_of('transfer', type(transfer))} with {self.basis_name} functions "

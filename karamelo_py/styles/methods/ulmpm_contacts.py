@@ -132,7 +132,7 @@ class ULMPMContacts(Method):
 
         Splines and domains reach further nodes. If these moved, the contact normal would rotate.
         """
-        if type(self.basis).cells == 1 and not getattr(self.basis, "shape", ()):
+        if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes
         of = np.array(fields(hub))
         solids = list(hub.solids.values())

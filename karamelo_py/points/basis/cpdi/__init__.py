@@ -19,6 +19,7 @@ from karamelo_py.compiler.compile import Weighted, beside, index, point_function
 from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
+from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.product import digits, inverse_radius, item, node_number, with_hoop
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import cofactor, determinant, gradient, product, total, vector
@@ -44,12 +45,8 @@ class ConvectedDomain(NamedTuple):
     square, Q4).
     """
 
-    cells = 3
+    traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
     line_nodes = 2  # per corner
-    nodes_per_cell = 1
-    least_nodes = 2
-    steady_moment = True
-    steep_edge = False
     in_lanes = True
     element = None
 
@@ -58,7 +55,7 @@ class CarriedDomain(ConvectedDomain):
     """Base of domains with stored corners that the grid moves; they add `element`."""
 
     __slots__ = ()
-    shape = ("corners",)
+    traits = ConvectedDomain.traits._replace(shape=("corners",))
 
 
 BENT, SMALL = 0.2, 0.15  # a strain; a fraction of the stable step

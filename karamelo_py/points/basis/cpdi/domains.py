@@ -10,7 +10,7 @@ class _Parallel(cpdi.ConvectedDomain):
     """Base of domains given by half edges."""
 
     __slots__ = ()
-    shape = ("half_edges",)
+    traits = cpdi.ConvectedDomain.traits._replace(shape=("half_edges",))
 
 
 class R4(_Parallel):

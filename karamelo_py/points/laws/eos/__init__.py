@@ -3,13 +3,7 @@
 An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is the
 volume over the reference volume, `heat` the temperature (`Warm`), or () if the law has none. Its
-memory is a tuple, empty for most. It also has a `specific_volume`, like a law. Class attributes
-that differ from the defaults:
-
-any_speed
-    whether bodies may move many times faster than waves;
-least_density
-    in kg/m^3, below which units are likely wrong.
+memory is a tuple, empty for most. It also has a `specific_volume`, like a law.
 """
 
 from typing import Annotated, NamedTuple

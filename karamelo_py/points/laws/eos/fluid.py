@@ -7,6 +7,7 @@ from karamelo_py.compiler.compile import round_off
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.eos import (
     at_pressure,
     bulk_modulus,
@@ -57,7 +58,7 @@ class Tait(NamedTuple):
     """
 
     in_lanes = True
-    any_speed = True
+    traits = LawTraits(any_speed=True)
     scalarised = ("compression_energy",)
 
     specific_volume: float  # reference volume per mass
@@ -172,8 +173,7 @@ class IdealGas(NamedTuple):
     """
 
     in_lanes = True
-    any_speed = True
-    least_density = 1e-3  # kg/m^3
+    traits = LawTraits(any_speed=True, least_density=1e-3)
 
     specific_volume: float  # reference volume per mass
     gamma: float  # ratio of specific heats
@@ -232,7 +232,7 @@ known_failure(
 
 
 def _sound(eos, scene):
-    jumps = scene.moves and getattr(scene.basis, "gradient_jumps", False)
+    jumps = scene.moves and scene.basis.traits.gradient_jumps
     if not jumps or scene.pressure_ratio >= STEP:
         return None
     return {"place": scene.method.place, "speed": sqrt(1 - 1 / eos.gamma)}

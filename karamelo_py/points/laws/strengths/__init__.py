@@ -7,15 +7,7 @@ of as many numbers as needed, preferably none (`remembers`). `heat` is the tempe
 
 Strengths that depend on pressure, and change the volume, define `pressure_response` instead of
 `shear_response` (`karamelo_py.points.laws.strengths.frictional`). The defaults are those of an
-elastic strength with a shear modulus ``G`` and no memory. Class attributes that differ from the
-defaults:
-
-rebounds
-    True: it never yields;
-flows
-    True: a body of it has no stable shape, like liquids and soils;
-rings
-    False: it does not vibrate.
+elastic strength with a shear modulus ``G`` and no memory.
 """
 
 import sys

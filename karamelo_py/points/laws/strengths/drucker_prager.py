@@ -5,6 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import inner
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
     frictional,
@@ -75,7 +76,7 @@ class DruckerPrager(NamedTuple):
     """
 
     in_lanes = True
-    flows = True
+    traits = LawTraits(flows=True)
     scalarised = ("respond",)
 
     G: float  # shear modulus

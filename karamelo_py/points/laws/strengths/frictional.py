@@ -15,6 +15,7 @@ from math import asin, ceil, degrees, inf, log, radians, sqrt
 from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import inner
+from karamelo_py.points.laws import parameter
 from karamelo_py.points.laws.eos import bulk_modulus, initial_energy, pressure, ratio_at_pressure
 from karamelo_py.points.laws.strengths import (
     elastic_ratio,
@@ -193,7 +194,7 @@ def _vibrates(strength, scene):
     least = f - (FED if averaged else FED_ALONE) / f  # G/(K + G/3)
     for solid in scene.hub.solids.values():
         law = solid.material.law
-        if getattr(law, "strength", None) is strength:
+        if parameter(law, "strength") is strength:
             share = bulk_modulus(law.eos, 1.0, initial_energy(law.eos, 1.0), ()) / strength.G
             most = 1 / least - 1 / 3 if least > 0 else inf
             if share > most:

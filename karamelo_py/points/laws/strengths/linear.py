@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import dev, inner, nothing
-from karamelo_py.points.laws import specific_volume, strengths
+from karamelo_py.points.laws import LawTraits, parameter, specific_volume, strengths
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.viscosity import damped
 
@@ -34,7 +34,7 @@ class Elastic(NamedTuple):
     """
 
     in_lanes = True
-    rebounds = True
+    traits = LawTraits(rebounds=True)
 
     G: Annotated[float, Positive]
 
@@ -68,7 +68,7 @@ class Viscous(NamedTuple):
     """
 
     in_lanes = True
-    flows = True
+    traits = LawTraits(flows=True)
 
     mu: float  # dynamic viscosity
     cell_size: float  # h, known when the scene is lowered
@@ -85,7 +85,7 @@ COUNTS = 0.05  # of the viscosity of the fluid
 def _viscosity(strength, scene):
     """Find the kinematic viscosity, 0 where it reaches no further than a cell in the run."""
     laws = [solid.material.whole for solid in scene.hub.solids.values()]
-    own = [law for law in laws if getattr(law, "strength", None) is strength]
+    own = [law for law in laws if parameter(law, "strength") is strength]
     nu = max((float(strength.mu * specific_volume(law)) for law in own), default=0.0)
     seen = scene.d > 1 and sqrt(nu * scene.duration) > scene.hub.domain.h
     return nu if seen and scene.moves and not scene.simulation.implicit else 0.0
@@ -102,7 +102,7 @@ def _slows(strength, scene):
 
 
 def _reaches(strength, scene):
-    splines = not scene.hats and scene.basis.nodes_per_cell == 1
+    splines = not scene.hats and scene.basis.traits.nodes_per_cell == 1
     moved = splines and scene.moving_walls and _viscosity(strength, scene) > 0
     return moved and {"place": scene.method.place}
 

@@ -6,6 +6,7 @@ from typing import Annotated, NamedTuple
 from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.kinematics.principal import from_principal, principal
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import frictional, peak_and_residual, surface
 
@@ -50,7 +51,7 @@ class MohrCoulomb(NamedTuple):
     """
 
     in_lanes = True
-    flows = True
+    traits = LawTraits(flows=True)
     scalarised = ("respond",)
 
     G: float  # shear modulus

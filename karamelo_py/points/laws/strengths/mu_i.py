@@ -7,7 +7,7 @@ from karamelo_py.compiler.compile import where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner
-from karamelo_py.points.laws import specific_volume
+from karamelo_py.points.laws import LawTraits, parameter, specific_volume
 from karamelo_py.points.laws.eos import pressure
 from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond, share_beside
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
@@ -54,8 +54,7 @@ class MuI(NamedTuple):
     """
 
     in_lanes = True
-    flows = True
-    rings = False
+    traits = LawTraits(flows=True, rings=False)
 
     G: Annotated[float, Positive]
     mu_s: Annotated[float, Positive]
@@ -103,7 +102,7 @@ def _slows(strength, scene):
     added = scene.grid_viscosity
     for solid in scene.hub.solids.values():
         law = solid.material.law
-        if getattr(law, "strength", None) is not strength or not scene.weights:
+        if parameter(law, "strength") is not strength or not scene.weights:
             continue
         rho = 1 / specific_volume(law)
         p = 0.5 * rho * scene.sag * scene.waves**2

@@ -8,6 +8,7 @@ import numpy as np
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import PointTable
+from karamelo_py.points.laws import parameter
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
@@ -75,7 +76,7 @@ class ToolFix(PointForces):
 def _shear_modulus(solid: Solid) -> float:
     """The shear modulus of a solid, 0 if it has none."""
     law: Any = elastic_law(solid.material.whole)
-    return float(getattr(law, "G", None) or getattr(getattr(law, "strength", None), "G", None) or 0)
+    return float(parameter(law, "G") or parameter(parameter(law, "strength"), "G"))
 
 
 def unit(vector: np.ndarray) -> np.ndarray:

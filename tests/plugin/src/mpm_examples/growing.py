@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import AtLeast, In
-from karamelo_py.points.transfers import updated_velocity
+from karamelo_py.points.transfers import TransferTraits, updated_velocity
 
 
 class Growing(NamedTuple):
@@ -26,7 +26,7 @@ class Growing(NamedTuple):
     factor: Annotated[float, In(0, 4)]
     times: Annotated[int, AtLeast(1)] = 1
 
-    inverts_spread = False  # only the affine transfers do
+    traits = TransferTraits()
 
 
 known_failure(

@@ -3,6 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from karamelo_py.language.signature import In
+from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import Along, along, register
 
@@ -22,11 +23,7 @@ class Smooth(NamedTuple):
 
     share: Annotated[float, In(0, 1)] = 0.5
 
-    cells = 1
-    nodes_per_cell = 1
-    least_nodes = 2
-    steady_moment = False
-    steep_edge = True
+    traits = BasisTraits(cells=1, least_nodes=2, steady_moment=False, steep_edge=True)
 
 
 @along.on(Smooth)

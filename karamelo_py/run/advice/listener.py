@@ -1,0 +1,181 @@
+"""Words about a run: banner, warnings before and within it, troubles, end."""
+
+from math import inf
+from typing import Any
+
+from karamelo_py.kernels.step import DONE
+from karamelo_py.kernels.watch import WITHIN
+from karamelo_py.points.basis import support
+from karamelo_py.run import crossing
+from karamelo_py.run.advice import known_failures
+from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.diagnosis import energy, explain
+from karamelo_py.run.listening import Listener, Trouble
+from karamelo_py.run.loop import RunLoop
+from karamelo_py.run.lower.memory import bytes_per_point
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.tiles import DIRECT_UP_TO
+from karamelo_py.run.timestep import (
+    NO_LIMITS,
+    own_step_instead,
+    own_step_instead_of,
+    stable_step,
+    words_of_own_step,
+    words_of_share,
+)
+from karamelo_py.scene import boundary
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import words_of_volumes
+from karamelo_py.script.errors import render_message
+
+
+class Narrator(Listener):
+    """Listens to a run, and tells the user of it."""
+
+    def __init__(self, hub: Hub):
+        self.hub = hub
+
+    def begun(self, run: RunLoop, simulation: Simulation, *, resumed: bool = False) -> None:
+        """Warn of what is known to go wrong in this run, and of one that is very long."""
+        hub, halve = self.hub, run.rollback.halve
+        self.smaller = ""
+        if resumed:
+            if not simulation.control.clock[0].watch_limit and simulation.step > run.first_step:
+                self.smaller = "a smaller time step"  # the state of the file may be spoilt
+            if not (run.rollback.point.halvings or simulation.implicit):  # else not the script's
+                known_failures.warn_about_steps(hub, simulation, halve, again=True)
+            return
+        steps = inf if run.steps is None else run.steps
+        duration = min(run.end_time - simulation.time, steps * simulation.dt)
+        if simulation.implicit:
+            known_failures.warn_about_factor(hub)
+            known_failures.warn_about_loads(hub, steps)
+            known_failures.warn_about_laws(hub, simulation, duration)
+            return
+        known_failures.warn(hub, simulation, duration, halve)
+        known_failures.warn_about_length(hub, simulation, run.end_time)
+
+    def ready(self, simulation: Simulation, *, resumed: bool) -> None:
+        """Begin the record of this run, and print it."""
+        hub, why = self.hub, energy.unknown_work(self.hub)
+        if not simulation.implicit:
+            self.limits, self.least = {simulation.ruling_limit}, simulation.limit
+        # Said of the first state: a later one is ruined, and its limit with it.
+        if explain.is_too_large(simulation):
+            self.smaller = self.smaller or own_step_instead(hub)
+        facts: dict[str, Any] = {
+            "method": hub.update.words,
+            "points": int(simulation.present.sum()),
+            "nodes": hub.fields.node_count,
+            "nodes_per_point": support(simulation.setup.basis, simulation.setup.kin),
+            "bytes_per_point": bytes_per_point(simulation),
+            "dt": simulation.dt,
+            "first_step": simulation.step,
+            "first_time": simulation.time,
+            "processes": simulation.comm.size,
+            "threads": simulation.threads,
+            "precision": hub.settings.precision,
+        }
+        shown = {
+            "method": facts["method"],
+            "points": facts["points"],
+            "volumes": words_of_volumes(hub),
+            "nodes": facts["nodes"],
+            "nodes per point": facts["nodes_per_point"],
+            "bytes per particle": facts["bytes_per_point"],
+            "dt": facts["dt"],
+        }
+        if not simulation.implicit:
+            facts["stable_dt"] = shown["stable dt"] = stable_step(hub, simulation, simulation.limit)
+            facts["own_dt"] = own_step_instead_of(hub, simulation)
+            shown["own dt"] = words_of_own_step(hub, simulation)
+            facts["limited_by"] = simulation.ruling_limit
+            shown["limited by"] = f"{facts['limited_by']}; {words_of_share(hub)}"
+        if why and simulation.moves:
+            facts["energy_unwatched"], shown["energy"] = why, energy.not_watched(why)
+        hub.record.begin(facts)
+        if facts["processes"] > 1:
+            alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+            shown["processes"] = f"{facts['processes']}{alone * simulation.tiles.direct}"
+        shown["gpu"] = hub.settings.card and hub.settings.card.name
+        shown |= {name: facts[name] for name in ("threads", "precision")}
+        shown["units"] = hub.output.units and str(hub.output.units)
+        hub.console.banner(
+            f"Run, continued from step {simulation.step}" if resumed else "Run",
+            {name: of for name, of in shown.items() if of not in (None, "")},
+        )
+
+    def stepped(self, simulation: Simulation) -> None:
+        hub = self.hub
+        if not simulation.told_of_growth and (found := energy.words_of_growth(hub, simulation)):
+            hub.warn(found.message, hint=found.fix, code=found.code, cause=found.cause)
+            simulation.told_of_growth = True
+        self._tell_of_loss(simulation, WITHIN)
+        if simulation.step % simulation.states_every == 0 and not simulation.implicit:
+            self._tell_of_limit(simulation)
+        boundary.tell_of_bounces(hub, simulation)
+
+    def _tell_of_limit(self, simulation: Simulation) -> None:
+        """Tell of a limit of the step that rules for the first time, or has halved."""
+        name, limit, before = simulation.ruling_limit, simulation.limit, self.least
+        if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
+            return
+        self.limits.add(name)
+        self.least = min(limit, before)
+        words = (
+            f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by {name} "
+            f"now: {limit:.4g} is stable, {before:.4g} before"
+        )
+        self.hub.console.say(render_message("note", words))
+
+    def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
+        """Warn once of an energy loss above a fraction of the largest energy."""
+        hub = self.hub
+        lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
+        if lost is not None:
+            hub.warn(lost.message, hint=lost.fix, code=lost.code, cause=lost.cause)
+            simulation.told_of_loss = True
+
+    def wrong(
+        self, simulation: Simulation, status: int, *, too_large: bool = False
+    ) -> Trouble | None:
+        if status == DONE:
+            return energy.words_of_growth(self.hub, simulation)
+        return explain.trouble(self.hub, simulation, status, self.smaller * too_large)
+
+    def ended(self, run: RunLoop, simulation: Simulation, first_step: int, wall: float) -> None:
+        """Finish the record of this run, and print its end."""
+        self._tell_of_loss(simulation, energy.LOSS)
+        steps = simulation.step - first_step
+        stages = [(name, float(passed)) for name, (passed, _) in run.timings.on.items()]
+        stages.append(("rest", max(wall - sum(seconds for _, seconds in stages), 0.0)))
+        in_steps, worked = run.timings.on["steps"]
+        facts: dict[str, Any] = {
+            "wall_s": wall,
+            "steps": steps,
+            "time": simulation.time,
+            "energy_change_percent": energy.change_of_energy(simulation),
+            "path_cells": inf if simulation.implicit else float(simulation.control.clock[0].path),
+            "point_steps_per_s": steps * simulation.count / in_steps if in_steps > 0 else 0.0,
+            "processor_s_in_steps": float(worked),
+            "seconds": dict(stages),
+            "interrupted": bool(run.interrupted),
+        }
+        self.hub.record.finish(facts)
+        change, path = facts["energy_change_percent"], facts["path_cells"]
+        of_energy = {} if change is None else {"energy": energy.words_of_change(self.hub, change)}
+        self.hub.console.summary(
+            {
+                "wall time": f"{wall:.3g} s",
+                "steps": steps,
+                "time": simulation.time,
+                **of_energy,
+                **crossing.words_at_end(SceneFacts(self.hub, simulation, simulation.time)),
+                **({"path": f"{path:.3g} cells at most"} if path < inf else {}),
+                "particle-steps/s": f"{facts['point_steps_per_s']:.3g}",
+                "processor time": f"{worked:.3g} s in steps, of all threads",
+                **boundary.counted(self.hub, simulation),
+            },
+            [(name, seconds) for name, seconds in stages if seconds > 0],
+            title="Run interrupted" if run.interrupted else "Run finished",
+        )

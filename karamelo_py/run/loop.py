@@ -1,0 +1,228 @@
+"""One run: steps in chunks, outputs when they are due, and events for all who listen."""
+
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import InitVar, dataclass, field
+from math import inf, isfinite, isnan
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.run.listening import Listener
+from karamelo_py.run.mpi.comm import check_same_run, handled_signals
+from karamelo_py.run.recovery import RollBack, Stopped
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.timings import Timings
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import attributed
+from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.expressions import Expression
+
+PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
+HANG_UP = signal.SIGHUP if hasattr(signal, "SIGHUP") else None
+
+
+class Interrupted(Exception):
+    """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
+
+
+@dataclass(eq=False)
+class RunLoop:
+    """Runs a scene for a number of steps, to a time, or by a condition.
+
+    It ends where the condition holds (`until`), else where it does not. With `halve` it goes back
+    and halves the step where that goes wrong.
+    """
+
+    hub: Hub
+    steps: int | None = None
+    end_time: float = inf
+    condition: Expression | None = None
+    until: bool = False
+    halve: InitVar[bool] = False
+    advice: Listener = field(default_factory=Listener)
+
+    signal = 0  # that this process has been sent
+    interrupted = 0  # the signal that all processes end with
+
+    def __post_init__(self, halve: bool) -> None:
+        self.rollback = RollBack(self.hub, self.tell, halve=halve)
+        self.place = self.hub.place
+        self.timings = Timings(self.hub)
+
+    def tell(self, event: Callable[[Listener], Any]) -> Any:
+        """Send an event to all who listen; return the first answer."""
+        answers = [event(listener) for listener in (*self.hub.listeners, self.advice)]
+        return next((answer for answer in answers if answer is not None), None)
+
+    def run(self) -> None:
+        hub = self.hub
+        hub.in_run = hub.begun
+        try:
+            check_same_run(hub)
+            with self.timings.telling_of_compilation(), attributed(hub):
+                self._run(hub.simulation)
+        finally:
+            hub.in_run = 0
+        hub.runs.append({name: hub.values.get(name) for name in hub.values.names()})
+
+    def _run(self, simulation: Simulation) -> None:
+        hub, counted = self.hub, self.timings.counted
+        started, simulation.rollback = time.perf_counter(), self.rollback.point
+        self.first_step, self.first_time = simulation.step, simulation.time
+        self.last_step = inf if self.steps is None else self.first_step + self.steps
+        ruined, resumed = False, hub.restart is not None
+        if resumed:
+            ruined = self._take_up(simulation)
+        else:
+            simulation.begin(self.end_time)
+            self.tell(lambda to: to.begun(self, simulation))
+        simulation.compile()
+        began = simulation.step
+        self.tell(lambda to: to.ready(simulation, resumed=resumed))
+        with handled_signals(self._note):
+            with counted("output"):
+                hub.output.begin(within=resumed)
+            hub.console.begin_run(simulation.step, 0.0)
+            try:
+                self.rollback.begin(simulation, self.first_step, ruined, self.condition is not None)
+                self._loop(simulation)
+                with counted("output"):
+                    hub.console.end_run()
+                    if self.interrupted:
+                        # Before the last state of this run is written, which a longer one has not.
+                        hub.output.write_last()
+                    hub.output.end()
+                self._agree(simulation)  # a signal may have come meanwhile: no further run begins
+            except BaseException as error:
+                hub.console.end_run()
+                hub.output.abort()
+                if isinstance(error, Stopped):
+                    simulation.comm.end_together()
+                raise
+        self.tell(lambda to: to.ended(self, simulation, began, time.perf_counter() - started))
+        if self.interrupted:
+            simulation.comm.end_together()
+            raise Interrupted(self.interrupted)
+
+    def _take_up(self, simulation: Simulation) -> bool:
+        """Take the state of a file; say whether a step above the limit has spoilt it."""
+        hub, file = self.hub, self.hub.restart.path
+        hub.restart.take(hub, self.rollback.point, outputs=True)
+        hub.restart = hub.interpreter.replay = None
+        watched, point = simulation.control.clock[0].watch_limit, self.rollback.point
+        simulation.go_on(self.end_time, point.halvings)
+        self.tell(lambda to: to.begun(self, simulation, resumed=True))
+        # It may hold the end of this run already, or later states.
+        step, time, last_step = simulation.step, simulation.time, self.last_step
+        holds = f"{file} holds step {step}, time {time:.6g}"
+        hint = "a longer run, or a file from before its end"
+        if step > last_step or time > self.end_time:
+            end = f"step {last_step}" if step > last_step else f"time {self.end_time:.6g}"
+            message = f"{holds}, which is beyond the end of this run, {end}: it takes no step"
+            self.hub.warn(message, hint=hint, place=self.place)
+        elif step == last_step or time == self.end_time or not self._condition_allows():
+            message = f"{holds}, the end of this run: it takes no further step"
+            self.hub.console.say(render_message("note", message, hint=hint))
+        return not watched and simulation.step > self.first_step
+
+    def _loop(self, simulation: Simulation) -> None:
+        hub, rollback, timings = self.hub, self.rollback, self.timings
+        rhythms = {fix.every for fix in hub.fixes.values() if fix.every}
+        most = simulation.states_every
+        length, longest = 1, most if self.condition is None else 1
+
+        def between(words: str) -> bool:
+            """Show how far a load step is; tell whether the run is to end before it."""
+            self._show_progress(simulation, words)
+            return bool(self.signal)
+
+        while self._goes_on(simulation):
+            rollback.before()
+            step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
+            kept = (step // most + 1) * most  # where a state may be kept
+            end = min(hub.output.next_step(step), self.last_step, step + length, kept)
+            end = min([end, *((step // every + 1) * every for every in rhythms)])
+            with timings.counted("steps"):
+                status = simulation.advance(int(end) - step, between)
+            self._agree(simulation)  # what is written shows steps that no process has failed in
+            if not rollback.after(status):
+                length = 1
+                continue
+            self.tell(lambda to: to.stepped(simulation))
+            rollback.act_between_steps()
+            elapsed = simulation.comm.bcast(timings.passed("steps") - before["steps"])
+            in_time = PATIENCE * max(simulation.step - step, 1) / max(elapsed, 1e-9)
+            length = int(min(longest, max(1, in_time)))
+            with timings.counted("output"):
+                if self._steps_left(simulation):
+                    hub.output.write()
+                anew = timings.passed("compilation") > before["compilation"]
+                self._show_progress(simulation, anew=anew)
+
+    def _goes_on(self, simulation: Simulation) -> bool:
+        if not self._steps_left(simulation):
+            return False
+        if self._condition_allows():
+            self._agree(simulation)
+            return not self.interrupted
+        if simulation.step == self.first_step:
+            # A comparison that was forgotten, or turned round, ends a run at once.
+            holds = "holds" if self.until else "does not hold"
+            self.hub.warn(
+                f"the condition {holds} before the first step of this run: it takes none",
+                hint="run_until ends where its condition is anything but 0, run_while where it is "
+                "0; comparisons are 1 or 0",
+                place=self.place,
+            )
+        return False
+
+    def _agree(self, simulation: Simulation) -> None:
+        """Learn which signal any of the processes has been sent."""
+        self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
+
+    def _steps_left(self, simulation: Simulation) -> bool:
+        # A limit load ends a run, too: it moves the end to the time that was reached.
+        end_time = simulation.control.clock[0].end_time
+        return simulation.step < self.last_step and simulation.time < end_time
+
+    def _condition_allows(self) -> bool:
+        if self.condition is None:
+            return True
+        values = self.hub.values
+        if self.condition.names - {"time", "timestep", "dt"}:
+            self.hub.refresh_values()
+        holds = self.condition.evaluate(values)
+        if isnan(holds):
+            lost = sorted(name for name in self.condition.names if isnan(values.get(name)))
+            raise ScriptError(
+                f"step {self.hub.update.step}: nobody can tell whether the condition holds: "
+                + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
+                place=self.place,
+                expected="values that are numbers at every step",
+            )
+        return bool(holds) != self.until
+
+    def _show_progress(
+        self, simulation: Simulation, within: str = "", *, anew: bool = False
+    ) -> None:
+        """Show how far the run is, and a step; `anew` where a rate would count compilation."""
+        console, fraction = self.hub.console, None
+        if self.steps:
+            fraction = (simulation.step - self.first_step) / self.steps
+        elif isfinite(self.end_time) and self.end_time > self.first_time:
+            fraction = (simulation.time - self.first_time) / (self.end_time - self.first_time)
+        if anew:
+            console.end_run()
+            console.begin_run(simulation.step, fraction or 0.0)
+        console.progress(simulation.step, simulation.time, fraction, within)
+
+    def _note(self, number: int, _: Any = None) -> None:
+        """Note a signal: it ends the run after the present chunk; a second one at once."""
+        if self.signal:
+            raise KeyboardInterrupt
+        self.signal = number
+        self.tell(lambda to: to.signalled(number))
+        if number == HANG_UP:
+            self.hub.console.leave()

@@ -1,0 +1,62 @@
+"""Seconds that a run spends on compilation, steps and output."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+
+import numpy as np
+
+from karamelo_py.compiler import cache
+from karamelo_py.compiler.loops import compilation
+from karamelo_py.scene.hub import Hub
+
+COMPILING = "Compiling the loops of this kind of scene, once (the next run starts at once) ..."
+ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folder"
+
+
+def _clocks() -> np.ndarray:
+    """Read the seconds that have passed, and that all threads have worked."""
+    return np.array([time.perf_counter(), time.process_time()])
+
+
+class Timings:
+    """Seconds that a run spends: (2,) those that have passed, and those of all threads."""
+
+    def __init__(self, hub: Hub):
+        self.hub = hub
+        self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
+        self._depth = 0  # of compilation in the midst of compilation
+        self._begun = np.zeros(2)
+        self._told = False
+
+    def passed(self, name: str) -> float:
+        return float(self.on[name][0])
+
+    @contextmanager
+    def counted(self, name: str) -> Iterator[None]:
+        """Count what is done meanwhile, without compilation."""
+        begun = _clocks() - self.on["compilation"]
+        yield
+        self.on[name] += _clocks() - self.on["compilation"] - begun
+
+    @contextmanager
+    def telling_of_compilation(self) -> Iterator[None]:
+        """Say so when kernels are compiled, and count the time."""
+        telling = cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
+        with compilation.told_to(self), telling:
+            yield
+
+    def on_start(self, _: str) -> None:
+        """Note that a kernel is compiled, or another process does, and this one waits for it."""
+        self._depth += 1
+        if self._depth == 1:
+            self._begun = _clocks()
+            if not self._told:
+                self.hub.console.say(COMPILING)
+                self._told = True
+
+    def on_end(self) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self.on["compilation"] += _clocks() - self._begun
