@@ -35,7 +35,7 @@ class Listener:
     def stepped(self, simulation: Any) -> None:
         """Some steps were taken, all of them good."""
 
-    def wrong(self, simulation: Any, status: int, *, too_large: bool = False) -> Trouble | None:
+    def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
         """Explain steps that ended with `status`, DONE where energy has grown.
 
         `too_large` says that the step was, from the start of the run.

@@ -204,9 +204,7 @@ class RunLoop:
             )
         return bool(holds) != self.until
 
-    def _show_progress(
-        self, simulation: Simulation, within: str = "", *, anew: bool = False
-    ) -> None:
+    def _show_progress(self, simulation: Simulation, within: str = "", anew: bool = False) -> None:
         """Show how far the run is, and a step; `anew` where a rate would count compilation."""
         console, fraction = self.hub.console, None
         if self.steps:

@@ -123,10 +123,10 @@ class RollBack:
         )
         return True
 
-    def _explained(self, status: int, *, too_large: bool = False) -> Trouble:
+    def _explained(self, status: int, too_large: bool = False) -> Trouble:
         """Have a listener explain what went wrong."""
         simulation = self.simulation
-        found = self.tell(lambda to: to.wrong(simulation, status, too_large=too_large))
+        found = self.tell(lambda to: to.wrong(simulation, status, too_large))
         return found or Trouble(f"a step has failed ({when(simulation)})", SMALLER_STEP, "point")
 
     def _points_only_leave(self) -> bool:
@@ -152,7 +152,7 @@ class RollBack:
         initial state: no later state is good.
         """
         too_large = self.too_large and not self.simulation.control.clock[0].watch_limit
-        found = self._explained(status, too_large=too_large)
+        found = self._explained(status, too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):
             resume = self._keep_start(status) if too_large else self._keep_good(status)

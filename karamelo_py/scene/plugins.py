@@ -225,8 +225,7 @@ def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
     for name in sorted(set(dir(kind)) - {"traits", *getattr(kind, "_fields", ())}):
         close = [] if name.startswith("_") else get_close_matches(name, names, 1, ALIKE)
         if close:
-            means = "is" if name in names else "looks like"
-            return f"{name} {means} one of its traits: traits = {wanted.__name__}({close[0]}=...)"
+            return f"{name} is one of its traits: traits = {wanted.__name__}({close[0]}=...)"
     return ""
 
 

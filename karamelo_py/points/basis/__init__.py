@@ -12,9 +12,8 @@ stencil
     the result of `locate`.
 
 A basis that is a product of one function per direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`. Each has `traits`
-(:class:`BasisTraits`); one whose points have domains with corners also
-has `element`, an :class:`~karamelo_py.points.basis.cpdi.Element`.
+:func:`karamelo_py.points.basis.product.register`. Each has `traits` (:class:`BasisTraits`); with
+corners it has an `element`, too (:class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
 from math import inf

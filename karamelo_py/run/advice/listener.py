@@ -136,9 +136,7 @@ class Narrator(Listener):
             hub.warn(lost.message, hint=lost.fix, code=lost.code, cause=lost.cause)
             simulation.told_of_loss = True
 
-    def wrong(
-        self, simulation: Simulation, status: int, *, too_large: bool = False
-    ) -> Trouble | None:
+    def wrong(self, simulation: Simulation, status: int, too_large: bool) -> Trouble | None:
         if status == DONE:
             return energy.words_of_growth(self.hub, simulation)
         return explain.trouble(self.hub, simulation, status, self.smaller * too_large)
