@@ -79,7 +79,8 @@ class Solid(Named):
                 "eos-strength",
             )
         T0 = self.T0 if can(self.material.law, initial_heat) else None
-        Tm = min((parameter(part, "Tm", math.inf) for part in self.material.whole), default=math.inf)
+        melting = [parameter(part, "Tm", math.inf) for part in self.material.whole]
+        Tm = min(melting, default=math.inf)
         if T0 is not None and T0 < 0:
             hub.warn(
                 f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
