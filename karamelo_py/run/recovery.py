@@ -125,9 +125,8 @@ class RollBack:
 
     def _explained(self, status: int, too_large: bool = False) -> Trouble:
         """Have a listener explain what went wrong."""
-        simulation = self.simulation
-        found = self.tell(lambda to: to.wrong(simulation, status, too_large))
-        return found or Trouble(f"a step has failed ({when(simulation)})", SMALLER_STEP, "point")
+        found = self.tell(lambda to: to.wrong(self.simulation, status, too_large))
+        return found or Trouble(f"a step failed ({when(self.simulation)})", SMALLER_STEP, "point")
 
     def _points_only_leave(self) -> bool:
         """Return True if points leave without an energy gain: no smaller step prevents this."""
