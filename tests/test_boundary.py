@@ -65,6 +65,18 @@ def test_error_is_the_default(run_interpreted, d):
     assert "leaves the domain" in said and "boundary(delete)" in said
 
 
+def test_a_run_that_points_leave_resumes_with_them_deleted(run_interpreted):
+    """As the error says; the arrays of the default and of delete are the same."""
+    lost = run_interpreted(thrown(1, "error", "run(35)"), status=1)
+    command, remark = re.search(r"resume: karamelo-py (.*?)  # (.*)", lost.err).groups()
+    assert remark == "with boundary(delete)"
+    words = command.split()[1:]
+    resumed = run_interpreted(thrown(1, "delete", "run(35)"), *words)
+    assert "deleted points" in resumed.out
+    said = run_interpreted(thrown(1, "reflect", "run(35)"), *words, status=1).err
+    assert "another scene: boundary error; here it is reflect" in said
+
+
 def test_walls_of_grids_that_go_with_solids(run_interpreted):
     script = block(2, "boundary(reflect)", "run(1)").replace("ulmpm", "tlmpm")
     err = run_interpreted(script, status=1).err

@@ -120,6 +120,7 @@ def test_help_finds_styles_by_a_word(capsys, word, listed):
         (["rigid", "body"], "material rigid"),
         (["reaction", "force"], "compute reaction"),
         (["moving", "wall"], "fix contact/surface"),
+        (["dam", "break"], "eos fluid"),
         (["time", "step"], "command set_dt"),
         (["retaining", "wall", "force"], "fix velocity_nodes"),
         (["strength", "reduction"], "command modify"),

@@ -119,6 +119,26 @@ def test_an_unknown_subcommand(capsys):
     assert "did you mean 'karamelo-py check'?" in capsys.readouterr().err
 
 
+def test_a_check_needs_no_folder_that_the_run_would_make(run_interpreted):
+    words = "-out", "later", "-log", "b.csv"
+    dumped = f"{BODY}dump(d, all, particle, 10, d.*.txt, x)\nrun(1)\n"
+    checked = run_interpreted(dumped, *words, command="check")
+    assert not (checked.folder / "later").exists()
+    said = run_interpreted(dumped.replace("d.*", "none/d.*"), *words, command="check", status=1).err
+    assert "the folder none does not exist" in said
+    said = run_interpreted(dumped, "-out", "in.script", command="check", status=1).err
+    assert "it is a file" in said
+
+
+@pytest.mark.parametrize(
+    ("option", "meant"), [("-o", "-out"), ("-l", "-log"), ("-res", "-restart")]
+)
+def test_options_are_not_shortened(capsys, option, meant):
+    assert main(["run", "in.none", option, "x"]) == 1
+    said = capsys.readouterr().err
+    assert f"there is no option {option}\n" in said and f"did you mean {meant}" in said
+
+
 SUBCOMMANDS = ("bench", "help", "styles", "check", "run", "sweep", "chart", "advise", "stability")
 
 

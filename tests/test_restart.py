@@ -484,6 +484,19 @@ def test_numbers_that_the_scene_does_not_have(run_interpreted, name, number):
     assert str(number) in result.err
 
 
+def test_a_state_is_looked_for_where_other_input_files_are(run_interpreted):
+    """In the output folder, then in the current one, then next to the script."""
+    folder = run_interpreted(with_files(FLY)).folder
+    first, *_, last = sorted(folder.glob("r.*.h5"))
+    (folder / "out").mkdir()
+    shutil.copy(first, folder / "out" / "r.h5")
+    shutil.copy(last, folder / "r.h5")
+    script = FLY.partition("run(")[0] + 'read_restart(r.h5)\nprint("step", timestep)\nquit\n'
+    steps = [run_interpreted(script, *words).out for words in (("-out", "out"), ())]
+    assert [f"step = {file.suffixes[0][1:]}" in said
+            for file, said in zip((first, last), steps, strict=True)] == [True, True]  # fmt: skip
+
+
 def test_a_file_in_a_folder_below_is_shown(run_interpreted):
     """Who has written it with -out looks for it by the name that stands in the script."""
     folder = run_interpreted(with_files(FLY)).folder

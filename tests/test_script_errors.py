@@ -510,6 +510,11 @@ def test_a_compute_does_not_hide_the_time(run_interpreted):
     assert "would publish its value as 'time', which is the time of the run" in said
 
 
+def test_swapped_pressure_and_exponent_of_a_liquid_are_told(tmp_path):
+    script = SCENE + "eos(water, fluid, 1000, 7, 3e8)\n"
+    check(script, 7, 28, "hint: eos(ID, fluid, 1000, 3e+08, 7)", tmp_path)
+
+
 def test_swapped_modulus_and_speed_of_a_shock_are_told(tmp_path):
     """Copper: K = 137 GPa, c0 = 3940 m/s, rho = 8930 kg/m^3 (Meyers 1994)."""
     line = "eos(cu, shock, 8930, {}, {}, 1.49, 1.96, 385, 294, 1.5, 0.06)"

@@ -123,7 +123,12 @@ def _dispatch(arguments: list[str]) -> int:
         arguments = _one_file(arguments)
     parser, commands = _parser(arguments[0])
     choice = commands.choices.get(arguments[0])
-    arguments = _values_below_zero(arguments, choice.options() if choice else [])
+    known = choice.options() if choice else []
+    arguments = _values_below_zero(arguments, known)
+    # argparse takes -o for -out; two hyphens have no short forms, either.
+    begins = [w for w in arguments if w[:1] == "-" != w[1:2] and w[1:].isalpha() and w not in known]
+    if short := [w for w in begins if any(option.startswith(w) for option in known)]:
+        raise _surplus(arguments, short[:1], choice)
     try:
         options, surplus = parser.parse_known_args(arguments)
     except SystemExit:  # argparse has shown what was asked for
@@ -206,6 +211,9 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
     same = table()["options"].get((option or "").rstrip("0123456789"))
     if same in parser.options():
         close = same + " N" * (same != "--only")
+    close = close or next(
+        (known for known in parser.options() if known.startswith(option or "?")), None
+    )
     hint = f"did you mean {close}?" if close else None
     value = words[words.index(option) + 1 :] if option in words else []
     if (
@@ -424,7 +432,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
 def _direct(hub: Hub, options: argparse.Namespace) -> None:
     """Send the files of a scene where the options say."""
     if options.out is not None:
-        if not hub.checking:
+        if not hub.checking or options.out.exists():
             make_folder(options.out, "-out {}")
         hub.folder = options.out.absolute()
     if options.record is not None:
@@ -436,7 +444,9 @@ def _direct(hub: Hub, options: argparse.Namespace) -> None:
     if options.log is not None:
         hub.output.log.file = options.log
         hub.output.log.is_asked_for = True
-        if not hub.output.log.path.parent.is_dir() or hub.output.log.path.is_dir():
+        folder = hub.output.log.path.parent
+        made = folder.is_dir() or (hub.checking and folder == hub.folder)
+        if not made or hub.output.log.path.is_dir():
             raise ScriptError(
                 f"the log cannot be written to {options.log}",
                 expected="the name of a file in a folder that exists",

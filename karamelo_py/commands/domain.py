@@ -188,6 +188,9 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     hub.update.boundary_place = hub.place
 
 
+boundary.may_differ = True  # a run that points leave can resume with boundary(delete)
+
+
 def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) -> None:
     """Name a part of the domain, to fill with a solid or to select the members of a group.
 

@@ -270,11 +270,11 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     continued; lines written after that step are cut off.
 
     The script must be unchanged up to this run, with three exceptions. Commands that only control
-    how a run proceeds or its output may change (set_dt, dt_factor, set_output, dump, plot). The
-    length of the last run may change, as a number in its own line. Variables that were set with
-    ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run that had this length
-    from the start. A longer ``run_time(T)`` is too, if the file was written before the last two
-    steps of the shorter run, which are shortened.
+    how a run proceeds or its output may change (set_dt, dt_factor, set_output, dump, plot), and
+    ``boundary(delete)`` may be added. The length of the last run may change, as a number in its own
+    line. Variables that were set with ``-var`` come from the file. A longer ``run(n)`` is
+    bit-identical to a run that had this length from the start. A longer ``run_time(T)`` is too, if
+    the file was written before the last two steps of the shorter run, which are shortened.
 
     A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
     plots, and the values that the script has read. A run that is killed while writing leaves the
@@ -378,7 +378,7 @@ def read_restart(hub: Hub, file: str) -> None:
             "there is no scene yet", expected="domain, method and solids before read_restart"
         )
     path = Path(file).expanduser()
-    ways = (path, hub.folder / path, hub.interpreter.folder / path)
+    ways = [folder / path for folder in hub.interpreter.folders]
     found = next((way for way in ways if any(way.parent.glob(way.name))), path)
     restart_file.Restart(found).take(hub, outputs=False)
 

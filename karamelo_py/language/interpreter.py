@@ -124,6 +124,11 @@ class Interpreter:
         return next(paths, self._working_folder)
 
     @property
+    def folders(self) -> list[Path]:
+        """Folders in which files to read are looked for: of the output, current, of the script."""
+        return [self._working_folder, Path(), self.folder]
+
+    @property
     def _working_folder(self) -> Path:
         return getattr(self.hub, "folder", None) or Path.cwd()
 

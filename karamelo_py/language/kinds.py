@@ -75,11 +75,9 @@ class InputFile:
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
         """Read the path of the file."""
         name = _file_name(argument)
-        folders = [getattr(hub, "folder", Path()), Path(), argument._interpreter.folder]
-        for folder in folders:
-            path = folder / name
-            if path.is_file():
-                return path
+        folders = argument._interpreter.folders
+        if found := next((f / name for f in folders if (f / name).is_file()), None):
+            return found
         here = folders[-1] / name
         files = [p for p in here.parent.glob("*") if p.is_file()]
         if cls.endings is not None:
@@ -119,7 +117,9 @@ class OutputFile:
                 place=argument.place,
                 hint="the environment variable PYTHONUTF8=1, or another name",
             ) from None
-        if not path.parent.is_dir():
+        # A run makes the folder of -out, which `check` may find missing.
+        made = getattr(hub, "checking", False) and path.parent == hub.folder
+        if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
             message, hint = f"the folder {folder} does not exist", f"mkdir {folder}"
             raise ScriptError(message, place=argument.place, expected=expected, hint=hint)
@@ -352,3 +352,27 @@ def _union(kinds: list[Kind]) -> Kind:
         raise last or Unfit(argument.text)
 
     return Kind(" or ".join(kind.text for kind in kinds), convert, words, nullable)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a command or style, as a script sees it."""
+
+    name: str
+    kind: Kind
+    variadic: bool = False
+    keyword: bool = False
+    optional: bool = False
+    default: Any = None
+    description: str = ""
+
+    @property
+    def shown(self) -> str:
+        """Write it as in a line of syntax."""
+        if self.keyword:
+            return f"{self.name}={'|'.join(self.kind.words) or self.name}"
+        if len(self.kind.words) == 1:
+            return self.kind.words[0]
+        if self.kind.words and self.kind.text.startswith("one of "):
+            return "|".join(self.kind.words)
+        return self.name

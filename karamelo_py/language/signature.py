@@ -14,61 +14,36 @@ are added with Annotated. ``*args`` take any number, keyword-only parameters are
 """
 
 import inspect
-import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
+from itertools import chain, repeat
 from typing import Any, Literal, get_type_hints
 
-from karamelo_py.language import registry
-from karamelo_py.language.arguments import NULL, NUMBER, Argument, with_gap
+from karamelo_py.language import explain, registry
+from karamelo_py.language.arguments import NULL, Argument
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.kinds import (
     AtLeast,
     Constraint,
     In,
     InputFile,
-    Kind,
     NonNegative,
     OutputFile,
+    Parameter,
     Positive,
     TableFile,
     Unfit,
     is_raw,
     kind_of,
 )
-from karamelo_py.language.unknown import longer, renamed
-from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
+from karamelo_py.language.unknown import renamed
+from karamelo_py.script.errors import ScriptError, meant
 
 __all__ = [
-    "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile", "Positive",
-    "TableFile",
+    "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile",
+    "Parameter", "Positive", "TableFile",
 ]  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of a command or style, as a script sees it."""
-
-    name: str
-    kind: Kind
-    variadic: bool = False
-    keyword: bool = False
-    optional: bool = False
-    default: Any = None
-    description: str = ""
-
-    @property
-    def shown(self) -> str:
-        """Write it as in a line of syntax."""
-        if self.keyword:
-            return f"{self.name}={'|'.join(self.kind.words) or self.name}"
-        if len(self.kind.words) == 1:
-            return self.kind.words[0]
-        if self.kind.words and self.kind.text.startswith("one of "):
-            return "|".join(self.kind.words)
-        return self.name
 
 
 @cache
@@ -135,7 +110,7 @@ def call(
                 try:
                     value = convert(hub, parameter, argument, number)
                 except ScriptError as error:
-                    error.hint = _swapped(hub, expected, bound, parameter) or error.hint
+                    error.hint = explain.swapped(hub, expected, bound, parameter) or error.hint
                     raise
                 if parameter.keyword:
                     named[parameter.name] = value
@@ -157,7 +132,7 @@ def call(
             raise ScriptError(message, hint="use larger cells or fewer points") from error
     except ScriptError as error:
         for wrong in () if error.complete else (error, *error.others):
-            wrong.place = wrong.place or _guilty(wrong, arguments, bound)
+            wrong.place = wrong.place or explain.guilty(wrong, arguments, bound)
             wrong.command = wrong.command or name
         raise
 
@@ -204,7 +179,7 @@ def remade(
         last = {n: given[n] for n in names[names.index(several) + 1 :] if n in given}
         return make(target, hub, name, *first, *given.get(several, ()), **last), given
     except ScriptError as error:
-        error.place = error.place or _guilty(error, arguments, bound)
+        error.place = error.place or explain.guilty(error, arguments, bound)
         error.command = error.command or name
         raise
 
@@ -251,159 +226,36 @@ def _bind(
     # Raw arguments are passed on to a style, which knows the names.
     passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
-        pair = argument.keyword()
-        if pair is None or (passed_on and pair[0] not in by_name):
+        word, value = argument.keyword() or ("", argument)
+        if not word or (passed_on and word not in by_name):
             given.append(argument)
-            continue
-        word, value = pair
-        if word not in by_name:
-            raise _unknown_keyword(word, argument, expected, by_name)
-        if word in bound:
+        elif word not in by_name:
+            raise explain.unknown_keyword(word, argument, expected)
+        elif word in bound:
             raise ScriptError(f"{word} is given twice", place=argument.place)
-        bound[word] = [value]
-    needed = sum(1 for p in slots if not p.optional and not p.variadic)
+        else:
+            bound[word] = [value]
+    needed = sum(not (p.optional or p.variadic) for p in slots)
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
     if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
-        few, gap, hint = len(given) < needed, with_gap(given), None
-        surplus = given[len(slots)] if len(given) > len(slots) and not variadic else None
-        if few:
-            hint = longer(name, given) or table()["otherwise"].get(name)
-        if surplus is not None:
-            values = {word: f"{p.name}={word}" for p in by_name.values() for word in p.kind.words}
-            word = surplus.text if surplus.text in values else nearest(surplus.text, values)
-            hint = values.get(word or "", hint) or table()["surplus"].get(name)
-        if gap:
-            hint = f"is a comma missing in '{gap.text}'?"
-        left_out = _left_out(slots[:needed], given) if few and not gap else []
-        if left_out:
-            surplus, filled = _filled(slots[:needed], given, left_out)
-            hint = hint or (filled and f"{name}({filled})")
-        missing = [f"{m}=..." for m in missing]
-        missing = _named(left_out or slots[len(given) : needed], slots) or missing
-        more = len(given) - len(slots)
-        message = f"{'one argument' if more == 1 else f'{more} arguments'} too many"
-        if missing:
-            message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-        place = gap.place if gap else surplus.place if surplus else None
-        form = syntax(target, name)
-        raise ScriptError(message, place=place, expected=form, hint=hint, code="arguments")
-    for k, argument in enumerate(given):
-        parameter = slots[k] if k < len(slots) and not slots[k].variadic else variadic
-        bound.setdefault(parameter.name, []).append(argument)
-
-
-def _left_out(slots: list[Parameter], given: Sequence[Argument]) -> list[Parameter]:
-    """List the parameters that were left out, by words that fit only further back."""
-    missing, rest = [], list(given)
-    for slot in slots:
-        words = () if slot.shown == slot.name else slot.kind.words
-        if rest and (not words or rest[0].text in words):
-            del rest[0]
-        else:
-            missing.append(slot)
-    return [] if rest or missing == slots[len(given) :] else missing
-
-
-def _named(missing: list[Parameter], slots: list[Parameter]) -> list[str]:
-    """List what is missing; an ID behind a word of its own is no second such word."""
-    words = {p.shown for p in slots if p.shown != p.name}
-    return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
-
-
-def _filled(
-    slots: list[Parameter], given: Sequence[Argument], missing: list[Parameter]
-) -> tuple[Argument | None, str | None]:
-    """Find what stands in the place of the first that is missing; fill words into all arguments."""
-    rest, before = iter(given), next(k for k, slot in enumerate(slots) if slot in missing)
-    words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
-    if True in words:
-        return given[before], None
-    return given[before], ", ".join(word or next(rest).text for word in words)
-
-
-def _unknown_keyword(
-    word: str, argument: Argument, expected: list[Parameter], by_name: dict
-) -> ScriptError:
-    longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
-    turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
-    hint = turned or meant(word, by_name) or longer
-    if not hint and not all(p.keyword for p in expected):
-        hint = f"leave out '{word} ='; == compares"
-    if any(p.name == word for p in expected):
-        hint = f"arguments are given by position: leave out '{word} ='"
-    known = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
-    message = f"there is no argument to be given as '{word} = ...'"
-    place = argument.place
-    return ScriptError(message, place=place, expected=known, hint=hint, code="arguments", name=word)
+        raise explain.wrong_count(syntax(target, name), name, expected, given, missing)
+    for argument, parameter in zip(given, chain(slots, repeat(variadic)), strict=False):
+        if parameter is not None:
+            bound.setdefault(parameter.name, []).append(argument)
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
     """Convert an argument, the one of this number, to the value of a parameter."""
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
-        raise _misfit(parameter, argument, number, Unfit(NULL))
+        raise explain.misfit(parameter, argument, number, Unfit(NULL))
     try:
         return parameter.kind.convert(hub, argument)
     except Unfit as unfit:
-        raise _misfit(parameter, argument, number, unfit) from None
+        raise explain.misfit(parameter, argument, number, unfit) from None
     except ScriptError as error:
         error.place = error.place or argument.place
         error.expected = error.expected or f"{parameter.name}: {parameter.kind.text}"
         raise
-
-
-def _swapped(
-    hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
-) -> str | None:
-    """Write the hint for two arguments of which each fits in the place of the other."""
-
-    def fits(parameter: Parameter, argument: Argument) -> bool:
-        kind = parameter.kind
-        try:
-            convert(hub, parameter, argument)
-        except ScriptError:
-            return False
-        return not kind.family or registry.knows(kind.family, argument.word() or "")
-
-    single = [p for p in expected if len(bound.get(p.name, ())) == 1 and not p.variadic]
-    if wrong not in single:
-        return None
-    (given,) = bound[wrong.name]
-    for other in single:
-        (there,) = bound[other.name]
-        if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
-            right = f"{wrong.name} {there.text}, {other.name} {given.text}"
-            return f"swap {given.text} and {there.text}: {right}"
-    family, after = [p.kind.family for p in (*single, *single)][:2]
-    word = bound[single[0].name][0].text
-    if family and registry.knows(after or "", word):
-        return f"{word} is a {after}; a {family} comes first: {', '.join(registry.names(family))}"
-    return None
-
-
-def _misfit(
-    parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
-) -> ScriptError:
-    which = f"argument {number} '{parameter.name}'" if number else f"'{parameter.name}'"
-    family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
-    if family and NUMBER.fullmatch(argument.text):
-        text, hint = f"one of {', '.join(registry.names(family))}", None
-    if re.fullmatch(r"0\d\d", argument.text):  # of 1,000
-        hint = "commas separate arguments: a million is 1e6 or 1000000"
-    message, place = f"{which} must be {text}, not {unfit.got}", unfit.place or argument.place
-    return ScriptError(message, place=place, expected=text, hint=hint, code="argument")
-
-
-def _guilty(
-    error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
-) -> Place | None:
-    """Find the place of the argument that an error names, or else of the word at fault."""
-    if isinstance(error.argument, int) and error.argument < len(arguments):
-        plain = [argument for argument in arguments if argument.keyword() is None]
-        return (arguments if error.argument >= 0 else plain)[error.argument].place
-    if isinstance(error.argument, str) and bound.get(error.argument):
-        return bound[error.argument][0].place
-    words = (error.name, f'"{error.name}"')
-    return next((a.place for a in arguments if a.text in words), None)
 
 
 def _joined(expected: list[Parameter]) -> str:

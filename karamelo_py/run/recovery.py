@@ -154,7 +154,7 @@ class RollBack:
         found = self._explained(status, too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):
-            resume = self._keep_start(status) if too_large else self._keep_good(status)
+            resume = self._keep_start(status) if too_large else self._keep_good(status, found.code)
             kind = Stopped
         error = kind(found.message, place=found.place or self.place, hint=found.fix)
         error.code, error.cause, error.resume = found.code, found.cause, resume
@@ -188,7 +188,7 @@ class RollBack:
         out = f" -out {folder}" if folder != os.curdir else ""
         return f"karamelo-py {script} -restart {file}{out}" + (remark and f"  # {remark}")
 
-    def _keep_good(self, status: int) -> str:
+    def _keep_good(self, status: int, code: str) -> str:
         """Return to the last good state, write it, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
@@ -212,6 +212,7 @@ class RollBack:
             present.give(self.hub)  # their files are unchanged, with later rows
         self._end_outputs()
         change = OTHER_LOAD_STEPS if simulation.implicit else SMALLER_STEP
+        change = "boundary(delete)" if code == "left-domain" else change
         return self._resume(path, f"{'before energy grew; ' * grown}with {change}")
 
     def _write_before_growth(self, end: int) -> Path | None:

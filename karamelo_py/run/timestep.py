@@ -244,11 +244,8 @@ def own_step_instead_of(hub: Hub, simulation: Any) -> float | None:
     return own_step(hub, simulation, still=still)
 
 
-def words_of_own_step(hub: Hub, simulation: Any) -> str:
-    """Describe the default step and its duration; empty if the script does not override it."""
-    step = own_step_instead_of(hub, simulation)
-    if step is None:
-        return ""
+def words_of_own_step(hub: Hub, simulation: Any, step: float) -> str:
+    """Describe the default step, see `own_step_instead_of`, and how long it is that."""
     after = own_step(hub, simulation, still=False)
     far = f", {after:.6g} once points have gone a quarter of a cell"
     return f"{step:.6g}" + (far if after < step else "")

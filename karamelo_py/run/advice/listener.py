@@ -87,8 +87,8 @@ class Narrator(Listener):
         }
         if not simulation.implicit:
             facts["stable_dt"] = shown["stable dt"] = stable_step(hub, simulation, simulation.limit)
-            facts["own_dt"] = own_step_instead_of(hub, simulation)
-            shown["own dt"] = words_of_own_step(hub, simulation)
+            facts["own_dt"] = own = own_step_instead_of(hub, simulation)
+            shown["own dt"] = words_of_own_step(hub, simulation, own) if own else None
             facts["limited_by"] = simulation.ruling_limit
             shown["limited by"] = f"{facts['limited_by']}; {words_of_share(hub)}"
         if why and simulation.moves:

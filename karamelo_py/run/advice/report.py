@@ -17,7 +17,13 @@ from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import ruling_limit, stable_step, words_of_own_step, words_of_share
+from karamelo_py.run.timestep import (
+    own_step_instead_of,
+    ruling_limit,
+    stable_step,
+    words_of_own_step,
+    words_of_share,
+)
 from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -56,8 +62,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
         stable = stable_step(hub, simulation, simulation.limit)
         say(f"first dt       {simulation.dt:.6g} (stable limit {stable:.6g})")
         say(f"               {words_of_share(hub)}")
-        if step := words_of_own_step(hub, simulation):
-            say(f"own dt         {step}")
+        if own := own_step_instead_of(hub, simulation):
+            say(f"own dt         {words_of_own_step(hub, simulation, own)}")
         say(f"limited by     {ruling_limit(simulation)}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
             one = seconds_of_step(hub, simulation.count)

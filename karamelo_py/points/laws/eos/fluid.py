@@ -76,6 +76,13 @@ class Tait(NamedTuple):
         tension: Annotated[float, NonNegative] = inf,
     ):
         """Make the law from density, reference pressure and exponent."""
+        if gamma > 100 > K:  # exponents of liquids are below 15
+            raise ScriptError(
+                f"K = {K:g} and gamma = {gamma:g} are swapped: gamma is an exponent",
+                argument="gamma",
+                expected="the reference pressure K, then the exponent gamma (7 for water)",
+                hint=f"eos(ID, fluid, {rho0:g}, {gamma:g}, {K:g})",
+            )
         return cls(1 / rho0, K, gamma, tension)
 
 

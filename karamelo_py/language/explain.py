@@ -1,0 +1,153 @@
+"""What is wrong with the arguments of a call, and what to write."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from karamelo_py.language import registry
+from karamelo_py.language.arguments import NUMBER, Argument, with_gap
+from karamelo_py.language.kinds import Parameter, Unfit
+from karamelo_py.language.unknown import longer
+from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
+
+
+def wrong_count(
+    form: str,
+    name: str,
+    expected: Sequence[Parameter],
+    given: Sequence[Argument],
+    keywords: Sequence[str],
+) -> ScriptError:
+    """Make the error for too few or too many arguments of `name`, written in the `form` shown.
+
+    Those `given` by position do not fit, or `keywords` that must be given are missing.
+    """
+    slots = [p for p in expected if not p.keyword]
+    needed = [p for p in slots if not (p.optional or p.variadic)]
+    surplus = given[len(slots) :] if not any(p.variadic for p in slots) else ()
+    place, hint, missing = None, None, [f"{word}=..." for word in keywords]
+    if surplus:
+        place, hint = surplus[0].place, _of_surplus(surplus[0].text, expected, name)
+    elif len(given) < len(needed):
+        hint = longer(name, given) or table()["otherwise"].get(name)
+        missing = _named(needed[len(given) :], slots)
+    if gap := with_gap(given):
+        place, hint = gap.place, f"is a comma missing in '{gap.text}'?"
+    elif left_out := _left_out(needed, given) if len(given) < len(needed) else []:
+        before, filled = _filled(needed, given, left_out)
+        place, missing = before.place, _named(left_out, slots)
+        hint = hint or (f"{name}({filled})" if filled else None)
+    message = f"{'one argument' if len(surplus) == 1 else f'{len(surplus)} arguments'} too many"
+    if missing:
+        message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+    return ScriptError(message, place=place, expected=form, hint=hint, code="arguments")
+
+
+def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
+    """Write the hint for an argument too many: a word of a keyword, or what is done otherwise."""
+    words = {word: f"{p.name}={word}" for p in expected if p.keyword for word in p.kind.words}
+    word = text if text in words else nearest(text, words)
+    return words.get(word or "") or table()["surplus"].get(name)
+
+
+def _left_out(slots: Sequence[Parameter], given: Sequence[Argument]) -> list[Parameter]:
+    """List the parameters that were left out, by words that fit only further back."""
+    missing, rest = [], list(given)
+    for slot in slots:
+        words = () if slot.shown == slot.name else slot.kind.words
+        if rest and (not words or rest[0].text in words):
+            del rest[0]
+        else:
+            missing.append(slot)
+    return [] if rest or missing == slots[len(given) :] else missing
+
+
+def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
+    """List what is missing; an ID behind a word of its own is no second such word."""
+    words = {p.shown for p in slots if p.shown != p.name}
+    return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
+
+
+def _filled(
+    slots: Sequence[Parameter], given: Sequence[Argument], missing: Sequence[Parameter]
+) -> tuple[Argument, str | None]:
+    """Find the argument given instead of the first missing one; fill words into all arguments."""
+    rest, before = iter(given), next(k for k, slot in enumerate(slots) if slot in missing)
+    words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
+    if True in words:
+        return given[before], None
+    return given[before], ", ".join(word or next(rest).text for word in words)
+
+
+def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]) -> ScriptError:
+    """Make the error for ``word = value`` that no parameter is called."""
+    by_name = [p.name for p in expected if p.keyword]
+    longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
+    turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
+    hint = turned or meant(word, by_name) or longer
+    if not hint and not all(p.keyword for p in expected):
+        hint = f"leave out '{word} ='; == compares"
+    if any(p.name == word for p in expected):
+        hint = f"arguments are given by position: leave out '{word} ='"
+    known = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
+    message = f"there is no argument to be given as '{word} = ...'"
+    place = argument.place
+    return ScriptError(message, place=place, expected=known, hint=hint, code="arguments", name=word)
+
+
+def swapped(
+    hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
+) -> str | None:
+    """Write the hint for two arguments of which each fits in the place of the other."""
+
+    def fits(parameter: Parameter, argument: Argument) -> bool:
+        kind = parameter.kind
+        if argument.is_null:
+            return kind.nullable
+        try:
+            kind.convert(hub, argument)
+        except (Unfit, ScriptError):
+            return False
+        return not kind.family or registry.knows(kind.family, argument.word() or "")
+
+    single = [p for p in expected if len(bound.get(p.name, ())) == 1 and not p.variadic]
+    if wrong not in single:
+        return None
+    (given,) = bound[wrong.name]
+    for other in single:
+        (there,) = bound[other.name]
+        if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
+            right = f"{wrong.name} {there.text}, {other.name} {given.text}"
+            return f"swap {given.text} and {there.text}: {right}"
+    family, after = [p.kind.family for p in (*single, *single)][:2]
+    word = bound[single[0].name][0].text
+    if family and registry.knows(after or "", word):
+        return f"{word} is a {after}; a {family} comes first: {', '.join(registry.names(family))}"
+    return None
+
+
+def misfit(
+    parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
+) -> ScriptError:
+    """Make the error for an argument that is of another kind."""
+    which = f"argument {number} '{parameter.name}'" if number else f"'{parameter.name}'"
+    family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
+    if family and NUMBER.fullmatch(argument.text):
+        text, hint = f"one of {', '.join(registry.names(family))}", None
+    if re.fullmatch(r"0\d\d", argument.text):  # of 1,000
+        hint = "commas separate arguments: a million is 1e6 or 1000000"
+    message, place = f"{which} must be {text}, not {unfit.got}", unfit.place or argument.place
+    return ScriptError(message, place=place, expected=text, hint=hint, code="argument")
+
+
+def guilty(
+    error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
+) -> Place | None:
+    """Find the place of the argument that an error names, or else of the word at fault."""
+    if isinstance(error.argument, int) and error.argument < len(arguments):
+        plain = [argument for argument in arguments if argument.keyword() is None]
+        return (arguments if error.argument >= 0 else plain)[error.argument].place
+    if isinstance(error.argument, str) and bound.get(error.argument):
+        return bound[error.argument][0].place
+    words = (error.name, f'"{error.name}"')
+    return next((a.place for a in arguments if a.text in words), None)
