@@ -1,4 +1,4 @@
-"""What is wrong with the arguments of a call, and what to write."""
+"""Mistakes in the arguments of a call, and what to write instead."""
 
 import re
 from collections.abc import Sequence

@@ -62,8 +62,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
         stable = stable_step(hub, simulation, simulation.limit)
         say(f"first dt       {simulation.dt:.6g} (stable limit {stable:.6g})")
         say(f"               {words_of_share(hub)}")
-        if own := own_step_instead_of(hub, simulation):
-            say(f"own dt         {words_of_own_step(hub, simulation, own)}")
+        if (step := own_step_instead_of(hub, simulation)) is not None:
+            say(f"own dt         {words_of_own_step(hub, simulation, step)}")
         say(f"limited by     {ruling_limit(simulation)}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
             one = seconds_of_step(hub, simulation.count)
