@@ -13,7 +13,6 @@ from karamelo_py.compiler.values import (
     HeldValue,
     Untraceable,
     Value,
-    counting,
     emit,
     is_literal,
     rebuilt,
@@ -34,10 +33,14 @@ class Edge(NamedTuple):
     read: dict
 
 
-class Range(NamedTuple):
+class Range:
     """Keep a range whose bounds only a run knows."""
 
-    bounds: tuple
+    def __init__(self, *bounds: Any):
+        self.bounds = bounds
+
+    def __iter__(self) -> Any:
+        raise Untraceable("the end of a range is only known when the kernel runs")
 
 
 class Counter(NamedTuple):
@@ -324,6 +327,6 @@ class Flow:
         """Compile a call."""
         if function is len and is_value(arguments[0]):
             return emit(len, arguments[0])
-        if function is counting and any(map(is_value, arguments)):
-            return Range(tuple(arguments))
+        if function is range and any(map(is_value, arguments)):
+            return Range(*arguments)
         return function(*arguments, **keywords)

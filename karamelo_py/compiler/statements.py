@@ -1,9 +1,8 @@
-"""Functions with branches and loops, written down by walking through their text.
+"""The front end: the text of a function, walked statement by statement, becomes code.
 
-What asks what only a run can know cannot be run by Python (:mod:`karamelo_py.compiler.trace`): here
-its statements are gone through one by one. What only concerns Python is done; where a number
-decides, code is written for all edges, and where edges meet, a variable is what it was on the way
-that was taken. A loop over a range that is known is written out, any other one becomes a loop.
+Python's own values are computed at once. Where a number of the kernel decides, code is written for
+both branches, and where they meet, a variable merges its values (a phi of SSA form). A loop over a
+known range is unrolled where it is short or must be; any other loop stays one.
 """
 
 import ast
@@ -15,7 +14,6 @@ import inspect
 import linecache
 import operator
 import os
-import textwrap
 import time
 import types as python
 from collections.abc import Callable, Iterable
@@ -27,7 +25,7 @@ from numba import types
 from karamelo_py.compiler import values
 from karamelo_py.compiler.choices import codes_in
 from karamelo_py.compiler.flow import Edge, Flow, Grows, Range, is_value
-from karamelo_py.compiler.values import LONG, DataDependentBranch, Untraceable, emit
+from karamelo_py.compiler.values import LONG, Untraceable, emit
 
 
 @functools.cache
@@ -45,21 +43,12 @@ def _globals_in(code: python.CodeType) -> frozenset[str]:
     return frozenset(i.argval for i in loads if i.opname == "LOAD_GLOBAL")
 
 
-def place_in_text(frame: python.FrameType) -> tuple[str, int] | None:
-    """Find the file and line of the statement that a frame is about, if it is about one."""
-    if frame.f_code is not AstCompiler.block.__code__ or "statement" not in frame.f_locals:
-        return None
-    walk, statement = frame.f_locals["self"], frame.f_locals["statement"]
-    return walk.walked.__code__.co_filename, statement.lineno
-
-
 # --- text -----------------------------------------------------------------------------------------
 
-_LONGEST_END = 40  # lines of closing brackets, at most, behind the last one with code
 _began = time.time()
 
 
-def _is_as_read(code: python.CodeType, lines: list[str]) -> bool:
+def _is_as_read(code: python.CodeType, text: str) -> bool:
     """Tell whether a file is as Python has read it; what was typed in lies in no file."""
     try:
         about = os.stat(code.co_filename)
@@ -67,26 +56,44 @@ def _is_as_read(code: python.CodeType, lines: list[str]) -> bool:
         return True
     if max(about.st_ctime, about.st_mtime) < _began:
         return True
-    return code in codes_in(compile("".join(lines), code.co_filename, "exec", dont_inherit=True))
+    return code in codes_in(compile(text, code.co_filename, "exec", dont_inherit=True))
 
 
-def source_of(function: Callable) -> ast.FunctionDef:
-    """Parse the text of a function."""
-    code = function.__code__
-    lines = linecache.getlines(code.co_filename)
-    if not _is_as_read(code, lines):
+@functools.cache
+def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
+    """Parse a text; list its functions by name and first line, decorators included."""
+    found: dict[tuple[str, int], list] = {}
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef):
+            first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+            found.setdefault((node.name, first), []).append(node)
+        elif isinstance(node, ast.Lambda):
+            found.setdefault(("<lambda>", node.lineno), []).append(node)
+    return found
+
+
+def _has(node: ast.expr, code: python.CodeType) -> bool:
+    """Tell whether the code of a lambda lies within an expression."""
+    begin, end = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
+    places = [p for p in code.co_positions() if None not in p and p[3]]
+    return all(begin <= (p[0], p[2]) and (p[1], p[3]) <= end for p in places)
+
+
+@functools.cache
+def source_of(code: python.CodeType) -> list[ast.stmt]:
+    """Find the statements of a function; of a lambda, what it returns."""
+    text = "".join(linecache.getlines(code.co_filename))
+    if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start anew")
-    first = code.co_firstlineno - 1
-    last = max(line for one in codes_in(code) for _, _, line in one.co_lines() if line is not None)
-    for end in range(last, min(last + _LONGEST_END, len(lines)) + 1):
-        try:
-            (definition,) = ast.parse(textwrap.dedent("".join(lines[first:end]))).body
-        except (SyntaxError, ValueError):  # longer and longer, until it can be parsed
-            continue
-        if isinstance(definition, ast.FunctionDef):
-            return ast.increment_lineno(definition, first)
-        break
-    raise Untraceable("its text is not known: write it into a file")
+    known = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
+    if code.co_name == "<lambda>":  # perhaps one of several in a line, or within another
+        known = sorted((n for n in known if _has(n.body, code)), key=lambda n: -n.body.col_offset)
+    if not known:
+        raise Untraceable("its text is not known: write it into a file")
+    node = known[0]
+    if isinstance(node, ast.FunctionDef):
+        return node.body
+    return [ast.copy_location(ast.Return(node.body), node.body)]
 
 
 # --- the walk -------------------------------------------------------------------------------------
@@ -95,25 +102,49 @@ def source_of(function: Callable) -> ast.FunctionDef:
 class AstFunction:
     """Compile a function from its text, statement by statement, where it is called.
 
-    The function has the globals that it is to see.
+    ``seen(thing)`` gives what kernels have for a global, a variable of a closure or a default.
     """
 
-    def __init__(self, function: Callable):
-        self.function = function
-        self.definition = source_of(function)
+    def __init__(self, function: Callable, seen: Callable[[Any], Any]):
+        self.function, self.seen = function, seen
+        self.__code__ = code = function.__code__
+        self.__name__ = function.__name__
+        self.body = source_of(code)
+        self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
         # Of loops, by all that decides on their code: types of literals that one begins with, by
         # place; None of one that must be written out.
         self.loops: dict[tuple, dict | None] = {}
-        self.signature = inspect.signature(function)
-        self.__code__ = function.__code__
-        free = function.__code__.co_freevars
-        cells = (cell.cell_contents for cell in function.__closure__ or ())
-        self.free = dict(zip(free, cells, strict=True))
+        plain = python.FunctionType(
+            code, {}, code.co_name, function.__defaults__, function.__closure__
+        )  # its signature is of the code, whatever the function shows
+        plain.__kwdefaults__ = function.__kwdefaults__
+        self.signature = inspect.signature(plain)
+
+    def free(self) -> dict[str, Any]:
+        """Give the variables of the closure."""
+        cells = zip(self.__code__.co_freevars, self.function.__closure__ or (), strict=True)
+        return {name: self.seen(cell.cell_contents) for name, cell in cells}
+
+    def of_module(self, name: str) -> Any:
+        """Give a global, or a builtin."""
+        true = self.function.__globals__
+        if name not in true and not hasattr(builtins, name):
+            raise NameError(f"name '{name}' is not defined")
+        return self.seen(true[name] if name in true else getattr(builtins, name))
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
-        bound = self.signature.bind(*arguments, **keywords)
-        bound.apply_defaults()
-        return AstCompiler(self, dict(bound.arguments)).result()
+        names = _bound(self.signature, arguments, keywords, self.seen)
+        return AstCompiler(self, names, self.free()).result()
+
+
+def _bound(
+    signature: inspect.Signature, arguments: tuple, keywords: dict, seen: Callable = lambda x: x
+) -> dict[str, Any]:
+    """Give the variables that a call begins with; `seen` what kernels have for defaults."""
+    bound = signature.bind(*arguments, **keywords)
+    given = {*bound.arguments}
+    bound.apply_defaults()
+    return {n: x if n in given else seen(x) for n, x in bound.arguments.items()}
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
@@ -141,11 +172,16 @@ _BINARY = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne,
     ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Invert: operator.invert,
 }  # fmt: skip
-_CHANGING = list | dict | set
+_KINDS = (
+    inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD,
+    inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD,
+)  # fmt: skip
+_CHANGING = (list, dict, set)
 _ON_ALL_WAYS = "on one of several ways, a list would change on all"
+_IMPORT = "`import` within a function: import at the top of the file"
 _WORDS = {
-    "JoinedStr": "text with numbers in it", "Try": "`try`", "With": "`with`", "Delete": "`del`",
-    "Import": "`import` within a function", "ImportFrom": "`import` within a function",
+    "Try": "`try` and no `with`", "With": "`try` and no `with`", "Delete": "`del`",
+    "Import": _IMPORT, "ImportFrom": _IMPORT,
     "Global": "`global`", "Nonlocal": "`nonlocal`", "Match": "`match`", "ClassDef": "`class`",
     "Raise": "`raise` of this kind", "FunctionDef": "function within of this kind",
 }  # fmt: skip
@@ -154,9 +190,10 @@ _WORDS = {
 class AstCompiler:
     """Compile one call of a function."""
 
-    def __init__(self, walked: AstFunction, names: dict[str, Any]):
-        self.walked, self.names = walked, names
-        self.function, self.free = walked.function, walked.free
+    def __init__(self, walked: AstFunction, names: dict[str, Any], free: dict[str, Any]):
+        self.walked, self.names, self.free = walked, names, free
+        self.depth = 0  # of branches and loops of the kernel
+        self.yielded: list = []
         self.goes = True  # whether anything is done after the statement before
         self.returns: list[Edge] = []
         self.breaks: list[Edge] = []
@@ -169,7 +206,9 @@ class AstCompiler:
 
     def result(self) -> Any:
         """Compile the body; return what the function returns."""
-        self.block(self.walked.definition.body)
+        self.block(self.walked.body)
+        if self.walked.generates:  # all at once
+            return self.yielded
         if self.goes:
             self.names = {"": None}
             self.returns.append(self.edge())
@@ -177,6 +216,11 @@ class AstCompiler:
         if "" not in self.names:
             raise Untraceable("what it returns is not of one kind on all edges")
         return self.names[""]
+
+    @property
+    def branches(self) -> bool:
+        """Tell whether only some edges come by here: elsewhere all is as Python does it."""
+        return bool(self.depth or self.returns or self.breaks or self.continues)
 
     # --- ways
 
@@ -207,7 +251,9 @@ class AstCompiler:
             self.names = dict(before)
             self.goes = True
             self.flow.start(begin)
+            self.depth += 1
             do()
+            self.depth -= 1
             edges += self.here()
         self.meet(edges)
 
@@ -228,10 +274,10 @@ class AstCompiler:
             return self.names[name]
         if name in self.free:
             return self.free[name]
-        code = self.function.__code__
+        code = self.walked.__code__
         if name in code.co_varnames and name not in _globals_in(code):
             raise Untraceable(f"'{name}' is not of one kind on all ways to here")
-        return self.function.__globals__[name]
+        return self.walked.of_module(name)
 
     def Name(self, node: ast.Name) -> Any:
         return self.name(node.id)
@@ -271,6 +317,25 @@ class AstCompiler:
         if None in node.keys:
             self.unknown(node)
         return dict(zip(map(self.do, node.keys), map(self.do, node.values), strict=True))
+
+    def JoinedStr(self, node: ast.JoinedStr) -> str:
+        return "".join(map(self.do, node.values))
+
+    def FormattedValue(self, node: ast.FormattedValue) -> str:
+        value = self.do(node.value)
+        if is_value(value):
+            raise Untraceable("kernels know no text with numbers in it")
+        if node.conversion >= 0:
+            value = {"s": str, "r": repr, "a": ascii}[chr(node.conversion)](value)
+        return format(value, self.do(node.format_spec) if node.format_spec else "")
+
+    def Yield(self, node: ast.Yield) -> None:
+        if self.branches or not self.walked.generates:
+            self.unknown(node)
+        self.yielded.append(node.value and self.do(node.value))
+
+    def YieldFrom(self, node: ast.YieldFrom) -> None:
+        self.yielded += self.do(node.value)
 
     def NamedExpr(self, node: ast.NamedExpr) -> Any:
         self.names[node.target.id] = value = self.do(node.value)
@@ -345,30 +410,54 @@ class AstCompiler:
 
     def Call(self, node: ast.Call) -> Any:
         function = self.do(node.func)
-        if isinstance(getattr(function, "__self__", None), _CHANGING):
+        if self.branches and isinstance(getattr(function, "__self__", None), _CHANGING):
             raise Untraceable(_ON_ALL_WAYS)
         arguments = self.items(node.args)
-        keywords = {k.arg: self.do(k.value) for k in node.keywords}
+        keywords: dict[str, Any] = {}
+        for one in node.keywords:
+            value = self.do(one.value)
+            keywords.update({one.arg: value} if one.arg else value)
         return self.flow.call(function, arguments, keywords)
 
     def Lambda(self, node: ast.Lambda) -> Callable:
-        names = [a.arg for a in node.args.args]
+        signature = self.signature(node.args)
 
-        def call(*arguments: Any) -> Any:
+        def call(*arguments: Any, **keywords: Any) -> Any:
             outer = self.names
-            self.names = outer | dict(zip(names, arguments, strict=True))
+            self.names = outer | _bound(signature, arguments, keywords)
             try:
                 return self.do(node.body)
             finally:
                 self.names = outer
 
-        return self.closing(call, node)
+        return self.closing(call, node, signature)
 
-    def closing(self, call: Any, node: ast.Lambda | ast.FunctionDef, **more: Any) -> Callable:
+    def signature(self, given: ast.arguments) -> inspect.Signature:
+        """Make the signature of a function within."""
+        in_order = [*given.posonlyargs, *given.args]
+        pairs = [
+            *zip(in_order[::-1], given.defaults[::-1], strict=False),
+            *zip(given.kwonlyargs, given.kw_defaults, strict=True),
+        ]
+        default = {a.arg: self.do(node) for a, node in pairs if node is not None}
+        of_kinds = (
+            given.posonlyargs, given.args, filter(None, [given.vararg]), given.kwonlyargs,
+            filter(None, [given.kwarg]),
+        )  # fmt: skip
+        return inspect.Signature([
+            inspect.Parameter(a.arg, kind, default=default.get(a.arg, inspect.Parameter.empty))
+            for some, kind in zip(of_kinds, _KINDS, strict=True)
+            for a in some
+        ])  # fmt: skip
+
+    def closing(
+        self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature
+    ) -> Callable:
         """Mark a function with its text and what its names stand for, which decide on its code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
         known = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
-        call.closes_over = lambda: (node, more, known())
+        defaults = [p.default for p in signature.parameters.values()]
+        call.closes_over = lambda: (node, defaults, known())
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
@@ -381,7 +470,12 @@ class AstCompiler:
                 out.append(item())
                 return
             one = node.generators[k]
-            for value in self.do(one.iter):
+            items = self.do(one.iter)
+            if isinstance(items, range) and len(items) > LONGEST:
+                raise Untraceable(
+                    f"a range of more than {LONGEST} numbers in a comprehension: take a loop"
+                )
+            for value in items:
                 self.give(one.target, value)
                 if all(self.do(test) for test in one.ifs):
                     go(k + 1)
@@ -404,11 +498,16 @@ class AstCompiler:
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Compile statements one after another."""
+        """Compile statements one after another; note where one fails."""
         for statement in statements:
             if not self.goes:
                 return
-            self.do(statement)
+            try:
+                self.do(statement)
+            except BaseException as error:
+                place = self.walked.__code__.co_filename, statement.lineno
+                vars(error).setdefault("places", []).append(place)
+                raise
 
     def Pass(self, node: ast.Pass) -> None:
         pass
@@ -436,21 +535,17 @@ class AstCompiler:
             self.give(node.target, self.do(node.value))
 
     def FunctionDef(self, node: ast.FunctionDef) -> None:
-        names = [a.arg for a in node.args.args]
-        every = [a for a in ast.walk(node.args) if isinstance(a, ast.arg)]
-        if node.decorator_list or len(names) < len(every):
+        if node.decorator_list:
             self.unknown(node)
-        defaults = dict(zip(names[::-1], map(self.do, node.args.defaults[::-1]), strict=False))
+        signature = self.signature(node.args)
 
         def call(*arguments: Any, **keywords: Any) -> Any:
             inner = copy.copy(self.walked)
-            inner.definition, inner.free = node, self.free | self.names
-            given = defaults | dict(zip(names, arguments, strict=False)) | keywords
-            if len(arguments) > len(names) or given.keys() != set(names):
-                raise TypeError(f"{node.name} takes {len(names)} arguments")
-            return AstCompiler(inner, given).result()
+            inner.body, inner.generates = node.body, False
+            names = _bound(signature, arguments, keywords)
+            return AstCompiler(inner, names, self.free | self.names).result()
 
-        self.names[node.name] = self.closing(call, node, **defaults)
+        self.names[node.name] = self.closing(call, node, signature)
 
     def Raise(self, node: ast.Raise) -> None:
         what, arguments = node.exc, []
@@ -489,7 +584,7 @@ class AstCompiler:
     def changed(self, target: ast.Subscript) -> Any:
         """Compile what has an item that is to be changed."""
         things = self.do(target.value)
-        if isinstance(things, _CHANGING):
+        if self.branches and isinstance(things, _CHANGING):
             raise Untraceable(_ON_ALL_WAYS)
         return things
 
@@ -519,7 +614,7 @@ class AstCompiler:
     def For(self, node: ast.For) -> None:
         through = self.do(node.iter)
         if isinstance(through, range) and self.is_rolled(node, through):
-            through = Range((through.start, through.stop, through.step))
+            through = Range(through.start, through.stop, through.step)
         if is_value(through):
             self.roll(node, (through.shape[0],), lambda k: through[k])
         elif isinstance(through, Range):
@@ -536,8 +631,6 @@ class AstCompiler:
             bounds = through.start, through.stop, through.step
             try:
                 self.without_code(lambda: self.roll(node, bounds, lambda k: k))
-            except DataDependentBranch:
-                raise
             except (Exception, Untraceable):
                 loops[key] = None
         return loops[key] is not None
@@ -555,13 +648,14 @@ class AstCompiler:
 
     def state(self) -> Callable[[], None]:
         """Make what goes back to here, where something is to be tried."""
-        names, breaks, continues = dict(self.names), self.breaks, self.continues
+        names, depth = dict(self.names), self.depth
+        breaks, continues = self.breaks, self.continues
         returns, read = [*self.returns], dict(self.flow.lowering.read)
 
         def go_back() -> None:
             self.names, self.breaks, self.continues = dict(names), breaks, continues
             self.returns, self.flow.lowering.read = [*returns], dict(read)
-            self.goes = True
+            self.goes, self.depth = True, depth
 
         return go_back
 
@@ -595,16 +689,20 @@ class AstCompiler:
             self.without_code(lambda: self.roll(node, bounds, item))
         grown = loops.get(key) or {}
         go_back = self.state()
-        while True:
-            try:
-                self.rolled(node, bounds, item, grown)
-                loops[key] = grown
-                return
-            except Grows as number:
-                if self.flow.builder:
-                    raise
-                grown = grown | number.grown
-                go_back()
+        self.depth += 1
+        try:
+            while True:
+                try:
+                    self.rolled(node, bounds, item, grown)
+                    loops[key] = grown
+                    return
+                except Grows as number:
+                    if self.flow.builder:
+                        raise
+                    grown = grown | number.grown
+                    go_back()
+        finally:
+            self.depth -= 1
 
     def rolled(
         self, node: ast.For | ast.While, bounds: tuple | None, item: Callable | None, grown: dict
@@ -643,4 +741,5 @@ class AstCompiler:
         self.names.pop(_COUNT, None)
 
 
+LONGEST = 1000  # range in a comprehension
 _COUNT = "for"  # no name of a function

@@ -1,17 +1,12 @@
-"""Functions are run once, on values of the function that is compiled, and written down.
+"""Find what a function is for arguments of some types, and compile it where it is called.
 
-Where a kernel calls a function marked for it, it is run by Python itself, on a
-:class:`~karamelo_py.compiler.values.Value` in the place of each number, and every operation that
-meets one is lowered at once, into the function that calls. Tuples are Python's own, so that what
-only takes them apart costs nothing. A function that asks what only a run can know (`if x > 0`) is
-walked through instead, statement by statement (:mod:`~karamelo_py.compiler.statements`).
-
-Functions see their globals through :class:`~karamelo_py.compiler.values.Globals`. Only what the key
-of a kernel on disk follows may be run (:mod:`karamelo_py.compiler.fingerprint`): functions that
-come by another way than a global name or a closure, as methods do, are refused.
+Each number is a :class:`~karamelo_py.compiler.values.Value`; every operation that meets one is
+lowered at once, into the function that calls. Tuples and classes are Python's: what only takes them
+apart costs nothing. The walk through the text is in :mod:`~karamelo_py.compiler.statements`. Only
+what the key of a kernel on disk follows may be called (:mod:`karamelo_py.compiler.fingerprint`):
+methods of classes of tuples are refused.
 """
 
-import dis
 import functools
 import itertools
 import threading
@@ -28,7 +23,7 @@ from karamelo_py.compiler import values
 from karamelo_py.compiler.arithmetic import OPERATIONS
 from karamelo_py.compiler.choices import choosers, codes_in, note, parts_noted, tag_class
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
-from karamelo_py.compiler.statements import AstFunction, place_in_text
+from karamelo_py.compiler.statements import AstFunction
 
 
 class CannotCompile(TypeError):
@@ -62,14 +57,15 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
+    yield from getattr(error, "places", ())  # in the text that was walked
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
-        yield place_in_text(frame) or (frame.f_code.co_filename, line)
+        yield frame.f_code.co_filename, line
 
 
 # --- functions as they are run here -----------------------------------------------------------
 
 
-_modules: dict[int, values.Globals] = {}
+_walked: dict[Callable, AstFunction] = {}
 _copies: dict[Any, Any] = {}
 
 
@@ -113,7 +109,7 @@ INSTEAD = {
     values.is_literal: values.is_literal,
     type: _class_of,
     isinstance: _is_instance,
-    range: values.counting,
+    range: range,
     getattr: _attribute,
 }
 _SAFE = {
@@ -140,8 +136,7 @@ def _seen(thing: Any) -> Any:
     if thing not in _copies:
         with parts_noted() as parts:  # with those in closures
             made = _copy(thing)
-            own = type(getattr(made, "__globals__", None)) is values.Globals
-            if own or isinstance(made, AstFunction | type):
+            if isinstance(made, AstFunction | type):
                 note([getattr(made, "__code__", made)])
         _copies[thing] = made, parts
     made, parts = _copies[thing]
@@ -165,32 +160,11 @@ def _copy(thing: Any) -> Any:
     raise values.Untraceable(f"kernels do not know {getattr(thing, '__name__', repr(thing))}")
 
 
-@functools.cache
-def _fault_of(code: python.CodeType) -> str:
-    """Say why a function is not run: it catches what is raised here, or nothing follows it."""
-    names = {i.opname for i in dis.get_instructions(code)}
-    if "PUSH_EXC_INFO" in names:  # handlers of comprehensions and generators do without it
-        return "kernels know no `try` and no `with`"
-    if "IMPORT_NAME" in names:
-        return "kernels know no `import` within a function: import at the top of the file"
-    return ""
-
-
-def _copied(function: Callable) -> Callable:
-    """Copy a function with other globals; one that asks what only a run knows, from its text."""
-    code = function.__code__
-    if _fault_of(code):
-        raise values.Untraceable(_fault_of(code))
-    true = function.__globals__
-    seen = _modules.setdefault(id(true), values.Globals(true, _seen))
-    cells = tuple(python.CellType(_seen(c.cell_contents)) for c in function.__closure__ or ())
-    defaults = function.__defaults__ and tuple(map(_seen, function.__defaults__))
-    made = python.FunctionType(code, seen, function.__name__, defaults, cells)
-    made.__kwdefaults__ = {k: _seen(v) for k, v in (function.__kwdefaults__ or {}).items()}
-    if code not in values.branching:
-        return made
-    vars(made).update(vars(function))
-    return AstFunction(made)
+def _copied(function: Callable) -> AstFunction:
+    """Give what compiles a function from its text."""
+    if function not in _walked:
+        _walked[function] = AstFunction(function, _seen)
+    return _walked[function]
 
 
 # --- methods, which nothing follows ---------------------------------------------------------------
@@ -269,7 +243,7 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
         if hasattr(dispatch, "tags"):
             parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
         return _Formula(run, result, frozenset(parts), _is_plain(found), dispatch.__qualname__)
-    except (values.DataDependentBranch, CannotCompile, Undefined):
+    except (CannotCompile, Undefined):
         raise
     except (Exception, values.Untraceable) as why:
         raise CannotCompile(_reason(why), chosen or dispatch) from why
@@ -278,30 +252,21 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
 def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     """Find what to run for arguments of these types; None if nothing is chosen."""
     if values.at_work():
-        return _formula(dispatch, kinds, known=False)
+        return _formula(dispatch, kinds)
     with one_at_a_time:
         if _outdated.is_set() or len(_formulas) > MOST_FORMULAS:
-            _forget_all()
-        return _formula(dispatch, kinds, known=bool(values.branching))
+            _outdated.clear()
+            for known in (_formulas, _copies, _walked):
+                known.clear()
+        return _formula(dispatch, kinds)
 
 
-def _formula(dispatch: Callable, kinds: tuple, *, known: bool) -> _Formula | None:
-    """Find it; `known` tells if functions are known to branch that perhaps do no longer."""
+def _formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
-    while key not in _formulas:
+    if key not in _formulas:
         if values.is_begun(key):
             raise CannotCompile("it calls itself", dispatch)
-        try:
-            _formulas[key] = _written(key, dispatch, kinds)
-        except values.DataDependentBranch:
-            # Once more, and through the text of the function that asks.
-            _copies.clear()
-        except CannotCompile:
-            # Perhaps it only asks elsewhere what a run knows: as if nothing had been compiled.
-            if not known:
-                raise
-            known = False
-            _forget_all()
+        _formulas[key] = _written(key, dispatch, kinds)
     found = _formulas[key]
     if found is not None:
         note(found.parts)
@@ -318,12 +283,6 @@ def forget() -> None:
         _formulas.clear()
     else:  # another thread of Python may write a function down now
         _outdated.set()
-
-
-def _forget_all() -> None:
-    _outdated.clear()
-    for known in (_formulas, _copies, _modules, values.branching):
-        known.clear()
 
 
 def outdate_kernels() -> None:

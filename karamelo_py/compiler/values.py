@@ -4,13 +4,10 @@ See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and ever
 meets one becomes code of the function that is compiled.
 """
 
-import builtins
 import contextvars
 import functools
 import math
 import operator
-import sys
-import types as python
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -24,10 +21,6 @@ from karamelo_py.compiler.code import Lanes, scalar_of
 
 class Untraceable(BaseException):
     """Say why a function cannot become code of a kernel; no function may catch that."""
-
-
-class DataDependentBranch(Untraceable):
-    """Say the same of a function that may be compiled from its text (`compiler/statements.py`)."""
 
 
 def words(kind: types.Type) -> str:
@@ -52,42 +45,11 @@ _WORDS = (
 )
 
 
-class Globals(dict):
-    """Show the globals of a module to functions that are run for kernels."""
-
-    def __init__(self, true: dict, seen: Callable[[Any], Any]):
-        super().__init__()
-        self.true, self.seen = true, seen
-
-    def __getitem__(self, name: str) -> Any:
-        if name not in self.true and not hasattr(builtins, name):
-            raise NameError(f"name '{name}' is not defined")
-        return self.seen(self.true[name] if name in self.true else getattr(builtins, name))
-
-
-branching: set = set()  # code of functions that ask for what only a run knows
-
-
-def _asking(frame: python.FrameType) -> python.FrameType:
-    """Find the frame of a function from that of a comprehension in it, of its own until 3.12."""
-    while frame.f_code.co_name in ("<listcomp>", "<setcomp>", "<dictcomp>"):
-        frame = frame.f_back
-    return frame
-
-
-def _branch(frame: python.FrameType, what: str) -> None:
-    code = _asking(frame).f_code
-    if type(frame.f_globals) is not Globals or code.co_name.startswith("<"):
-        raise Untraceable(what)
-    branching.add(code)
-    raise DataDependentBranch(what)
-
-
 def _only_at_run_time(use: str) -> Callable:
     """Make the method of values that stands for a `use` that needs to know what they are."""
 
     def ask(*arguments: Any) -> Any:
-        _branch(sys._getframe(1), f"{use} is only known when the kernel runs")
+        raise Untraceable(f"{use} is only known when the kernel runs")
 
     return ask
 
@@ -399,18 +361,4 @@ OF_WHOLE = {min, max, abs, int, bool}
 # Functions whose literals are of the type of the numbers beside them; more are added by name.
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
-LONGEST = 1000  # range that is gone through
-LONG = 8  # range that is gone through where it need not be
-
-
-def counting(*bounds: int) -> range:
-    """Count as `range` does, in functions that are run."""
-    frame = _asking(sys._getframe(1))
-    if any(isinstance(bound, Value) for bound in bounds):
-        _branch(frame, "the end of a range")
-    made = range(*bounds)
-    if len(made) > LONGEST:
-        raise Untraceable(f"a range of more than {LONGEST} numbers in a comprehension: take a loop")
-    if len(made) > LONG and type(frame.f_globals) is Globals and frame.f_code.co_name[0] != "<":
-        _branch(frame, "a long range")
-    return made
+LONG = 8  # turns of a loop over a known range that is unrolled even where it need not be
