@@ -43,8 +43,6 @@ def _globals_in(code: python.CodeType) -> frozenset[str]:
     return frozenset(i.argval for i in loads if i.opname == "LOAD_GLOBAL")
 
 
-# --- text -----------------------------------------------------------------------------------------
-
 _began = time.time()
 
 
@@ -94,9 +92,6 @@ def source_of(code: python.CodeType) -> list[ast.stmt]:
     if isinstance(node, ast.FunctionDef):
         return node.body
     return [ast.copy_location(ast.Return(node.body), node.body)]
-
-
-# --- the walk -------------------------------------------------------------------------------------
 
 
 class AstFunction:
@@ -172,10 +167,6 @@ _BINARY = {
     ast.Eq: operator.eq, ast.NotEq: operator.ne,
     ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Invert: operator.invert,
 }  # fmt: skip
-_KINDS = (
-    inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD,
-    inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.VAR_KEYWORD,
-)  # fmt: skip
 _CHANGING = (list, dict, set)
 _ON_ALL_WAYS = "on one of several ways, a list would change on all"
 _IMPORT = "`import` within a function: import at the top of the file"
@@ -434,21 +425,14 @@ class AstCompiler:
 
     def signature(self, given: ast.arguments) -> inspect.Signature:
         """Make the signature of a function within."""
-        in_order = [*given.posonlyargs, *given.args]
-        pairs = [
-            *zip(in_order[::-1], given.defaults[::-1], strict=False),
-            *zip(given.kwonlyargs, given.kw_defaults, strict=True),
-        ]
-        default = {a.arg: self.do(node) for a, node in pairs if node is not None}
-        of_kinds = (
-            given.posonlyargs, given.args, filter(None, [given.vararg]), given.kwonlyargs,
-            filter(None, [given.kwarg]),
-        )  # fmt: skip
-        return inspect.Signature([
-            inspect.Parameter(a.arg, kind, default=default.get(a.arg, inspect.Parameter.empty))
-            for some, kind in zip(of_kinds, _KINDS, strict=True)
-            for a in some
-        ])  # fmt: skip
+        bare = copy.copy(given)
+        bare.defaults, bare.kw_defaults = [], [None] * len(given.kwonlyargs)
+        text = ast.fix_missing_locations(ast.Expression(ast.Lambda(bare, ast.Constant(None))))
+        like = eval(compile(text, "signature", "eval"))
+        like.__defaults__ = tuple(map(self.do, given.defaults))
+        pairs = zip(given.kwonlyargs, given.kw_defaults, strict=True)
+        like.__kwdefaults__ = {a.arg: self.do(node) for a, node in pairs if node is not None}
+        return inspect.signature(like)
 
     def closing(
         self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature

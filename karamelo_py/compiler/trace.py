@@ -62,9 +62,6 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         yield frame.f_code.co_filename, line
 
 
-# --- functions as they are run here -----------------------------------------------------------
-
-
 _walked: dict[Callable, AstFunction] = {}
 _copies: dict[Any, Any] = {}
 
@@ -166,8 +163,6 @@ def _copied(function: Callable) -> AstFunction:
         _walked[function] = AstFunction(function, _seen)
     return _walked[function]
 
-
-# --- methods, which nothing follows ---------------------------------------------------------------
 
 _GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
 _METHODS = python.FunctionType | property | classmethod | staticmethod
