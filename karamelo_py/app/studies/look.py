@@ -21,11 +21,6 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 DASHES = (
     "-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)), (0, (3, 1, 1, 1, 1, 1)),
 )  # fmt: skip
-PLOTLY_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
-PLOTLY_MARKERS = (
-    "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
-    "triangle-left", "triangle-right",
-)  # fmt: skip
 NEAR = 0.02  # share of the axes within which ends of lines are at one place
 PART = 0.105  # of a logarithmic axis, that a number of six digits covers
 FAMILIES = (
