@@ -237,7 +237,7 @@ def test_friction_that_nothing_has(run_interpreted, fix):
             "run(1)",
         )
         said = run_interpreted(bars(0.0, *lines, d=2)).err
-        assert said.count("warning: the coefficient of friction is 30: ") == told
+        assert said.count("warning: the coefficient of friction is 30; ") == told
         assert said.count("0.3 is 30 %") == told
 
 
@@ -355,8 +355,8 @@ def test_friction_is_a_share_of_the_push(run_script, basis, apart):
 TWICE = "fix(f, contact/friction, a, b, 0.1)\nfix(g, contact/friction, {}, {}, 0.2)"
 
 MESSAGES = {
-    "pair twice": (TWICE.format("a", "b"), "that of fix 'f' (line 17) already"),
-    "pair turned around": (TWICE.format("b", "a"), "that of fix 'f' (line 17) already"),
+    "pair twice": (TWICE.format("a", "b"), "already set by fix 'f' (line 17)"),
+    "pair turned around": (TWICE.format("b", "a"), "already set by fix 'f' (line 17)"),
     "named twice": ("fix(f, contact/friction, a, a, 0.1)", "'a' is named twice"),
     "negative": ("fix(f, contact/friction, a, b, -0.1)", "-0.1"),
     "unknown": ("fix(f, contact/friction, a, c, 0.1)", "unknown solid 'c'"),

@@ -232,7 +232,7 @@ def test_messages(run_interpreted, contact, said):
 @pytest.mark.parametrize("method", ["ulmpm", "ulmpm/contacts"])
 def test_shared_grids_are_a_warning(run_interpreted, method):
     script = bodies(0.1, MINIMIZE, "log_modify(custom, step)", "run(1)", method=method)
-    assert "touch there already" in run_interpreted(script).err
+    assert "in contact there already" in run_interpreted(script).err
 
 
 def test_solids_without_contact_are_told(run_interpreted):

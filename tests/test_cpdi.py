@@ -481,7 +481,7 @@ def test_domains_of_a_mesh(run_interpreted, state_interpreted, meshes, variant, 
     right = {"triangle": "T3", "quad": "Q4", "tetra": "Tet4"}[element]
     if variant != right:
         result = run_interpreted(script + "    run(1)\n", status=1)
-        assert f"{right} in the place of {variant}" in result.err
+        assert f"{right} instead of {variant}" in result.err
         return
     masses = {"T3": [1, 1], "Q4": [1], "Tet4": [1, 1, 1, 1, 2]}[variant]
     before, after = (state_interpreted(dedent(script) + f"run({n})\n") for n in (0, 3))

@@ -125,7 +125,7 @@ def test_affine_transfer_without_a_second_mapping_is_refused(run_interpreted):
     )
     err = run_interpreted(text, status=1).err
     line = 1 + text[: text.index("method(")].count("\n")
-    assert f"in.script:{line}:" in err and "error: method: APIC with linear functions" in err
+    assert f"in.script:{line}:" in err and "error: method: APIC with the basis linear" in err
     assert "is unstable" in err
     assert "unstable" not in run_interpreted(text.replace("scheme(usl)", "scheme(musl)")).err
 

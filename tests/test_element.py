@@ -212,7 +212,7 @@ def test_a_stress_beyond_yield_is_not_found(run_script):
         ),
         (
             "load_path(a, 2, turn=1)\nelement(b, steel, a, kinematics=1D)",
-            "1D cannot turn",
+            "1D cannot rotate",
         ),
         ("load_path(a, 2, exx=0)\nelement(b/c, steel, a)", "formulas could not name the values"),
         ("load_path(a, 2)", "no strain and no stress is prescribed"),

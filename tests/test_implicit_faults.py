@@ -305,7 +305,7 @@ def test_explicit_steps_have_no_iterations(run_interpreted):
 def test_a_scheme_that_no_run_has(run_interpreted):
     once = coarse().replace("run(4)", "run(1)")
     twice = once.replace("scheme(quasi-static)", "scheme(musl)\n    scheme(quasi-static)")
-    assert "takes the place of that of line 7" in run_interpreted(twice).err
+    assert "replaces the one in line 7" in run_interpreted(twice).err
     then = once.replace("run(1)", "run(1)\n    scheme(quasi-static)\n    run(1)")
     assert "takes the place" not in run_interpreted(then).err
 
@@ -349,7 +349,7 @@ PLASTIC = """eos(e, linear, 1, 1000)
 def test_plastic_flow_that_locks_is_told(run_interpreted, basis, told):
     text = patch().replace("material(m, linear, 1, 1000, 0.25)", PLASTIC)
     said = run_interpreted(text, "-var", "basis", basis, command="check").err
-    assert ("locking: plastic flow of material 'm'" in said) == told
+    assert ("locking: material 'm' flows at constant volume" in said) == told
 
 
 RIGID = (
@@ -364,9 +364,9 @@ RIGID = (
 
 def test_forces_on_rigid_solids_are_told(run_interpreted):
     said = run_interpreted(patch(RIGID + "\n    fix(f, force_particles, t, 0, -1)"), status=1).err
-    assert "no force moves it, only" in said and "fix velocity_particles moves" in said
+    assert "forces do not move it" in said and "fix velocity_particles moves" in said
     text = patch(RIGID + "\n    fix(f, force_particles, both, 0, 1)")
-    assert "its share of the force moves nothing" in run_interpreted(text, command="check").err
+    assert "its part of the force has no effect" in run_interpreted(text, command="check").err
 
 
 def test_a_point_that_leaves_is_told_of_load_steps(run_script):

@@ -131,8 +131,8 @@ def test_solids_as_in_2020(run_interpreted):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("method_modify(FLIP, 0.99)", "method(ulmpm, FLIP, linear, 0.99), in the place of line 1"),
-        ("method_modify(0.98)", "method(ulmpm, FLIP, linear, 0.98), in the place of line 1"),
+        ("method_modify(FLIP, 0.99)", "method(ulmpm, FLIP, linear, 0.99), instead of line 1"),
+        ("method_modify(0.98)", "method(ulmpm, FLIP, linear, 0.98), instead of line 1"),
         ("method_modify(tlmpm)", "method(tlmpm, FLIP, linear"),
         ("method_modify(PIC, cubic-spline)", "method(ulmpm, PIC, cubic-spline), in the place"),
         ("solid(s, block, 0, 1, 0, 2*H, 2, rubber, 0.1)", "region(box, block, 0, 1, 0, 2*H), and"),

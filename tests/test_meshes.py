@@ -166,7 +166,7 @@ def test_shapes_may_be_mixed_and_of_higher_order(tmp_path):
     assert not hub.warnings
     region_hub = SmallHub(2, -1, 3, 0.25)
     MeshRegion(region_hub, tmp_path / "bent.vtu")
-    assert "has edges that bend by 0.14 of their length" in region_hub.warnings[0]
+    assert "has edges curved by 0.14 of their length" in region_hub.warnings[0]
 
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])

@@ -66,7 +66,7 @@ def test_pandas_takes_columns_as_they_are(interpreted):
                 try:
                     change()
                 except TypeError as error:
-                    assert "none is added or taken out" in str(error)
+                    assert "cannot be added or removed" in str(error)
                 else:
                     raise AssertionError(change)
         assert pandas.Series(sim.values)["Ek"] == sim.values["Ek"]

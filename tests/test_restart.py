@@ -328,7 +328,7 @@ def test_a_file_from_behind_the_last_run(run_interpreted):
     assert "note: end.h5 holds the end of the last run" in said and "read_restart(end.h5)" in said
     longer = run_interpreted(text.replace("run(4)", "run(9)"), "-restart", "end.h5", status=1).err
     assert "end.h5 was written when this run was over, by run(4)" in longer
-    assert "run(4) as it was, a further run behind write_restart(end.h5)" in longer
+    assert "run(4) as it was, another run command after write_restart(end.h5)" in longer
     further = run_interpreted(text + "run(5)\n", "-restart", "end.h5")
     assert further.log.Step[-1] == 9 and "note:" not in further.out
 
@@ -338,7 +338,7 @@ def test_a_longer_run_by_a_variable(run_interpreted):
     text = with_files("n = 4\n" + FLY.replace("run(4)", "run(2*n)"))
     run_interpreted(text)
     result = run_interpreted(text.replace("n = 4", "n = 6"), "-restart", "r.4.h5", status=1)
-    assert "hint: leave n=4 as it was here, and write run(2*6) in the place of run(2*n)" in (
+    assert "hint: leave n=4 as it was here, and write run(2*6) instead of run(2*n)" in (
         result.err
     )
     longer = text.replace("run(2*n)", "run(2*6)")

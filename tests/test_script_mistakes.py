@@ -147,7 +147,7 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("run(steps)", "set it first: steps = ..."),
         ("run_time(2*tim)", "set it first: tim = ..."),
         ("run_time(2*Pi)", "did you mean 'PI'?"),
-        ('run("100")', "numbers stand without quotes: 100"),
+        ('run("100")', "write numbers without quotes: 100"),
     ],
 )
 def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):

@@ -306,7 +306,7 @@ def test_open_ends_of_a_part_do_not_warn():
 @pytest.mark.parametrize(
     ("region", "options", "says", "argument"),
     [
-        ((0.2, 0.8, 0.2, 0.8), {"h": 0.2}, "differs from that of the domain's grid, 0.1", "h"),
+        ((0.2, 0.8, 0.2, 0.8), {"h": 0.2}, "differs from the domain's, 0.1", "h"),
         ((0.2, 0.8, 0.2, 0.8), {"T0": math.inf}, "T0 must be a finite number", "T0"),
         ((0.21, 0.22, 0.21, 0.22), {}, "no point lies in region 'r'", "region"),
         ((1.2, 1.8, 0.2, 0.8), {}, "all of them lie outside the domain", "region"),

@@ -179,7 +179,7 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "q.dump"], "p.dump and q.dump both have step 0"),
         (["p.dump", "--only", "not tool"], "--script FILE the groups, solids and variables"),
         (["p.dump", "-c", "tool"], "--script FILE the groups"),
-        (["p.dump", "--title", "load {load} N"], "a log beside the dumps (log.mpm, log.csv)"),
+        (["p.dump", "--title", "load {load} N"], "a log in the folder of the dumps (log.mpm, log.csv)"),
         (["p.dump", "--title", "v_{max}"], "($v_{max}$), or {{max}} for braces"),
         (["p.dump", "--title", "{1/0}"], "error: {1/0} in --title: division by zero"),
         ([], "FILE"),
@@ -394,7 +394,7 @@ def test_view_knows_groups_solids_and_values_by_name(run_interpreted, monkeypatc
     only = ["--only", "vx > twice/3"]
     assert call(capsys, *words, *only)[0] == 0 and shown[-1][0] == 24
     Path("log.mpm").write_text("Step Time twice\n0 0 0\n")
-    assert "twice at step 2 is a value that dumps do not hold" in call(capsys, *words, *only)[2]
+    assert "twice at step 2 is not in dumps" in call(capsys, *words, *only)[2]
     Path("log.mpm").unlink()
     err = call(capsys, *words, *only, "--script", "in.script")[2]
     assert "log_modify(custom, step, time, v) in the script" in err
@@ -441,7 +441,7 @@ def test_view_outlines_the_tools_of_a_script(run_interpreted, monkeypatch, capsy
     status, _, err = call(capsys, *words, file, "--script", "in.flat")
     assert status == 1 and f"{dimension - 1} dimension" in err and f"the dump {dimension}" in err
     status, _, err = call(capsys, *words, "p.dump", "--script", "in.results")
-    assert status == 1 and "the place of fix 'ball' follows from results of the run" in err
+    assert status == 1 and "the position of fix 'ball' depends on results of the run" in err
 
 
 def test_one_point_does_not_take_all_colours(hub):
@@ -538,7 +538,7 @@ def test_outlines_go_on_beyond_a_window():
 def test_no_outlines_on_a_line(run_interpreted):
     text = block(1, "dump(d, all, pyplot, 10, p.png, 300, 300, outlines=true)", "run(1)")
     err = run_interpreted(text, status=1).err
-    assert "outlines are drawn in the plane and in space, and this scene is on a line" in err
+    assert "outlines are drawn in 2D and 3D, and this scene is 1D" in err
 
 
 def lines_of_tool(words):

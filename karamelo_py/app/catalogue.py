@@ -1,4 +1,4 @@
-"""karamelo-py styles and karamelo-py help: what a script can say, and what each word means."""
+"""karamelo-py styles and karamelo-py help: list and explain commands and styles."""
 
 import inspect
 import re
@@ -15,10 +15,10 @@ from karamelo_py.script.errors import ScriptError, codes, meant, table
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
 HELP_USAGE = "karamelo-py help COMMAND, karamelo-py help STYLE, or karamelo-py help FAMILY STYLE"
-_WIDEST = 88  # running text is hard to read in longer lines
+_WIDEST = 88  # running text in longer lines is hard to read
 
 
-# ---- what there is to say -----------------------------------------------------------------------
+# ---- contents -----------------------------------------------------------------------------------
 
 
 def families() -> list[str]:
@@ -27,7 +27,7 @@ def families() -> list[str]:
 
 
 def help_of(family: str, name: str) -> Help:
-    """Gather the help about a command or style."""
+    """Collect the help for a command or style."""
     target = registry.find(family, name)
     try:
         return describe(target, name if family == COMMAND else f"{family} {name}")
@@ -40,7 +40,7 @@ def help_of(family: str, name: str) -> Help:
 
 def describe_parameter(parameter: Parameter) -> str:
     """Kind and default of a parameter, in words: ``a number above 0, 0.9 when left out``."""
-    if parameter.kind.text == "anything":  # whatever the command or style makes of it
+    if parameter.kind.text == "anything":  # interpreted by the command or style
         return ""
     family = parameter.kind.family
     parts = ["one of " + ", ".join(registry.names(family)) if family else parameter.kind.text]
@@ -62,7 +62,7 @@ def describe_parameter(parameter: Parameter) -> str:
 
 
 def print_styles(given: Sequence[str]) -> int:
-    """List commands and styles, or a family, with where they come from; returns the exit status."""
+    """List commands and styles, or a family, with their packages; return the exit status."""
     if len(given) > 1:
         raise ScriptError(f"too many arguments: {' '.join(given)}", expected=STYLES_USAGE)
     page = _Page()
@@ -75,7 +75,7 @@ def print_styles(given: Sequence[str]) -> int:
 
 
 def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
-    """Explain what a name means, or a family and a name; returns the exit status."""
+    """Explain a name, or a family and a name; return the exit status."""
     if len(given) == 2 and (family := _singular(given[0])) in families():
         try:
             return _explain(family, given[1])
@@ -95,7 +95,7 @@ def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
         return print_styles([name])
     if name in codes():
         return _explain_code(name, codes()[name]["title"], codes()[name]["text"])
-    # Of three words, and more, one may be too many.
+    # Of three or more words, one may be superfluous.
     fewer = [" ".join(given[:k] + given[k + 1 :]) for k in range(len(given) * (len(given) > 2))]
     said = next(filter(_about, [name, *fewer]), name)
     found, related = _arguments(name), _about(said)
@@ -131,7 +131,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """Find the family that a word means: fixes, Fix and fix are the same."""
+    """Return the family that a word means: fixes, Fix and fix are the same."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -152,7 +152,7 @@ def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:
 
 
 def _summary(family: str, name: str) -> tuple[str, bool]:
-    """Write one line about a style, and whether it is broken."""
+    """Return the summary line of a style, and whether it is broken."""
     try:
         target = registry.find(family, name)
     except ScriptError as error:
@@ -190,10 +190,10 @@ def _explain(family: str, name: str) -> int:
 
 
 def _about(word: str) -> list[tuple[str, str]]:
-    """Find commands and styles by parts of their name, then by their summary, else their text."""
+    """Find commands and styles by parts of their name, then by summary, else by text."""
     topics = {like: topic for topic, alike in table()["topics"].items() for like in alike}
     word = topics.get(word.lower(), word)
-    words = [part for part in word.split() if len(part) > 2] or [word]  # without a, of, ...
+    words = [part for part in word.split() if len(part) > 2] or [word]  # drops a, of, ...
     sought = [re.escape(topics.get(part.lower(), part)) for part in words]
     begins = [re.compile(rf"(?<![^\W_]){part}", re.IGNORECASE) for part in sought]
     found: list[list[tuple[str, str]]] = [[], [], [], []]
@@ -208,11 +208,11 @@ def _about(word: str) -> list[tuple[str, str]]:
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
-    """Find arguments of this name, or that may be this word, by their command or style."""
+    """Find arguments with this name, or with this word as a value, by command or style."""
     found = {}
     for family in families():
         for name in registry.names(family):
-            with suppress(ScriptError):  # a broken plug-in is not what this is about
+            with suppress(ScriptError):  # errors of broken plug-ins do not matter here
                 help_ = help_of(family, name)
                 for parameter in help_.parameters:
                     if word == parameter.name or word in parameter.kind.words:
@@ -221,7 +221,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
 
 
 def _explain_argument(word: str, found: dict[str, Parameter]) -> None:
-    """Explain an argument where most is said of it, and list where else there is one."""
+    """Print the longest explanation of an argument, and list other places."""
     page = _Page()
     owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
     page.say(word, "bold")
@@ -235,24 +235,24 @@ def _explain_argument(word: str, found: dict[str, Parameter]) -> None:
     page.say(f"karamelo-py help {owner} explains the rest.")
 
 
-# ---- how it looks -------------------------------------------------------------------------------
+# ---- layout -------------------------------------------------------------------------------------
 
 
 class _Page(Console):
-    """Lines on standard output: bold and coloured on a terminal, plain elsewhere."""
+    """Writes to standard output, bold and coloured on a terminal."""
 
     def _write(self, text: str) -> None:
         super()._write(text)
         if self._broken:
-            raise BrokenPipeError  # there is nothing else to finish
+            raise BrokenPipeError  # nothing else to finish
 
     def heading(self, text: str) -> None:
-        """Write a part of a page."""
+        """Write a heading."""
         self.say()
         self.say(text, "bold")
 
     def paragraph(self, text: str, indent: int = 0) -> None:
-        """Running text, broken into lines; empty lines part paragraphs."""
+        """Write running text, wrapped; empty lines separate paragraphs."""
         width = min(self._rich.width if self.terminal else _WIDEST, _WIDEST) - indent
         for index, part in enumerate(text.replace("``", "").split("\n\n") if text else ()):
             if index:
@@ -261,14 +261,14 @@ class _Page(Console):
                 self.say(" " * indent + line)
 
     def rows(self, listed: Sequence[tuple[str, str, str]]) -> None:
-        """Write names as they are shown, each with the origin and summary of its style."""
+        """Write names with origin and summary of each style."""
         origins = [registry.origin(family, name) for _, family, name in listed]
         widths = [max(map(len, column), default=0) for column in ([s for s, *_ in listed], origins)]
         for (shown, family, name), origin in zip(listed, origins, strict=True):
             self.row(shown.ljust(widths[0]), origin.ljust(widths[1]), *_summary(family, name))
 
     def row(self, name: str, origin: str, summary: str, broken: bool) -> None:
-        """Write a line of a list; cut where a terminal ends."""
+        """Write a line of a list, cut at the width of a terminal."""
         if not self.terminal:
             self.say(f"  {name}  {origin}  {summary}")
             return

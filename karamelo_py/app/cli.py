@@ -29,7 +29,7 @@ from karamelo_py.output import record
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
 from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
-if TYPE_CHECKING:  # which takes most of the time that the program needs to begin
+if TYPE_CHECKING:  # these take most of the start-up time
     from karamelo_py.scene.hub import Hub
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
@@ -53,10 +53,11 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit status."""
+    """Run the command line; return the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     launch.keep_to_oneself()
-    # A word where a batch system ends the program, outside of runs; launchers say one of several.
+    # Signals that batch systems send to end the program; mpiexec handles them for several
+    # processes.
     unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
     with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = launch.outcome_of(
@@ -68,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _end(number: int, _: Any) -> NoReturn:
-    # All that is open is whole: files have their names when they are complete.
+    # All open files are consistent: they get their names when complete.
     os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
     os._exit(SIGNALLED + number)
 
@@ -78,8 +79,8 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# Subcommands with a module of their own, which is imported when it is asked for: DESCRIPTION,
-# add_options(parser) and run(options), which returns the exit status.
+# Subcommands in separate modules, imported on demand: DESCRIPTION, add_options(parser) and
+# run(options), which returns the exit status.
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
@@ -90,7 +91,7 @@ ELSEWHERE = {
     "fit": ("karamelo_py.app.studies.fit", "Find the values of variables that match measurements."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
 }
-OPTIONS = ("gpu", "ranks", "live", "threads")  # of run, which help explains
+OPTIONS = ("gpu", "ranks", "live", "threads")  # of run, as listed by help
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
 
@@ -131,10 +132,10 @@ def _dispatch(arguments: list[str]) -> int:
         raise _surplus(arguments, short[:1], choice)
     try:
         options, surplus = parser.parse_known_args(arguments)
-    except SystemExit:  # argparse has shown what was asked for
+    except SystemExit:  # argparse has printed the help
         return 0
     except ScriptError as error:
-        # An option that is missing may be misspelt.
+        # A missing option may be misspelt.
         known = commands.choices[arguments[0]].options()
         odd = [word for word in arguments if word[:1] == "-" and word not in known]
         said = (f"{word}: {near}" for word in odd if (near := meant(word, known)))
@@ -151,20 +152,20 @@ def _dispatch(arguments: list[str]) -> int:
             )
         return launch.ERROR
     options.command_line = arguments
-    if options.act is not _run:  # which imports more before it begins
+    if options.act is not _run:  # run imports more before it begins
         begun()
     return options.act(options)
 
 
 def begun() -> None:
-    """Let Python look for cycles again, among what is new: the program itself stays to its end."""
+    """Turn on Python's garbage collector again, for new objects only."""
     if not gc.isenabled():
         gc.freeze()
         gc.enable()
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Take the last of the files behind -restart where a shell has put all that match a pattern."""
+    """Take the last of the files after -restart, if a shell has expanded a pattern."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -182,11 +183,11 @@ def _one_file(arguments: list[str]) -> list[str]:
 
 
 def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
-    """Put a blank before values such as -1e6, and -E/2 of a variable: argparse sees options."""
+    """Put a blank before values such as -1e6 or -E/2, which argparse takes for options."""
 
     def is_value(k: int) -> bool:
         if re.match(r"-\.?\d", arguments[k]):
-            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])  # which argparse knows
+            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])  # argparse recognises these
         return (
             k > 1
             and arguments[k][:1] == "-" != arguments[k][1:2]
@@ -199,7 +200,7 @@ def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
 
 
 def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> ScriptError:
-    """Make the error for words that a command line has no use for."""
+    """Make the error for surplus words on a command line."""
     command = arguments[0]
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
@@ -235,18 +236,18 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
 
 
 class CommandLine(argparse.ArgumentParser):
-    """A command line whose errors are messages in our own form."""
+    """A command line that reports errors in our format."""
 
     def __init__(self, **options: Any):
         usual = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
         super().__init__(**(usual | options))
 
     def options(self) -> list[str]:
-        """List all words that begin an option."""
+        """List all words that start an option."""
         return [word for action in self._actions for word in action.option_strings]
 
     def plain_usage(self) -> str:
-        """Write the usage without that word."""
+        """Format the usage without the word 'usage'."""
         return self.format_usage().removeprefix("usage: ").rstrip()
 
     def error(self, message: str) -> NoReturn:
@@ -261,7 +262,7 @@ class CommandLine(argparse.ArgumentParser):
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:
-    """Make the command line and its subparsers; what only `command` needs is there only for it."""
+    """Make the command line and its subparsers; only those of `command` are complete."""
     parser = CommandLine(
         prog="karamelo-py",
         usage=USAGE,
@@ -285,14 +286,14 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         script.set_defaults(checking=name == "check")
         script.add_argument("script", metavar="SCRIPT", nargs="?")
         script.add_argument("-i", "-in", dest="input", metavar="SCRIPT", help=argparse.SUPPRESS)
-        add_variables(script, "set a variable, in place of its value in the script")
+        add_variables(script, "set a variable, overriding the script")
         script.add_argument(
             "--threads", type=threads_option, metavar="N",
             help="threads to use (default: all cores where the scene is large enough)",
         )  # fmt: skip
         script.add_argument(
             "--ranks", type=positive, metavar="N", default=None,
-            help="processes (MPI) that share the scene; --threads is per process",
+            help="number of processes (MPI); --threads is per process",
         )  # fmt: skip
         script.add_argument(
             "--gpu", action="store_true",
@@ -349,7 +350,7 @@ def _run(options: argparse.Namespace) -> int:
         command = "karamelo-py check" if options.checking else "karamelo-py"
         raise ScriptError("no script is named", expected=f"{command} SCRIPT")
     if launched()[0] > 1 and not options.checking:
-        with leaving_at_once():  # before they know of each other
+        with leaving_at_once():  # before the processes are connected
             import_module("karamelo_py.scene.hub")
         return launch.together(
             options.ranks, lambda comm: _carry_out(options, script, comm), debugging=options.debug
@@ -357,15 +358,15 @@ def _run(options: argparse.Namespace) -> int:
     if (options.ranks or 1) > 1 and not options.checking and not options.gpu:
         if options.live:
             raise ScriptError(
-                f"a live page shows a run of one process, and {options.ranks} share this one",
-                hint="--threads N in the place of --ranks, or karamelo-py view --live FOLDER",
+                f"a live page shows a run of one process, and this one has {options.ranks}",
+                hint="--threads N instead of --ranks, or karamelo-py view --live FOLDER",
             )
         return launch.launch(options.ranks, options.command_line)
     return _carry_out(options, script)
 
 
 def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = None) -> int:
-    """Carry out a script; returns the exit status."""
+    """Run a script; return the exit status."""
     with leaving_at_once():
         import numpy as np
 
@@ -375,7 +376,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.lower.card import use_card
         from karamelo_py.scene.hub import Hub
     begun()
-    # Errors of the program replace NumPy's warnings.
+    # The program's errors replace NumPy's warnings.
     np.seterr(over="ignore", invalid="ignore", divide="ignore")
     hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads
@@ -424,13 +425,13 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         _tell_of_no_run(hub, script)
     elif restart is not None and restart.is_over(hub):
         message = f"{restart.path} holds the end of the last run of {script}: nothing is left to do"
-        hint = f"a further run behind it, or read_restart({restart.path}) in a script of its own"
+        hint = f"another run command after it, or read_restart({restart.path}) in a separate script"
         hub.console.say(render_message("note", message, hint=hint))
     return 0
 
 
 def _direct(hub: Hub, options: argparse.Namespace) -> None:
-    """Send the files of a scene where the options say."""
+    """Set where the files of a scene go."""
     if options.out is not None:
         if not hub.checking or options.out.exists():
             make_folder(options.out, "-out {}")
@@ -454,7 +455,7 @@ def _direct(hub: Hub, options: argparse.Namespace) -> None:
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """Tell of a script without a run: one that makes a scene may have forgotten it."""
+    """Warn of a script without a run command if it makes a scene."""
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:

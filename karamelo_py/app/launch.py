@@ -1,8 +1,8 @@
-"""karamelo-py --ranks N: mpiexec starts the processes, one stands for them, and all end together.
+"""karamelo-py --ranks N: mpiexec starts the processes; they report and end as one.
 
-Each process reports through a socket to the `Launcher`, the process that the user has started. The
-first gets the terminal, or whatever output and errors go to, and the signals that come; the others
-say what they know that it does not. What mpiexec says is shown only where no process was started.
+Each process reports over a socket to the `Launcher`, the process started by the user. Rank 0 gets
+the terminal (or redirected output) and the signals; the others report only what rank 0 cannot know.
+Output of mpiexec is shown only if no process was started.
 """
 
 import errno
@@ -32,17 +32,17 @@ if TYPE_CHECKING:
     from karamelo_py.scene.hub import Hub
 
 ERROR = 1
-# What the system says of disks and rights, wherever that comes up: no fault of the program.
+# Operating system errors about disks and permissions, which are no fault of the program.
 OF_THE_SYSTEM = tuple(
     getattr(errno, name)
     for name in ("ENOSPC", "EDQUOT", "EROFS", "EFBIG", "EIO", "EACCES", "EPERM", "EMFILE", "ENFILE",
                  "ESTALE")
     if hasattr(errno, name)
 )  # fmt: skip
-# Where the launcher of this program waits for the processes to report.
+# Socket on which the launcher waits for reports.
 SOCKET = "KARAMELO_PY_LAUNCHER"
-# What Open MPI is told: more processes than cores are the user's choice, each has threads of its
-# own, one that waits lets others work, and a container's root may start it.
+# Settings of Open MPI: more processes than cores are allowed, processes have their own threads,
+# waiting processes yield, and root in a container may run.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -50,21 +50,21 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-# Large pages for what the processes reserve, where Linux gives them to who asks: NumPy asks for the
-# arrays that it makes, not for those that grow. Four processes of a million points: a tenth faster.
+# Large pages for allocations, on Linux where enabled on request: NumPy requests them for new
+# arrays, not for growing ones. Four processes of a million points run 10 % faster.
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
-PAUSE = 0.05  # seconds between two looks at mpiexec
-GRACE = 2.0  # seconds that processes have to end after it
-AT_ONCE = 3  # so many signals end all without waiting for the step
-LONGEST_FOLDER = 70  # of a socket, whose name may not be long
-A_CORE = 16  # processes at most: who asks for more means another number
-# Seconds that one that has failed waits for the others, before it ends them. The first tells what
-# is wrong; others do where it does not know.
+PAUSE = 0.05  # seconds between polls of mpiexec
+GRACE = 2.0  # seconds for processes to end after it
+AT_ONCE = 3  # signals that end all without waiting for the step
+LONGEST_FOLDER = 70  # of a socket, whose name must be short
+A_CORE = 16  # processes per core at most; more is a mistake
+# Seconds that a failed process waits for the others before it ends them: rank 0 reports the
+# error, others only what it does not know.
 PATIENCE, LONGER = 2.0, 6.0
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
-    """Run something; returns its exit status, and what is left to be said."""
+    """Run a function; return its exit status, and a message still to be printed."""
     try:
         return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
@@ -74,9 +74,9 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int,
 def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED, render_message("error", "interrupted")
-    # Rich makes a SystemExit of it.
+    # Rich converts it to a SystemExit.
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-        # Whoever read our output has gone; what was written stays.
+        # The reader of our output has gone; files stay.
         sys.stderr.close()
         return ERROR, ""
     if debugging:
@@ -85,7 +85,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
 
 
 def rendered(error: BaseException) -> str:
-    """Write an exception for the user: no traceback, also where the fault is not the user's."""
+    """Format an exception for the user, without a traceback even for faults of the program."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
@@ -104,7 +104,7 @@ def rendered(error: BaseException) -> str:
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
-    """Run a program on so many processes of this machine; returns the exit status."""
+    """Run a program on this number of local processes; return the exit status."""
     cores = os.cpu_count() or 1
     if ranks > A_CORE * cores:
         raise ScriptError(
@@ -134,24 +134,24 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
 
 
 class Launcher:
-    """The processes of a run as one: its signals, its exit status, its last word."""
+    """The processes of a run as one: signals, exit status, final message."""
 
     def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
-        self.links: dict[socket.socket, dict[str, Any]] = {}  # empty until they say who they are
+        self.links: dict[socket.socket, dict[str, Any]] = {}  # empty until they report their rank
         self.reports: dict[int, dict[str, Any]] = {}
-        self.lost: list[dict[str, Any]] = []  # ended without a report, in this order
-        self.over = False  # the first has done all
+        self.lost: list[dict[str, Any]] = []  # ended without a report, in order
+        self.over = False  # rank 0 has finished
         self.signals: list[int] = []
         self.process: Any = None
 
     def run(self) -> int:
-        """Start them and see them end; returns the exit status."""
+        """Start the processes and wait for them; return the exit status."""
         with socket.socket(socket.AF_UNIX) as self.door, mpi.handled_signals(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
-            # A session of its own: Ctrl-C comes to this process alone.
+            # A separate session, so that Ctrl-C reaches this process only.
             self.process = subprocess.Popen(
                 self.command, env=environment, stdin=subprocess.DEVNULL, stdout=self.said,
                 stderr=self.said, start_new_session=True,
@@ -161,7 +161,7 @@ class Launcher:
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
-            for one in filter(None, self.links.values()):  # mpiexec was ended, and not they
+            for one in filter(None, self.links.values()):  # mpiexec has ended, but they have not
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
         status = self._outcome()
@@ -209,7 +209,7 @@ class Launcher:
     # --- when they have ended ---------------------------------------------------------------------
 
     def _outcome(self) -> int:
-        """Find the exit status, and say what no process could say."""
+        """Determine the exit status, and report what no process could."""
         first = self.reports.get(0)
         failed = [one for _, one in sorted(self.reports.items()) if one["status"]]
         if first is not None and first["status"]:
@@ -244,7 +244,7 @@ class Launcher:
         return render_message("error", who, hint=hint)
 
     def _words(self) -> str:
-        """Read what mpiexec said, and libraries of C through it."""
+        """Read the output of mpiexec, which includes messages of C libraries."""
         self.said.seek(0)
         return self.said.read().decode(errors="replace").strip()
 
@@ -254,7 +254,7 @@ class Launcher:
 
 
 def _received(link: socket.socket) -> bytes:
-    """Read what has come; the link is closed where its other end is."""
+    """Read available data; close the link if the other end is closed."""
     found = b""
     with suppress(OSError):
         while part := link.recv(1 << 16):
@@ -267,11 +267,11 @@ def _received(link: socket.socket) -> bytes:
 
 # ---- one of the processes -----------------------------------------------------------------------
 
-_link: socket.socket | None = None  # to the launcher, where that has started this process
+_link: socket.socket | None = None  # to the launcher, if that started this process
 
 
 def keep_to_oneself() -> None:
-    """All processes but the first are silent, and the first reports to its launcher."""
+    """Silence all processes but rank 0, and connect rank 0 to its launcher."""
     size, rank = mpi.launched()
     if size > 1:
         _report_to_launcher(rank)
@@ -280,7 +280,7 @@ def keep_to_oneself() -> None:
 
 
 def _report_to_launcher(rank: int) -> None:
-    """Tell the launcher of this process; the first gets its output and errors, and its signals."""
+    """Report this process to the launcher; rank 0 gets output streams and signals."""
     global _link
     name = os.environ.pop(SOCKET, None)
     if name is None:
@@ -290,11 +290,11 @@ def _report_to_launcher(rank: int) -> None:
         link.connect(name)
         link.sendall(_line(rank=rank, pid=os.getpid()))
         if rank == 0:
-            # What libraries write to the usual ones is left to mpiexec.
+            # Output of libraries to the standard streams is left to mpiexec.
             out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
             sys.stdout = sys.__stdout__ = out
             sys.stderr = sys.__stderr__ = err
-    except OSError:  # it is on another machine
+    except OSError:  # on another machine
         return
     _link = link
     if rank == 0:
@@ -302,12 +302,12 @@ def _report_to_launcher(rank: int) -> None:
 
 
 def _stream(fd: int) -> TextIO:
-    usual = sys.__stderr__  # shows what it cannot encode
+    usual = sys.__stderr__  # escapes what it cannot encode
     return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)
 
 
 def _heed(link: socket.socket) -> None:
-    """Take signals from the launcher; where that has gone, the run is to end."""
+    """Receive signals from the launcher; if that is gone, end the run."""
     with suppress(OSError):
         while number := link.recv(1):
             os.kill(os.getpid(), number[0])
@@ -319,19 +319,19 @@ def _line(**message: Any) -> bytes:
 
 
 def _report(**message: Any) -> None:
-    """Tell the launcher, where there is one."""
+    """Send a message to the launcher, if there is one."""
     if _link is not None:
         with suppress(OSError):
             _link.sendall(_line(**message))
 
 
 def has_terminal() -> bool | None:
-    """False where mpiexec passes on what this process writes: it pretends to be a terminal."""
+    """False if mpiexec pretends that this process writes to a terminal."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
 def together(asked: int | None, run: Callable[[Any], int], *, debugging: bool = False) -> int:
-    """Carry out `run` as one of all processes, as many as were `asked` for; returns the status."""
+    """Call `run` as one of the processes (`asked`: their number); return the exit status."""
     size, rank = mpi.launched()
     comm: mpi.MpiComm | None = None
 
@@ -350,20 +350,20 @@ def together(asked: int | None, run: Callable[[Any], int], *, debugging: bool = 
         sys.stdout.flush()
         if not stays:
             comm.abort(status)
-        # mpiexec would have its own say about a status, and the launcher knows it.
+        # mpiexec would comment on a status, and the launcher has it.
         return 0 if _link is not None and comm is not None else status
 
     status, text = outcome_of(act, debugging=debugging)
     if comm is None:
         end(status, text, tells=rank == 0, stays=True)
-        if status == INTERRUPTED:  # while others join: they would be waited for at the end
+        if status == INTERRUPTED:  # the others are starting: they would be waited for
             os._exit(status)
         return status
     if comm.parted:
         return end(status, text, tells=True, stays=True)
     patience = inf
     if not status and rank == 0:
-        _report(over=True)  # and the others are waited for
+        _report(over=True)  # then wait for the others
     if status:
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or comm.failed_within:
@@ -388,7 +388,7 @@ def _signed(text: str, rank: int, size: int) -> str:
 
 
 def _join(asked: int | None, ends: Callable[[BaseException], None]) -> mpi.MpiComm:
-    """Join the processes that mpiexec has started; `ends` as of `MpiComm`."""
+    """Connect to the processes started by mpiexec; `ends` as in `MpiComm`."""
     size, _ = mpi.launched()
     if asked is not None and asked != size:
         raise ScriptError(
@@ -405,7 +405,7 @@ def _join(asked: int | None, ends: Callable[[BaseException], None]) -> mpi.MpiCo
 
 
 def share(hub: "Hub", comm: mpi.MpiComm) -> None:
-    """Let all processes step a scene together, of which the first writes. One needs no other."""
+    """Distribute a scene over all processes; rank 0 writes."""
     if comm.size > 1:
         hub.settings.comm = comm
     if not comm.leads:

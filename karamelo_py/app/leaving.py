@@ -1,12 +1,12 @@
-"""The end of a program that is interrupted before it has begun, with a word about it.
+"""Exit with a message if the program is interrupted during its imports.
 
-An interrupt in the midst of an import can come out as any error; while nothing is open yet, the
-program just ends.
+An interrupt within an import may surface as any error; nothing is open yet, so the program just
+ends.
 """
 
 import os
 
-SIGNALLED = 128  # as a shell reports a program that a signal ended: this and its number
+SIGNALLED = 128  # exit status of a shell for a signal: this plus its number
 INTERRUPTED = SIGNALLED + 2
 
 
@@ -15,19 +15,19 @@ def _leave(*_):
     os._exit(INTERRUPTED)
 
 
-# Nothing more is imported here: until `leaving_at_once` is at work, Python tells of an interrupt.
+# No more imports here: until `leaving_at_once` is active, Python reports an interrupt.
 try:
     import signal
 except KeyboardInterrupt:
     _leave()
 
 
-STUDY = "KARAMELO_PY_STUDY"  # the number of the process whose run this one is
-_DEATH_SIGNAL = 1  # of Linux's prctl: sent when the parent ends
+STUDY = "KARAMELO_PY_STUDY"  # process number of the study that started this run
+_DEATH_SIGNAL = 1  # of Linux's prctl: signal sent when the parent ends
 
 
 def end_with(study: int) -> None:
-    """Let this run end with its study, however that ends; of Linux."""
+    """End this run when its study ends, for whatever reason (Linux)."""
     import ctypes
     import sys
 
@@ -36,19 +36,19 @@ def end_with(study: int) -> None:
     ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     try:
         os.kill(study, 0)
-    except ProcessLookupError:  # it has ended before that
+    except ProcessLookupError:  # it has ended already
         os._exit(SIGNALLED + signal.SIGKILL)
     except OSError:
         pass
 
 
 class leaving_at_once:
-    """Let Ctrl-C end the program on the spot: for imports."""
+    """Let Ctrl-C end the program immediately, during imports."""
 
     def __enter__(self) -> None:
         try:
             self.before = signal.signal(signal.SIGINT, _leave)
-        except ValueError:  # not in the main thread, which gets the signals
+        except ValueError:  # not in the main thread, which gets signals
             self.before = None
 
     def __exit__(self, *_) -> None:

@@ -1,4 +1,4 @@
-"""Options that subcommands share: variables, numbers, folders."""
+"""Options of several subcommands: variables, numbers, folders."""
 
 import argparse
 from pathlib import Path
@@ -11,7 +11,7 @@ LIVE = ("--live", "-live")
 
 
 class _Variable(argparse.Action):
-    """A variable and its value, each variable once."""
+    """A variable and its value; each variable once."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option: Any = None) -> None:
         given = getattr(namespace, self.dest)
@@ -25,7 +25,7 @@ class _Variable(argparse.Action):
 
 
 def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
-    """Let a command line set variables of scripts."""
+    """Add the option that sets script variables."""
     parser.add_argument(
         *VARIABLE, nargs=2, action=_Variable, default=[], metavar=("NAME", "VALUE"),
         help=text,
@@ -42,7 +42,7 @@ def threads_option(text: str) -> int | None:
 
 
 def positive(text: str) -> int:
-    """Read a whole number of at least 1."""
+    """Read a positive integer."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return int(text)
@@ -60,7 +60,7 @@ def above_zero(text: str) -> float:
 
 
 def make_folder(folder: Path, option: str) -> None:
-    """Make a folder for the files of a scene, unless it is there; `option` asks for it: -out {}."""
+    """Make a folder for the files of a scene, if needed, for an `option` such as -out {}."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

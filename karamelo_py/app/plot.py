@@ -1,4 +1,4 @@
-"""Logs of earlier runs, read back, and karamelo-py plot: their columns against each other."""
+"""Read logs of earlier runs; karamelo-py plot draws their columns."""
 
 import argparse
 import csv
@@ -21,7 +21,7 @@ is explained by karamelo-py help command plot."""
 
 
 def read_text(path: Path, expected: str | None = None) -> str:
-    """Read a file of an earlier run; nothing where it is no text."""
+    """Read a file of an earlier run; empty if it is not text."""
     try:
         return reading.read_text(path, largest=None)
     except OSError as error:
@@ -34,12 +34,11 @@ def read_text(path: Path, expected: str | None = None) -> str:
 def read_rows(path: Path) -> list[dict[str, float]]:
     """Read the rows of a log, by column; words, such as what limits the step, are NaN.
 
-    A line that begins with # names the columns anew; one that a killed run has left half is passed
-    over.
+    Lines that begin with # rename the columns. A line cut off by a killed run is skipped.
     """
     names: list[str] = []
     rows = []
-    # What is not ended by a line end is cut: of 2.4e+10 there may be 2.4.
+    # A line without a line end may be cut: 2.4 of 2.4e+10.
     lines = read_text(path).rpartition("\n")[0].splitlines()
     for cells in filter(
         None, csv.reader(lines) if path.suffix == ".csv" else map(str.split, lines)
@@ -57,9 +56,9 @@ def read_rows(path: Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Read the columns of a log in a folder, those of no log where it cannot be read.
+    """Read the columns of a log in a folder; empty if it cannot be read.
 
-    Where they change between runs, all rows of a column.
+    If columns change between runs, all rows of each column.
     """
     try:
         rows = read_rows(folder / name)
@@ -70,7 +69,7 @@ def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add what the subcommand takes."""
+    """Add the options of the subcommand."""
     parser.add_argument("log", metavar="LOG", type=Path)
     parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
     parser.add_argument("-x", help="column to draw over (default: Time, or Step)")
@@ -86,7 +85,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw what the command line asks for; returns the exit status."""
+    """Draw as requested; return the exit status."""
     if not options.log.exists() and not options.log.suffix:
         raise ScriptError(
             f"there is no log {options.log}",

@@ -1,4 +1,4 @@
-"""A scene in Python: the commands of scripts as methods, what points carry as arrays."""
+"""Python interface: script commands as methods, point data as arrays."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
 
 
 class SimulationError(ScriptError):
-    """An error of a script or a command: the whole message, with its place.
+    """An error in a script or a command; its text is the whole message, with the place.
 
     Attributes
     ----------
     message, place, expected, hint
-        The parts of the message; `place` has file, line, column and the line itself.
+        Parts of the message; `place` has file, line, column and the text of the line.
     """
 
     def __str__(self) -> str:
@@ -57,7 +57,7 @@ class KarameloWarning(UserWarning):
 
 
 class Quiet(Console):
-    """Shows nothing; warnings are those of Python."""
+    """Prints nothing; warnings are Python warnings."""
 
     def __init__(self) -> None:
         super().__init__(quiet=True)
@@ -67,9 +67,9 @@ class Quiet(Console):
 
 
 class Columns(Mapping, dict):  # type: ignore[metaclass]
-    """Columns by name: arrays of numbers, which cannot be written to.
+    """Read-only columns by name, as arrays of numbers.
 
-    A dict, so that ``pandas.DataFrame(sim.log)`` takes its columns; it holds nothing itself.
+    A dict, so that ``pandas.DataFrame(sim.log)`` works; the dict itself is empty.
     """
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
@@ -99,24 +99,24 @@ class Columns(Mapping, dict):  # type: ignore[metaclass]
         return f"<columns {', '.join(self)}>"
 
     def _refuse(self, *arguments: Any, **named: Any) -> Any:
-        raise TypeError("these columns are those of the simulation: none is added or taken out")
+        raise TypeError("columns of a simulation cannot be added or removed")
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     update = pop = popitem = setdefault = clear = _refuse
 
     def copy(self) -> dict[str, np.ndarray]:
-        """Give the present columns."""
+        """Return the present columns."""
         return dict(self)
 
     def to_pandas(self) -> Any:
-        """Give the columns as a DataFrame."""
+        """Return the columns as a DataFrame."""
         import pandas
 
         return pandas.DataFrame(self)
 
 
 class LivePage:
-    """A page that follows a simulation: its `address`, and how a notebook shows it."""
+    """A page that follows a simulation: its `address`, and its display in notebooks."""
 
     def __init__(self, page: Any):
         self._page = page
@@ -130,15 +130,15 @@ class LivePage:
         return f"<live page {self.address}>"
 
     def close(self) -> None:
-        """End the page."""
+        """Close the page."""
         self._page.detach()
 
 
 class PointColumns(Columns):
-    """Columns of the points: ``points["vx"] = values`` sets one between two runs.
+    """Columns of the points; ``points["vx"] = values`` sets one between two runs.
 
-    x, y, z, velocities, temperatures, stresses (of materials in rate form) and fields of parts can
-    be set, to a number or to one for each point (n,); others follow from these.
+    x, y, z, velocities, temperatures, stresses (of rate-form materials) and declared fields can be
+    set, to a number or to one number per point (n,). Other columns are derived.
     """
 
     def __init__(self, hub: Hub):
@@ -156,7 +156,7 @@ class PointColumns(Columns):
 
 
 class Variables(MutableMapping):
-    """The variables of a script: numbers, texts of formulas; ``variables["q"] = 0`` is q = 0."""
+    """Script variables: numbers, or texts of formulas; ``variables["q"] = 0`` is q = 0."""
 
     def __init__(self, sim: Simulation):
         self._sim = sim
@@ -191,7 +191,7 @@ class Variables(MutableMapping):
 
 
 class ShownPicture:
-    """A picture of the points, which a notebook shows."""
+    """A picture of the points; notebooks display it."""
 
     def __init__(self, png: bytes):
         self.png = png
@@ -200,55 +200,54 @@ class ShownPicture:
         return self.png
 
     def save(self, file: str | PathLike) -> None:
-        """Write it to a file (PNG)."""
+        """Write it to a PNG file."""
         Path(file).write_bytes(self.png)
 
 
 class Simulation:
-    """A scene, made by a script, by commands, or by both.
+    """A scene, built by a script, by commands, or both.
 
     Parameters
     ----------
     script
-        Name of a script, or the text of one: a str that names no file and has a line break, a
-        parenthesis or an equals sign; a Path is always a name. It is carried out up to its first
-        run command; ``run()`` without a number goes on from there.
+        Name or text of a script. A str that names no file and contains a line break, a parenthesis
+        or an equals sign is text; a Path is always a name. The script is executed up to its first
+        run command; ``run()`` without a number continues from there.
     out
-        Folder for log, dumps, plots and files to go on from. Without it none is written: the log
-        is kept in memory, and what a script says of dumps and plots has no effect.
+        Folder for log, dumps, plots and restart files. By default none is written: the log is kept
+        in memory, and dumps and plots of the script have no effect.
     threads
-        Threads to use; all cores where the scene is large enough by default.
+        Number of threads; by default all cores if the scene is large enough.
     gpu
-        Let an NVIDIA GPU take the steps.
+        Run on an NVIDIA GPU.
     verbose
-        Show on the terminal what the command line shows.
+        Print what the command line prints.
     trust_geometries
-        Let .geo files run programs and write files.
+        Allow .geo files to run programs and write files.
     alone
-        Where mpiexec has started several processes: each has a scene of its own, such as one of a
-        study. Without it that is refused, since it would be the same run so many times.
+        For several processes started by mpiexec: each has a separate scene. Otherwise this is
+        refused, because all would repeat the same run.
     variables
-        Take the place of what the script assigns to them, as ``-var`` does.
+        Override assignments in the script, like ``-var``.
 
     Raises
     ------
     SimulationError
-        For a wrong script, number of threads or folder, or no GPU; it carries the message and the
-        place that the command line shows.
+        For an error in the script, the number of threads, the folder, or a missing GPU; with the
+        message and place that the command line shows.
 
     Notes
     -----
-    Every command of scripts is a method with the same arguments: ``sim.solid("body", "region",
-    "box", 2, "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Texts
-    stand for what a script would say, names and formulas; numbers, True and False, and None (NULL)
-    are what they are; ``sim.fix(ID, "python", group, function)`` takes a function,
-    ``sim.solid(ID, "points", columns, ...)`` arrays by name, or a DataFrame.
+    Script commands are methods with the same arguments: ``sim.solid("body", "region", "box", 2,
+    "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Strings are
+    names and formulas as in a script; numbers and booleans are passed as they are, and None is
+    NULL. ``sim.fix(ID, "python", group, function)`` takes a function, ``sim.solid(ID, "points",
+    columns, ...)`` arrays by name or a DataFrame.
 
-    Commands that give a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return the
-    present one.
+    Commands with a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return it.
 
-    Simulations may run at the same time, each in a thread of Python. One takes one call at a time:
-    a second thread gets a SimulationError.
+    Several simulations may run in different Python threads. One simulation takes one call at a
+    time; a second thread gets a SimulationError.
 
     Examples
     --------
@@ -277,7 +276,7 @@ class Simulation:
         hub.output.log.rows = []
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
-        self._at_work = threading.RLock()  # by this thread
+        self._at_work = threading.RLock()  # held by the calling thread
         self._name = "a scene"
         with _as_simulation_error():
             hub.settings.threads = _threads_of(threads)
@@ -298,11 +297,11 @@ class Simulation:
         folder = Path(out).absolute()
         make_folder(folder, 'out="{}"')
         if folder in _folders:
-            gc.collect()  # one that is not in use any more
+            gc.collect()  # closes simulations that are no longer used
         if folder in _folders:
             raise ScriptError(
                 f"another simulation writes to {folder}",
-                expected="a folder of its own for each, or close() for the other",
+                expected="a separate folder for each, or close() the other",
             )
         _folders[folder] = self
         return folder
@@ -312,7 +311,7 @@ class Simulation:
             raise ScriptError(
                 f"{script!r} is no script", expected=SCRIPT, hint="variables by name, as in N=3"
             )
-        there = os.path.exists(script)  # False for what is too long for a name
+        there = os.path.exists(script)  # False for text too long for a name
         is_text = isinstance(script, str) and not there and any(c in script for c in "\n(=")
         self._name = "a script" if is_text else str(script)
         try:
@@ -330,7 +329,7 @@ class Simulation:
     # -- commands ---------------------------------------------------------------------------------
 
     def command(self, text: str) -> None:
-        """Carry out a line of script, or several.
+        """Execute one or more lines of script.
 
         Raises
         ------
@@ -346,7 +345,7 @@ class Simulation:
 
     @contextmanager
     def _carried_out(self) -> Iterator[None]:
-        """Make runs at once, and end them as the user wants."""
+        """Execute runs at once, and handle interrupts."""
         with self._in_one_thread():
             pausing, self.hub.pausing = self.hub.pausing, False
             try:
@@ -366,7 +365,7 @@ class Simulation:
 
     @contextmanager
     def _in_one_thread(self) -> Iterator[None]:
-        """Refuse what a second thread wants meanwhile."""
+        """Refuse calls from a second thread."""
         if not self._at_work.acquire(blocking=False):
             raise SimulationError(
                 "this simulation is at work in another thread",
@@ -378,7 +377,7 @@ class Simulation:
             self._at_work.release()
 
     def evaluate(self, expression: str) -> float | str:
-        """Compute the present value of an expression of the language."""
+        """Return the present value of an expression of the script language."""
         return self._evaluated(expression, "evaluate")
 
     def _evaluated(self, expression: str, name: str) -> float | str:
@@ -419,7 +418,7 @@ class Simulation:
         return ", ".join([*words, *(f"{key}={self._word(v)}" for key, v in named.items())])
 
     def _word(self, value: Any) -> str:
-        """Write a value as a script would."""
+        """Format a value as in a script."""
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
@@ -433,7 +432,7 @@ class Simulation:
     # -- time -------------------------------------------------------------------------------------
 
     def run(self, steps: int | None = None) -> None:
-        """Take a number of steps; without one, carry out the rest of the script, with its runs."""
+        """Take a number of steps; without one, execute the rest of the script and its runs."""
         if steps is not None:
             self._do(f"run({_as_script_text(steps)})", "Simulation.run")
             return
@@ -456,14 +455,14 @@ class Simulation:
 
     @property
     def dt(self) -> float:
-        """The next step."""
+        """Length of the next step."""
         return self.hub.update.dt
 
-    # -- what there is to see ---------------------------------------------------------------------
+    # -- results ----------------------------------------------------------------------------------
 
     @property
     def points(self) -> PointColumns:
-        """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) in the order of ids.
+        """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) ordered by id.
 
         ``sim.points["vx"] = values`` sets one between two runs.
         """
@@ -476,9 +475,9 @@ class Simulation:
 
     @property
     def log(self) -> Columns:
-        """Columns of the log by name: arrays with a number for each line.
+        """Columns of the log by name, with one number per line.
 
-        Where the columns have changed, those of the last lines that have the same.
+        If the columns have changed, only the last lines with the same columns count.
         """
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
@@ -487,7 +486,7 @@ class Simulation:
 
     @property
     def values(self) -> Columns:
-        """Values that fixes and computes publish, now: numbers by name."""
+        """Present values published by fixes and computes, by name."""
 
         def read(name: str) -> float:
             if self.hub.solids and self.hub.update.method is not None:
@@ -510,7 +509,7 @@ class Simulation:
         file: str | PathLike | None = None,
         **look: Any,
     ) -> ShownPicture:
-        """Draw a picture of the points, coloured by a column (or by solid), which a notebook shows.
+        """Draw the points, coloured by a column (default: by solid); notebooks display the result.
 
         Parameters
         ----------
@@ -519,9 +518,9 @@ class Simulation:
         width, height
             Size in inches.
         file
-            Write it there, too: .png, .pdf or .svg.
+            Also write a file: .png, .pdf or .svg.
         look
-            The words of dump pyplot: vmin, vmax, cmap, label, only, xmin, quantile, dpi ...
+            Options of dump pyplot: vmin, vmax, cmap, label, only, xmin, quantile, dpi ...
         """
         from karamelo_py.styles.dumps.pyplot import PyPlot
 
@@ -540,10 +539,10 @@ class Simulation:
         return ShownPicture(drawn.getvalue())
 
     def live(self) -> LivePage:
-        """Open a page in a browser that follows the runs to come; a notebook shows it.
+        """Open a browser page that follows later runs; notebooks display it.
 
-        Points in colour, curves of the log, what limits the step; pause, step, stop. Close it with
-        ``.close()``, or that of the simulation. Needs the package plotly.
+        It shows points, log curves and what limits the step, with buttons to pause, step and stop.
+        Close it with ``.close()``, or with the simulation. Needs plotly.
         """
         from karamelo_py.app.live.run import RunPage
 
@@ -551,7 +550,7 @@ class Simulation:
             return LivePage(RunPage(self.hub, self._name))
 
     def close(self) -> None:
-        """Close its files and pages; a further run would begin the log anew."""
+        """Close files and pages; a later run starts a new log."""
         for page in [*self.hub.output.pages]:
             page.detach()
         self.hub.output.log.close()
@@ -568,12 +567,12 @@ class Simulation:
         return f"<{self._name}: {count} points, step {self.step}, time {self.time:.6g}>"
 
 
-# ---- values and errors between Python and a scene, which speaks as a script does ----------------
+# ---- conversion of values and errors between Python and scripts ---------------------------------
 
 
 @contextmanager
 def _as_simulation_error() -> Iterator[None]:
-    """Raise errors as those whose text is the whole message."""
+    """Convert script errors to SimulationError, whose text is the whole message."""
     try:
         yield
     except ScriptError as error:
@@ -584,21 +583,21 @@ def _as_simulation_error() -> Iterator[None]:
 
 
 def _refuse_copies() -> None:
-    """Refuse several processes that were started: the first tells that none shares a scene here."""
+    """Refuse unconnected processes of mpiexec; the first reports that no scene is distributed."""
     size, rank = launched()
     if size == 1:
         return
     if rank > 0:
         sys.exit()
     raise SimulationError(
-        f"{size} processes were started, and a scene in Python is of one: they would do the same",
-        expected=f"mpiexec -n {size} karamelo-py SCRIPT, by which they share a scene",
-        hint="Simulation(..., alone=True) where each is to have a scene of its own",
+        f"{size} processes were started, but a scene in Python uses one: all would do the same",
+        expected=f"mpiexec -n {size} karamelo-py SCRIPT, which distributes a scene",
+        hint="Simulation(..., alone=True) to run a separate scene on each",
     )
 
 
 def _threads_of(given: Any) -> int | None:
-    """Read the number of threads, as `--threads` takes it; None for auto."""
+    """Read a number of threads like `--threads`; None for auto."""
     try:
         return None if given is None else threads_option(str(given))
     except ArgumentTypeError:
@@ -609,7 +608,7 @@ def _threads_of(given: Any) -> int | None:
 
 
 def _as_script_text(value: Any) -> str:
-    """Write a value of Python as a script would."""
+    """Format a Python value in script syntax."""
     if value is None:
         return "NULL"
     if isinstance(value, (bool, np.bool_)):
@@ -623,6 +622,6 @@ def _as_script_text(value: Any) -> str:
     if isinstance(value, str):
         words = value.split()
         texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
-        # Words with nothing but blanks between them are no formula.
+        # Words separated by blanks only are not a formula.
         return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
     raise TypeError(f"{value!r} is no number, text, True, False, None or function")

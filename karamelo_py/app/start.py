@@ -1,4 +1,4 @@
-"""The start of the program."""
+"""Entry point of the program."""
 
 import gc
 import os
@@ -8,16 +8,16 @@ from karamelo_py.app.leaving import STUDY, end_with, leaving_at_once
 
 
 def main() -> int:
-    """Run the command line; returns the exit status.
+    """Run the command line; return the exit status.
 
-    While the program begins, Python does not look for cycles of objects to throw away: its search
-    went through all modules again and again, half of what a small scene takes.
+    The garbage collector is off during start-up, where its repeated searches of all modules took
+    half the time of a small scene.
     """
     gc.disable()
     _open_what_is_closed()
     if study := os.environ.pop(STUDY, ""):
         end_with(int(study))
-    # Threads of OpenBLAS, in load steps, wait for each other more than they do.
+    # In load steps, threads of OpenBLAS would mostly wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with leaving_at_once():
         from karamelo_py.app.cli import main as command
@@ -25,9 +25,9 @@ def main() -> int:
 
 
 def _open_what_is_closed() -> None:
-    """Have input, output and errors go nowhere where they are closed, as by >&- in a shell.
+    """Redirect closed standard streams, as by >&- in a shell, to nowhere.
 
-    The next file that is opened would take the place of one.
+    Otherwise the next opened file would get their descriptors.
     """
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass

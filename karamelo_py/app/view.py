@@ -37,13 +37,13 @@ from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, 
 
 DESCRIPTION = """\
 Draw pictures or a movie of dumps of points.
-Files are those of dump particle, particle/gz, hdf5 and vtk (its .pvd). The pictures are those of
-dump pyplot, and so are the options that say how they look."""
+Files are from dump particle, particle/gz, hdf5 and vtk (its .pvd). Pictures and their options are
+as in dump pyplot."""
 DPI = 100
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add what the subcommand takes."""
+    """Add the options of the subcommand."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     parser.add_argument(
         *LIVE, action="store_true",
@@ -76,7 +76,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _pixels(text: str) -> int:
-    """Read the width or height of a picture, as dump pyplot has it."""
+    """Read the width or height of a picture, as in dump pyplot."""
     if not text.isdecimal() or not LEAST_PIXELS <= int(text) <= MOST_PIXELS:
         said = f"'{text}' is no number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
         raise argparse.ArgumentTypeError(said)
@@ -84,18 +84,18 @@ def _pixels(text: str) -> int:
 
 
 def _look_words() -> list[Parameter]:
-    """List the words of dump pyplot that say how a picture looks."""
+    """List the options of dump pyplot that control the look."""
     return [word for word in help_of("dump", "pyplot").parameters if word.keyword]
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw what the command line asks for; returns the exit status."""
+    """Draw as requested; return the exit status."""
     if options.live:
         return _live(options.files)
     movie = options.output.suffix.lower() in (".gif", ".mp4")
     (movie_format if movie else picture_format)(options.output)
     frames = Frames(options.fps)
-    # Named by number, 1000 comes after 999.
+    # Sorted by number: 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn, scene = 0, _scene(options)
     if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
             snapshot = chosen(snapshot)
             unit = snapshot.units.get("time", "")
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
-            # As they stand in the file, whatever their ids.
+            # In file order, whatever the ids.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
             title = f"{look['title']}: " if look["title"] else ""
             tools = _tools(scene) if options.script and look["outlines"] else ()
@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> int:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
     if look["outlines"] and options.script is None:
-        said = "dumps do not tell where walls and tools are: outlines are those of solids alone"
+        said = "dumps do not contain walls and tools: only solids are outlined"
         hint = "--script FILE, the script of the run, shows its walls and tools, too"
         print(render_message("note", said, hint=hint), file=sys.stderr)
     return 0
@@ -146,23 +146,23 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
-    """Tell with an unknown name where those come from that dumps do not have."""
+    """Explain, for an unknown name, where names missing in dumps come from."""
     try:
         yield
     except ScriptError as error:
         if error.code in ("unknown-name", "unknown-column") and error.alike is None:
-            error.hint = "a log beside the dumps (log.mpm, log.csv) knows the values of its columns"
+            error.hint = "a log in the folder of the dumps (log.mpm, log.csv) has its values"
             if options.script is None:
                 error.hint += ", and --script FILE the groups, solids and variables of the run"
         raise
 
 
 def _scene(options: argparse.Namespace) -> Hub:
-    """Go through the script of the run, without its steps; the scene is empty without a script."""
+    """Execute the script of the run without steps; without a script the scene is empty."""
     if options.script is None and options.var:
         raise ScriptError(
             f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
-            expected="--script FILE, the script of the run, beside it",
+            expected="--script FILE, the script of the run, with it",
         )
     hub = Hub(Console(quiet=True))
     hub.rehearsing = True
@@ -175,9 +175,9 @@ def _scene(options: argparse.Namespace) -> Hub:
 def _log_beside(
     file: Path, first: Snapshot, options: argparse.Namespace, scene: Hub
 ) -> dict[int, dict[str, float]]:
-    """Read the log beside a dump, by step, where a formula, the title or a tool may need it."""
+    """Read the log in a dump's folder, by step, if a formula, the title or a tool may need it."""
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
-    asked = re.findall(r"[^\W\d]\w*\b(?! *\()", " ".join(filter(None, formulas)))  # no functions
+    asked = re.findall(r"[^\W\d]\w*\b(?! *\()", " ".join(filter(None, formulas)))  # no calls
     known = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
     if known.issuperset(asked) and not (options.script and options.outlines):
         return {}
@@ -186,30 +186,30 @@ def _log_beside(
         with suppress(ScriptError):
             rows += [row for row in read_rows(file.parent / name) if "Step" in row]
     for name in filter(str.isidentifier, dict.fromkeys(name for row in rows for name in row)):
-        scene.interpreter.variables.pop(name, None)  # of a formula the log has the value
+        scene.interpreter.variables.pop(name, None)  # a formula's value is in the log
         if name not in scene.values and name not in KEYWORDS.values():
             scene.values.publish(name)
     return {int(row["Step"]): row for row in rows}
 
 
 def _tools(scene: Hub) -> list[Any]:
-    """List the walls and tools of all runs, where they are now."""
+    """List the walls and tools of all runs, at their present positions."""
     fixes = [part for part in dict.fromkeys(scene.in_runs) if isinstance(part, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
         if np.isnan(tool.depth(scene.domain.lo[None, : scene.domain.dimension])).any():
             raise ScriptError(
-                f"the place of fix '{fix.id}' follows from results of the run, which are not in "
+                f"the position of fix '{fix.id}' depends on results of the run, which are not in "
                 "its script",
                 place=fix.place,
                 expected="walls and tools that move by formulas of time",
-                hint="a log beside the dumps that has them, or dump pyplot during the run",
+                hint="a log with them in the folder of the dumps, or dump pyplot during the run",
             )
     return tools
 
 
 def _live(folders: list[Path]) -> int:
-    """Serve the page of a folder until somebody interrupts."""
+    """Serve the page of a folder until interrupted."""
     from karamelo_py.app.live.folder import FolderPage
 
     if len(folders) > 1:
@@ -224,7 +224,7 @@ def _live(folders: list[Path]) -> int:
 
 
 def _matching(names: Iterable[Path]) -> set[Path]:
-    """Find the files of these names; a pattern stands for all files that match it."""
+    """Expand names and patterns to files."""
     found: set[Path] = set()
     for name in names:
         is_pattern = glob.has_magic(str(name)) and not name.exists()
@@ -238,7 +238,7 @@ def _matching(names: Iterable[Path]) -> set[Path]:
 
 
 def _all_in(files: Iterable[Path]) -> Iterator[Snapshot]:
-    """Read the snapshots in files, those of one after those of another."""
+    """Yield the snapshots of several files in order."""
     return chain.from_iterable(map(read, files))
 
 
@@ -248,12 +248,12 @@ def _number(path: Path) -> int:
 
 
 def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str, Any]:
-    """Read the words of dump pyplot as a script's."""
+    """Parse the options of dump pyplot as in a script."""
     columns = list(first.columns)
     names = SimpleNamespace(
         particle_names=lambda: columns, shown_names=lambda: [*columns, *named_sets(scene)]
     )
-    none = SimpleNamespace(variables={})  # columns are not told from variables of a script
+    none = SimpleNamespace(variables={})  # names of columns take precedence over script variables
     hub = SimpleNamespace(fields=names, values=scene.values, interpreter=none)
     (field,) = (word for word in help_of("dump", "pyplot").parameters if word.name == "field")
     look = {}
@@ -278,22 +278,22 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
 def _chosen(
     look: dict[str, Any], scene: Hub, log: dict[int, dict[str, float]], snapshot: Snapshot
 ) -> Snapshot:
-    """Choose the points that are drawn, with the formula that colours them as a column.
+    """Select the points to draw, and evaluate the formula that colours them as a column.
 
-    The scene has the time of the snapshot then, and the values of its log.
+    Sets the scene to the time of the snapshot and the values of its log.
     """
     columns, field, only = snapshot.columns, look["field"], look["only"]
     values, row = scene.values, log.get(snapshot.step, {})
     for name in values.names():
-        values.set(name, row.get(name, np.nan))  # what a run has to find
+        values.set(name, row.get(name, np.nan))  # computed by a run only
     values.set("time", snapshot.time)
     values.set("timestep", snapshot.step)
     formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
     for name in set().union(*(one.names for one in (*formulas, *filter(None, [look["title"]])))):
         if name not in GLOBAL_SEEDS and name in values and np.isnan(values.get(name)):
             raise ScriptError(
-                f"{name} at step {snapshot.step} is a value that dumps do not hold",
-                expected="a log beside the dumps, with its column and a line for each of them",
+                f"{name} at step {snapshot.step} is not in dumps",
+                expected="a log in the folder of the dumps, with its column and a line for each",
                 hint=f"log_modify(custom, step, time, {name}) in the script of the run",
             )
     numbers = columns["id"].astype(np.int64) - 1
@@ -320,10 +320,10 @@ def _picture(
     scene: Hub,
     chosen: Callable[[Snapshot], Snapshot],
 ) -> Any:
-    """Make the empty picture that suits the first snapshot; place and colours suit all of them."""
+    """Make an empty picture for the first snapshot, with position and colours that fit all."""
     from karamelo_py.output import outlines, pictures
 
-    # A dump holds zeros where the scene has no direction.
+    # A dump has zeros for unused directions.
     dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
     if options.script is not None:
         has = [("dimension", scene.domain.dimension, dimension)]
@@ -335,7 +335,7 @@ def _picture(
                     f"the script has {plural(of_script, noun)}, the dump {of_dump:.0f}",
                     expected="the script of the run that has written the dump, and its -var",
                 )
-        dimension = scene.domain.dimension  # points of a scene in space may all have z = 0
+        dimension = scene.domain.dimension  # points of a 3D scene may all have z = 0
     first, field = chosen(first), look["field"]
     column = field.text if isinstance(field, ColumnFormula) else field
     if column is not None and column not in first.columns:
@@ -370,7 +370,7 @@ def _all(
     made_look: dict[str, Any],
     chosen: Callable[[Snapshot], Snapshot],
 ) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Find corners around all snapshots, and limits of the values of a column in them."""
+    """Find bounds of all snapshots, and limits of a column in them."""
     from karamelo_py.output.pictures import grown, in_window, within
 
     corners, ends, there, left = [], [], 0, 0
@@ -379,8 +379,8 @@ def _all(
         if file_of.setdefault(snapshot.step, path) != path:
             raise ScriptError(
                 f"{file_of[snapshot.step]} and {path} both have step {snapshot.step}: one picture "
-                "would take the place of the other",
-                hint="view one dump after the other, each with a name of its own: -o FILE.*.png",
+                "would overwrite the other",
+                hint="view one dump after the other, with different names: -o FILE.*.png",
             )
         corners.append((snapshot.lo, snapshot.hi))
         columns = in_window(chosen(snapshot).columns, made_look["window"])

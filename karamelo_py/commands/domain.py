@@ -138,7 +138,7 @@ def axisymmetric(hub: Hub, active: bool) -> None:
         raise ScriptError(
             f"the domain begins at x = {domain.lo[0]:g}, and x is a radius",
             argument="active",
-            expected="dimension(2, 0, ...), or more than 0 in the place of 0",
+            expected="dimension(2, 0, ...), or more than 0 instead of 0",
         )
     if hub.solids and active != domain.axisymmetric:
         raise ScriptError(

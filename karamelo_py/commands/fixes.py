@@ -124,7 +124,7 @@ def _define(
     if replaces and ID in own:
         hub.warn(
             f"fix '{ID}' replaces the one of line {own[ID].place.line}",
-            hint="fixes that act at the same time need IDs of their own",
+            hint="fixes that act at the same time need different IDs",
         )
     own.add(ID, new, replace=replaces)
     hub.values.publish_vector(ID, new.published)

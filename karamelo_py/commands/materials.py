@@ -195,7 +195,7 @@ def load_path(
     for name in shear:
         if strains[name] is not None:
             raise ScriptError(
-                f"g{name} and e{name} are the same strain, with and without a turn",
+                f"g{name} and e{name} are the same strain, with and without rotation",
                 argument=f"g{name}",
                 expected="one of them",
             )
@@ -203,7 +203,7 @@ def load_path(
     given = *strains.values(), *stresses.values(), volumetric, duration
     if not turn and all(value is None for value in given):
         raise ScriptError(
-            "no strain and no stress is prescribed: the point would stay where it is",
+            "no strain and no stress is prescribed: nothing would change",
             expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... holds it",
         )
     path = LoadPath(
@@ -363,7 +363,7 @@ def _check_components(path: LoadPath, point: Point, kinematics: str, number: int
         )
     if path.turn and "xy" not in point.free:
         raise ScriptError(
-            f"load path '{path.id}' turns the point, and {kinematics} cannot turn",
+            f"load path '{path.id}' rotates the point, and {kinematics} cannot rotate",
             argument=2 + number,
             hint="kinematics=3D",
         )

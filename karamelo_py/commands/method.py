@@ -75,7 +75,7 @@ def method(
     before = hub.update.method
     if before is not None:
         hub.warn(
-            f"this method takes the place of that of line {before.place.line}",
+            f"this method replaces the one in line {before.place.line}",
             hint="one line method(...)",
         )
     chosen = hub.update.method = parts["method"]
@@ -144,8 +144,8 @@ def scheme(
     update.half_start = start == "half"
     if update.scheme_place is not None and update.scheme_behind == runs:
         hub.warn(
-            f"this scheme takes the place of that of line {update.scheme_place.line}, which no run "
-            "has had",
+            f"this scheme replaces the one in line {update.scheme_place.line}, which no run "
+            "has used",
             hint="one line scheme(...) before a run",
         )
     update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
@@ -305,7 +305,7 @@ class _Call:
         kind, fit = self.names["method"], self.fit
         if self.names["basis"] != "linear":
             raise ScriptError(
-                f"method {kind} maps the corners of domains by linear functions only",
+                f"method {kind} maps the corners of domains with a linear basis only",
                 argument="basis",
                 expected="linear",
             )

@@ -174,7 +174,7 @@ def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
         raise ScriptError(
             f"points of solid '{solid.id}' would leave the domain",
             argument="shift",
-            expected="a shift that keeps the points in the domain",
+            expected="a shift that leaves the points inside the domain",
         )
     if len(step) and (step == step[0]).all():
         lo, hi = moved.lo + step[0], moved.hi + step[0]

@@ -1,4 +1,4 @@
-"""Arguments as a script has them: text first, evaluated only when a value is asked for."""
+"""Script arguments: text, evaluated on request."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ NULL = "NULL"
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
-_GAP = re.compile(r'[\w)"]\s+["\w.]|\w;')  # two words with no more than a blank or ; between them
+_GAP = re.compile(r'[\w)"]\s+["\w.]|\w;')  # two words separated by a blank or ; only
 _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 class Argument:
-    """One argument of a call as the script has it, not evaluated.
+    """One unevaluated argument of a call.
 
-    Its `text` is what is written, without blanks around it, and `place` where that stands.
+    `text` is the argument as written, without surrounding blanks, and `place` its place.
     """
 
     def __init__(self, raw: Raw, interpreter: Any):
@@ -42,7 +42,7 @@ class Argument:
 
     @property
     def statement(self) -> Any:
-        """The statement that the script is at."""
+        """The present statement of the script."""
         return self._interpreter.statement
 
     def __repr__(self) -> str:
@@ -54,10 +54,10 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """Find the word it is: bare, in quotes, or in a text variable; None for arithmetic.
+        """Return it as a word: bare, quoted, or in a text variable; None for arithmetic.
 
-        Words such as ``neo-hookean`` or ``dump.*.gz`` count unless a name in them is known, which
-        makes them arithmetic.
+        ``neo-hookean`` or ``dump.*.gz`` are words, unless they contain a known name, which makes
+        them arithmetic.
         """
         quoted = _QUOTED.fullmatch(self.text)
         if quoted:
@@ -72,7 +72,7 @@ class Argument:
         return None if known else self.text
 
     def words(self, known: Sequence[str] = ()) -> str:
-        """Find the text it stands for where only a word will do, arithmetic or not."""
+        """Return its text where only a word fits, even if it looks like arithmetic."""
         if self.text in known:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
@@ -94,7 +94,7 @@ class Argument:
         return self.text
 
     def value(self, hub: Scene | None) -> Value:
-        """Find the number, text or formula it stands for."""
+        """Evaluate to a number, text or formula."""
         if self.is_null:
             raise ScriptError(
                 "NULL cannot be used here", place=self.place, expected="a number or a formula"
@@ -102,7 +102,7 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def value_with(self, seeds: Sequence[str]) -> Value:
-        """Find the value where the names `seeds` are those that a formula depends on."""
+        """Evaluate with `seeds` as the variables of a formula."""
         own = self._interpreter
         script = copy(own)
         script.variables = own.variables | {name: Expression.seed(name) for name in seeds}
@@ -119,7 +119,7 @@ class Argument:
             raise
 
     def behind(self, count: int) -> Argument:
-        """Cut off the first `count` characters."""
+        """Remove the first `count` characters."""
         return self._from(self._raw.start + count)
 
     def _from(self, start: int, end: int | None = None) -> Argument:
@@ -132,11 +132,11 @@ class Argument:
         return [name for name, value in variables if isinstance(value, float)]
 
     def knows(self, name: str) -> bool:
-        """Tell if a name means something where the argument stands."""
+        """Tell if a name has a meaning at this place."""
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
-        """Find the last place of `text` in it, as an argument of its own."""
+        """Return the last occurrence of `text` in it as an argument."""
         start = self._raw.source.text.rindex(text, self._raw.start, self._raw.end)
         return self._from(start, start + len(text))
 
@@ -149,12 +149,12 @@ class Argument:
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """Find the first argument that may be two, with a comma forgotten between them."""
+    """Return the first argument that may be two with a missing comma."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
 class Named:
-    """Base of parts of a scene that a script names by an ID: for signatures, too."""
+    """Base of parts of a scene that scripts name by an ID; also an annotation."""
 
     id: str = ""
     place: Place | None = None

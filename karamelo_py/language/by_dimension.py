@@ -1,7 +1,7 @@
-"""Argument lists whose length follows from the dimension, such as those of dimension() and block.
+"""Argument lists that depend on the dimension, as in dimension() and block.
 
-A signature says which kinds of arguments a style takes; which *names* they have in 1D, 2D and 3D
-is said here once, and every error shows the form for the dimension in use.
+A signature gives the kinds of arguments; here are their *names* in 1D, 2D and 3D, for errors that
+show the form of the dimension in use.
 """
 
 import math
@@ -15,17 +15,16 @@ from karamelo_py.language.unknown import size_of_cells, words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.expressions import Expression
 
-# Karamelo's own stand-in for infinity; scripts that write it mean INF.
+# Karamelo's value for infinity; scripts that write it mean INF.
 _HUGE = 1e20
 
 
 class Forms:
     """The forms of one argument list, by dimension.
 
-    `pattern` is how a call is written, with ``{names}`` and perhaps ``{dimension}`` in it; `names`
-    are those of the arguments for each dimension, where it has a form. Some arguments are one of a
-    few `words`; INF and EDGE mean the `open_ends` of others (-inf for a lower end, inf for an
-    upper).
+    `pattern` is the form of a call, with ``{names}`` and perhaps ``{dimension}``; `names` has the
+    argument names for each supported dimension. Some arguments are one of a few `words`; INF and
+    EDGE mean the `open_ends` (-inf for a lower end, inf for an upper end).
     """
 
     def __init__(
@@ -42,7 +41,7 @@ class Forms:
         self.open_ends = open_ends or {}
 
     def line(self, dimension: int) -> str:
-        """Write the call as it is written in `dimension`."""
+        """Format the call for `dimension`."""
         names = ", ".join(self.names[dimension])
         return self.pattern.format(dimension=dimension, names=names)
 
@@ -84,7 +83,7 @@ class Forms:
         )
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
-        """Write the call in the words of the script, with what is missing by its name."""
+        """Format the call with the words of the script, and names for missing arguments."""
         names = self.names[dimension]
         words = [argument.text for argument in arguments][: len(names)]
         line = re.sub(r"\[.*?\]", "", self.pattern)
@@ -92,7 +91,7 @@ class Forms:
         size, below = size_of_cells(hub.interpreter) if further == ["h"] else ("", None)
         further = [size] if size else further
         line = line.format(dimension=dimension, names=", ".join([*words, *further]))
-        line += f", behind line {below}, which sets {size}" if below else ""
+        line += f", after line {below}, which sets {size}" if below else ""
         ID = (words_of(arguments[0].statement) or ["ID"])[0]
         return line.replace("(ID,", f"({ID},")
 
@@ -127,9 +126,9 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """Find the finite, constant number that `argument` stands for.
+    """Evaluate `argument` to a finite constant number.
 
-    A number that is not known before a run has been made is NaN in a rehearsal, and passes.
+    A number that only a run can give is NaN in a rehearsal, and accepted.
     """
     value = argument.value(hub)
     kind, hint = "number", None
@@ -149,7 +148,7 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
-    """Return `value`, refused where it is NaN or infinite (NaN passes in a rehearsal)."""
+    """Return `value`; refuse NaN and infinity (NaN is accepted in a rehearsal)."""
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
     raise ScriptError(

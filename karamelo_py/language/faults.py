@@ -1,4 +1,4 @@
-"""Exceptions in code of a style or plug-in as errors of the script that uses it."""
+"""Convert exceptions in styles and plug-ins to errors of the script that uses them."""
 
 import inspect
 import linecache
@@ -15,16 +15,16 @@ from karamelo_py.script.errors import FAILURES, Place, Quit, ScriptError
 
 TRACEBACK = "; --debug shows the traceback"
 
-# Each of these has words of its own elsewhere.
+# These have other messages.
 KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 
 @contextmanager
 def as_script_error(name: str, where: str, code: Any, place: Place | None) -> Iterator[None]:
-    """Turn an exception of a style (``fix drag``) into an error of the script at `place`.
+    """Convert an exception of a style (``fix drag``) to an error of the script at `place`.
 
-    `where` is the part of it that is at work, such as the name of a hook; the file of `code`, a
-    class or function, is looked for in the traceback.
+    `where` is the active part, such as a hook; the traceback is searched for the file of `code`, a
+    class or function.
     """
     try:
         yield
@@ -36,9 +36,9 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
 
 
 def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptError:
-    """Make the error of a script that uses a style (``fix drag``) with a fault in it.
+    """Make the error of a script that uses a faulty style (``fix drag``).
 
-    It names the package; `more` follows its hint.
+    Names the package; `more` is appended to the hint.
     """
     family, _, style = name.rpartition(" ")
     family = family or "command"
@@ -50,7 +50,7 @@ def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptEr
 
 
 def cause_of(error: BaseException) -> str:
-    """Tell in one line what went wrong; of what cannot be compiled, with the user's own line."""
+    """Describe an exception in one line; for code that cannot be compiled, with the user's line."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -61,13 +61,13 @@ def cause_of(error: BaseException) -> str:
 
 
 def _others() -> tuple[str, ...]:
-    """List folders that are not the user's: this program, Python's library, what is installed."""
+    """List folders that are not the user's: this program, Python's library, installed packages."""
     libraries = map(sysconfig.get_path, ("stdlib", "purelib", "platlib"))
     return (str(Path(__file__).parents[1]), *libraries)
 
 
 def steps_to(error: BaseException) -> list[str]:
-    """List the user's lines that led to an exception: ``ropes.py:12 in pull: inner(points)``."""
+    """List the user's lines in a traceback: ``ropes.py:12 in pull: inner(points)``."""
     others = _others()
     return [
         f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}: {frame.line}".rstrip(": ")
@@ -77,13 +77,13 @@ def steps_to(error: BaseException) -> list[str]:
 
 
 def place_of(function: Callable) -> str:
-    """Show where a function in Python begins: `` (spring.py:12)``."""
+    """Format the first line of a Python function: `` (spring.py:12)``."""
     code = function.__code__
     return f" ({Path(code.co_filename).name}:{code.co_firstlineno})"
 
 
 def place_in(code: Any, error: BaseException) -> str:
-    """Show the last line of the own file of `code` that took part: `` (spring.py:28)``."""
+    """Format the last line in the file of `code` in the traceback: `` (spring.py:28)``."""
     try:
         own = inspect.getsourcefile(code)
     except TypeError:

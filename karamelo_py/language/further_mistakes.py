@@ -1,8 +1,8 @@
-"""Further mistakes of a script, behind the first: those that do not follow from it.
+"""Find further, independent mistakes of a script after the first.
 
-The rest of the script is tried, and what a wrong statement would have defined is noted. Statements
-that name it are passed over, and what they would define is noted in turn; the names of commands and
-styles in them are looked up, since these depend on nothing.
+The rest of the script is tried. What a wrong statement would have defined is recorded; statements
+that use it are skipped, and what they would define is recorded in turn. Names of commands and
+styles in them are still checked, because they depend on nothing.
 """
 
 import re
@@ -20,27 +20,27 @@ MOST = 9
 MOST_OF_TEXT = 200  # a script of another program is wrong in every line
 # Nearly everything depends on these.
 _BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "include", "quit"})
-# What these define is needed by a run, others by what names them only.
+# Runs depend on what these define; other definitions matter only where named.
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
-_PLAIN = {"group", "plot", "load_path", "element"}  # have no style
-# Where the style stands among the arguments.
+_PLAIN = {"group", "plot", "load_path", "element"}  # without a style
+# Index of the style among the arguments.
 _STYLED = {name: 2 if name == "dump" else 1 for name in (_SCENE | _NAMED) - _PLAIN}
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 
 
 class Dependents:
-    """Names and kinds that depend on statements that went wrong."""
+    """Names and kinds that depend on failed statements."""
 
     def __init__(self) -> None:
         self.names: set[str] = set()
-        # Of what kinds something may be missing, under a name that nobody knows.
+        # Kinds of parts that may be missing under an unknown name.
         self.kinds: set[str] = set()
 
     def note(self, statement: Statement) -> bool:
-        """Note what `statement` would have defined; False where nothing can be said any more."""
+        """Record what `statement` would define; return False if nothing else can be checked."""
         if isinstance(statement, Assignment):
             self.names.add(statement.name)
         if not isinstance(statement, CommandCall):
@@ -63,7 +63,7 @@ class Dependents:
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:
-        """Guess the command that an unknown one stands for; else note what it may have made."""
+        """Guess the command that an unknown one means; else record what it may have defined."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
@@ -76,16 +76,16 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Tell if a statement names something of that, such as F or F_x of a fix F."""
+        """Tell if a statement uses a missing name, such as F or F_x of a fix F."""
         words = re.findall(r"\w+", statement.raw.code)
         return any(w in self.names or w.rpartition("_")[0] in self.names for w in words)
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Find mistakes in the statements behind the one that failed, in their order.
+    """Find mistakes in the statements after the one that failed, in order.
 
-    The interpreter is behind that statement, of which `first` says what was wrong. Its hub is tried
-    on, and of no use thereafter.
+    The interpreter is past that statement, whose error is `first`. Its hub is used for trials and
+    must not be used afterwards.
     """
     found = first.others
     seen = {error.message: error for error in (first, *found)}
@@ -93,9 +93,9 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     dependents = Dependents()
 
     def tell(error: ScriptError) -> None:
-        # One name that is not known may stand in many lines. It follows where an ID was given
-        # twice: the second of the two was meant to have another, which nobody knows. So it does
-        # behind a command of another program that says by other names what one here makes.
+        # An unknown name may appear in many lines. It is a consequence if an ID was given twice
+        # (the second was meant to have another name), or after a command of another program, which
+        # names things differently.
         for one in (error, *error.others):
             twice = {other.kind for other in seen.values() if other.code == "already-used"}
             follows = one.code == "unknown-ID" and one.kind in twice | dependents.kinds
@@ -123,7 +123,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
                 wrong = statement
             except Quit:
                 break
-            except Exception:  # What is left of the scene is not whole.
+            except Exception:  # the scene is incomplete
                 passed_over += _rest_of(interpreter)
     for statement in passed_over:
         dependents.note(statement)
@@ -133,13 +133,13 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Find further mistakes in a script whose text is wrong somewhere: in its text and in names.
+    """Find further mistakes in a script with a syntax error: syntax, and names.
 
-    Where there are too many to be read, the last one says how many there are besides.
+    If there are too many, the last one gives the number of the rest.
     """
     found = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
     more = len(found) - MOST_OF_TEXT
-    besides = [ScriptError(f"and {plural(more, 'more mistake')} behind these")] if more > 0 else []
+    besides = [ScriptError(f"and {plural(more, 'more mistake')} after these")] if more > 0 else []
     return [*found[:MOST_OF_TEXT], *besides]
 
 
@@ -149,7 +149,7 @@ def misnamed(
     """Find wrong names of commands and styles in statements.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
-    are right, also where what would have one of the `wanting` names went wrong.
+    are valid, even if the definition of a `wanting` name failed.
     """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}
@@ -196,7 +196,7 @@ def _look_up(
 
 
 def _rest_of(interpreter: Any) -> list[Statement]:
-    """List the statements that are left, up to where the script ends."""
+    """List the remaining statements, up to the end of the script."""
     rest = iter(interpreter.next_statement, None)
     return list(takewhile(lambda statement: statement.raw.code.strip() != "quit", rest))
 

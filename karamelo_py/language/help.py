@@ -12,8 +12,8 @@ from karamelo_py.language import signature
 class Help:
     """The help about a command or style.
 
-    Beside the `syntax`: the first line and the rest of the docstring, parameters with their kinds,
-    and further sections by title, such as Example, Notes, See Also.
+    Has the `syntax`, the first line and the rest of the docstring, parameters with their kinds, and
+    further sections by title, such as Example, Notes, See Also.
     """
 
     name: str
@@ -30,11 +30,11 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Help about a command or style, from its signature and docstring, and those of its bases."""
+    """Make the help for a command or style, from its signature and docstring, and its bases."""
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     descriptions: dict[str, str] = {}
-    # What a base class describes holds for the styles made from it.
+    # Descriptions in a base class hold for derived styles.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
         for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):
             inner = sections_of(doc or "")[1]

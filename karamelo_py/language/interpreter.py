@@ -1,4 +1,4 @@
-"""Runs statements: keeps variables, finds commands, marks where something is wrong."""
+"""Executes statements: variables, commands, and places of errors."""
 
 import re
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ from karamelo_py.script.parser import parse, parse_expression, read_script
 
 @dataclass
 class _Frame:
-    """A script in progress: its statements and which comes next."""
+    """A script in progress: its statements, and the next one."""
 
     statements: list[syntax.Statement]
     path: Path | None
@@ -27,41 +27,41 @@ class _Frame:
 
 
 class Interpreter:
-    """Runs a script on a hub, whose ``interpreter`` and ``place`` it sets."""
+    """Executes a script on a hub, whose ``interpreter`` and ``place`` it sets."""
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
         self.variables: dict[str, Value] = {}
         hub.interpreter = self
-        self.files: list[Path] = []  # that were read
-        self.files_ahead: list[Path] = []  # and those that a rehearsal has read
+        self.files: list[Path] = []  # files read
+        self.files_ahead: list[Path] = []  # files read by a rehearsal
         self.frames: list[_Frame] = []
-        self.statement: syntax.Statement | None = None  # the last that was begun
-        self.record = Record()  # of what was done so far, for files to go on from
-        # Until the script is where an earlier run of it left off.
+        self.statement: syntax.Statement | None = None  # last one started
+        self.record = Record()  # executed statements, for restart files
+        # Until the script has reached the state of an earlier run.
         self.replay: Replay | None = None
-        # Variables from the command line, in the place of those that the script assigns.
+        # Variables of the command line, which override assignments.
         self.presets = Presets(self, presets or {})
 
-    # -- running ----------------------------------------------------------------------------------
+    # -- execution --------------------------------------------------------------------------------
 
     def run_file(self, path: str | Path) -> None:
-        """Run a script from a file."""
+        """Execute a script file."""
         path = Path(path)
         self.files.append(path)
         self._run(read_script(path), str(path), path)
 
     def run_text(self, text: str, name: str = "<text>") -> None:
-        """Run a script that is in memory."""
+        """Execute a script given as text."""
         self._run(text, name)
 
     @property
     def waits(self) -> bool:
-        """Tell if a script is in the middle of its statements."""
+        """Tell if a script is between its first and last statement."""
         return bool(self.frames)
 
     def include(self, name: str) -> None:
-        """Run another script at this place; the name is relative to the script that asks."""
+        """Execute another script here; `name` is relative to the present script."""
         path = self.included(name, self.folder)
         there = path.exists()
         if any(there and frame.path and frame.path.samefile(path) for frame in self.frames):
@@ -86,16 +86,16 @@ class Interpreter:
         self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
-        """Find the file that ``include(name)`` means in a script of this folder."""
+        """Return the file meant by ``include(name)`` in a script in `folder`."""
         path = folder / name
         elsewhere = self._working_folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
-        """Run all that comes after the statement in progress on another hub.
+        """Execute everything after the present statement on another hub.
 
-        The variables there are copies. So mistakes late in a script are found before a long run:
-        the first, with those behind it that do not follow from it.
+        Variables there are copies. This finds mistakes late in a script before a long run: the
+        first, and later independent ones.
         """
         other = self._copy(hub)
         try:
@@ -109,7 +109,7 @@ class Interpreter:
             self.files_ahead = other.files
 
     def _copy(self, hub: Any) -> "Interpreter":
-        """Copy the place in the script, on another hub."""
+        """Copy the position in the script, on another hub."""
         other = Interpreter(hub, self.presets)
         other.variables = dict(self.variables)
         other.files = list(self.files)
@@ -147,7 +147,7 @@ class Interpreter:
             raise
 
     def go_on(self) -> None:
-        """Carry out what is left of all scripts in progress, such as one that waits (`Pause`)."""
+        """Execute the rest of all scripts in progress, such as a waiting one (`Pause`)."""
         try:
             self._finish()
         except Pause:
@@ -156,7 +156,7 @@ class Interpreter:
             self.frames.clear()
             self.hub.answered = True
         except ScriptError as error:
-            # Once a run has begun, the rest of the script has been tried.
+            # At a run, the rest of the script has been rehearsed.
             if not getattr(self.hub, "rehearsed", True):
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
@@ -178,13 +178,13 @@ class Interpreter:
             try:
                 self.execute(frame.statements[frame.next - 1])
             except Pause:
-                # In the script that has the run; those that include it are at their next line.
+                # In the script of the run; scripts that include it are at their next line.
                 if frame is self.frames[-1]:
                     frame.next -= 1
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """Take the statement that comes next, in whichever file; it counts as carried out."""
+        """Take the next statement, from any file; it counts as executed."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -194,7 +194,7 @@ class Interpreter:
         return None
 
     def execute(self, statement: syntax.Statement) -> None:
-        """Carry out one statement; errors know its place, and which scripts include it."""
+        """Execute one statement; errors get its place, and the scripts that include it."""
         self.statement = statement
         self.hub.place = statement.place
         depth = len(self.frames)
@@ -233,7 +233,7 @@ class Interpreter:
             raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
-        """List the include statements of the first `depth` scripts, the nearest first."""
+        """List the include statements of the first `depth` scripts, nearest first."""
         frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
@@ -280,11 +280,11 @@ class Interpreter:
         try:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
-            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # no L/20
+            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # excludes L/20
             if error.code == "unknown-name" and re.fullmatch(
                 rf"{letters}([-/.]\w+)*[-/.]{letters}", word
             ):
-                error.hint = f'a text stands in quotes: "{word}"'
+                error.hint = f'put text in quotes: "{word}"'
             raise
         self.presets.follow(statement)
 
@@ -298,27 +298,27 @@ class Interpreter:
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
         else:
-            # A function alone on a line does nothing, but its mistakes count.
+            # A function alone on a line has no effect, but its mistakes count.
             self.evaluate(parse_expression(raw), raw)
 
     # -- expressions ------------------------------------------------------------------------------
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
-        """Evaluate an expression now: to a number, a text or a formula."""
+        """Evaluate an expression to a number, a text or a formula."""
         return evaluation.evaluate(node, raw, self)
 
     def knows(self, name: str) -> bool:
-        """Tell if a name means something in an expression."""
+        """Tell if a name has a meaning in an expression."""
         return (
             name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values
         )
 
     def hides(self, name: str) -> bool:
-        """Tell if a variable has the name of a function or command, which it hides then."""
+        """Tell if a variable hides a function or command of this name."""
         return name in self.variables
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
-        """Find the value of a name in an expression."""
+        """Return the value of a name in an expression."""
         if name in self.variables:
             return self.variables[name]
         if name in SEEDS:
@@ -330,7 +330,7 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """Tell if a name can stand in a script here, be it as a call or further down."""
+        """Tell if a name has any meaning here, as a call or in later lines."""
         known = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             known
@@ -339,14 +339,14 @@ class Interpreter:
         )
 
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
-        """Find the value of a call inside an expression that is not a function."""
+        """Return the value of a command called in an expression."""
         name = node.name
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))
         if not registry.knows("command", name) or self.hides(name):
             raise unknown.unknown_call(self, name, place, statement=False)
         target = registry.find("command", name)
-        # What gives no value must not be carried out here, least of all a run.
+        # A command without a value must not be executed here, least of all a run.
         if getattr(target, "__annotations__", {}).get("return", "") in (None, "None"):
             raise unknown.no_value(name, place)
         arguments = [

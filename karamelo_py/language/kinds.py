@@ -1,4 +1,4 @@
-"""Kinds of arguments: what an annotation asks for, how to say it, how to make it."""
+"""Kinds of arguments: conversion and description, by annotation."""
 
 import inspect
 import math
@@ -19,12 +19,12 @@ from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
 
-# Beyond it a number cannot tell one integer from the next.
+# Beyond this, floats cannot represent every integer.
 _LARGEST_INTEGER = 2**53
 
 
 def _rounding(value: float) -> float:
-    """Return how far a result such as 0.3/0.1 may be from a whole number."""
+    """Return the tolerance for a result such as 0.3/0.1 to count as an integer."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
 
 
@@ -33,7 +33,7 @@ def _rounding(value: float) -> float:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A condition on a number: `text` says it, `holds` decides."""
+    """A condition on a number: its `text`, and the test `holds`."""
 
     text: str
     holds: Callable[[float], bool]
@@ -44,12 +44,12 @@ NonNegative = Constraint("of at least 0", lambda value: value >= 0)
 
 
 def AtLeast(least: float) -> Constraint:
-    """Ask for a number of at least `least`."""
+    """Require a number of at least `least`."""
     return Constraint(f"of at least {least:g}", lambda value: value >= least)
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Ask for a number from `lo` to `hi`; ends named by `open` (True: both) are excluded."""
+    """Require a number from `lo` to `hi`; ends named by `open` (True: both) are excluded."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -65,10 +65,10 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """For signatures: a file to read, looked for in the current folder, then beside the script."""
+    """Annotation: a file to read, searched in the current folder, then in the script's folder."""
 
     script_kind = "the name of a file"
-    # Of files that can be read as what is asked for, in small letters; None: of any.
+    # Supported endings in lower case; None: any.
     endings: Container[str] | None = None
 
     @classmethod
@@ -85,7 +85,7 @@ class InputFile:
         what = "is a folder, not a file" if here.is_dir() else "does not exist"
         if here.exists() and not here.is_dir():
             what = "is a pipe or a device, not a file"
-        expected = "a file in the current folder or beside the script"
+        expected = "a file in the current folder or the folder of the script"
         hint = meant(here.name, [p.name for p in files])
         message = f"the file {name} {what}"
         place, code = argument.place, "no-file"
@@ -93,13 +93,13 @@ class InputFile:
 
 
 class TableFile(InputFile):
-    """For signatures: a file with numbers in columns."""
+    """Annotation: a file with numbers in columns."""
 
     endings = ("", ".csv", ".dat", ".tsv", ".txt")
 
 
 class OutputFile:
-    """For signatures: a file to write; its folder must exist."""
+    """Annotation: a file to write; its folder must exist."""
 
     script_kind = "the name of a file"
 
@@ -142,7 +142,7 @@ def _file_name(argument: Argument) -> str:
 
 
 class Unfit(Exception):
-    """An argument is of another kind; `got` says what it is."""
+    """An argument is of another kind, described by `got`."""
 
     def __init__(self, got: str, place: Place | None = None, hint: str | None = None):
         super().__init__(got)
@@ -153,9 +153,9 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """The kind of an argument: its words, and the way to make a value of it.
+    """The kind of an argument: description and conversion.
 
-    `words` are the only ones that fit, where there are such; `family` is that of styles it names.
+    If there are `words`, only these fit; `family` is the family of styles that it names.
     """
 
     text: str
@@ -186,7 +186,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
         raise Unfit(f"a formula of {names}", hint=f"value({argument.text}) is its present value")
     if isinstance(value, str):
         number = value.strip()
-        hint = f"numbers stand without quotes: {number}" if NUMBER.fullmatch(number) else None
+        hint = f"write numbers without quotes: {number}" if NUMBER.fullmatch(number) else None
         raise Unfit(_shown(value), hint=hint)
     if math.isnan(value) and not getattr(hub, "rehearsing", False):
         raise Unfit("NaN, which is not a number")
@@ -194,7 +194,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
 
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
-    """Suggest for an unknown name no other that changes in a run, which is no number here."""
+    """Suggest only numbers for an unknown name, not values that change in a run."""
     name, alike, numbers = error.name or "", error.alike, argument.numbers()
     if error.code != "unknown-name" or alike is None or "value" in argument.text:
         return
@@ -207,7 +207,7 @@ def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
 def _to_integer(hub: Any, argument: Argument) -> int:
     value = _to_number(hub, argument)
     if math.isnan(value):
-        return 1  # A result that a rehearsal does not have; 1 passes every check.
+        return 1  # unknown in a rehearsal; 1 passes every check
     if math.isinf(value) or abs(value - round(value)) > _rounding(value):
         raise Unfit(number_text(value))
     if abs(value) > _LARGEST_INTEGER:
@@ -229,13 +229,13 @@ def _to_text(hub: Any, argument: Argument) -> str:
 
 @dataclass(frozen=True)
 class StyleOf:
-    """Annotation of a word that names a style: the name of one wins over a variable."""
+    """Annotation of a style name; a style takes precedence over a variable of its name."""
 
     family: str
     script_kind = "a word"
 
     def from_script(self, hub: Any, argument: Argument) -> str:
-        """Read the name as it stands, or what a text variable of another name holds."""
+        """Read the name as written, or the content of a text variable."""
         if registry.knows(self.family, argument.text):
             return argument.text
         joined = "-".join(argument.text.split())
@@ -294,7 +294,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Find the kind that an annotation asks for; a TypeError where there is none."""
+    """Return the kind for an annotation; TypeError if it is not supported."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:
@@ -316,7 +316,7 @@ def kind_of(annotation: Any) -> Kind:
 
 
 def is_raw(kind: Kind) -> bool:
-    """Tell if arguments of this kind are left to the callee as they are."""
+    """Tell if arguments of this kind are passed unevaluated."""
     return kind is _RAW
 
 
@@ -337,7 +337,7 @@ def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
 def _union(kinds: list[Kind]) -> Kind:
     nullable = any(kind.nullable for kind in kinds)
     words = tuple(word for kind in kinds for word in kind.words)
-    # Words first: a literal word that is known wins over a variable of that name.
+    # Words first: a literal word takes precedence over a variable of that name.
     tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
     def convert(hub: Any, argument: Argument) -> Any:

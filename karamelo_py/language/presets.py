@@ -1,4 +1,4 @@
-"""Variables from the command line, which win over those that a script assigns."""
+"""Variables from the command line, which override assignments of a script."""
 
 import re
 from collections.abc import Mapping
@@ -17,17 +17,17 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Text by name, as it was given; the script's own assignment of such a name is passed over."""
+    """Text by name, as given; assignments of these names in the script are skipped."""
 
     def __init__(self, script: Any, given: Mapping[str, str]):
         super().__init__(given)
         self._script = script
-        # Those that may have to be numbers, and of these what a mistake was put down to.
+        # Those that may have to be numbers, and mistakes attributed to them.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
-        # Which of them a variable is made of, by its name.
+        # Presets that each variable depends on, by its name.
         self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in given}
-        if isinstance(given, Presets):  # of a script that this one is a copy of
+        if isinstance(given, Presets):  # of a script that this one copies
             vars(self).update(vars(given), _script=script, _made_of=dict(given._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
@@ -56,13 +56,13 @@ class Presets(dict[str, str]):
                 variables[name] = present
 
     def stand_for(self, statement: Assignment) -> None:
-        """Take the place of what a script assigns; no text takes that of a number."""
+        """Replace an assignment of the script; a text does not replace a number."""
         name, variables = statement.name, self._script.variables
-        # What was a word at first may have become an expression of variables.
+        # A word may have become an expression of variables.
         if isinstance(variables.get(name), str):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
-            # A method may take a text for a number; a mistake is told where it is used.
+            # A method may take a text for a number; the mistake is reported where it is used.
             own = None
             with suppress(ScriptError):
                 own = self._script.evaluate(statement.node, statement.right)
@@ -71,17 +71,17 @@ class Presets(dict[str, str]):
                 self._texts[name] = statement.right.code.strip()
 
     def follow(self, statement: Assignment) -> None:
-        """Note what a script makes of them."""
+        """Record how a script uses them."""
         if self:
             self._made_of[statement.name] = self._in(statement.right.code)
 
     def _in(self, code: str) -> dict[str, None]:
-        """Those that some code is made of."""
+        """Presets that some code depends on."""
         words = re.findall(_WORD, re.sub(r'"[^"]*"', " ", code))
         return {name: None for word in words for name in self._made_of.get(word, ())}
 
     def blame(self, statement: Statement, error: ScriptError) -> None:
-        """Say so where a mistake may come from them: from numbers, or texts in their place."""
+        """Add a remark if a mistake may come from presets: numbers, or texts instead of numbers."""
         place = error.place
         if place not in (None, statement.place) and not error.hint:
             marked = place.text[place.column - 1 : place.column - 1 + place.length]
@@ -106,9 +106,9 @@ class Presets(dict[str, str]):
     def _collect(
         self, statements: list[Statement], folder: Path, words: set, assigned: dict, seen: list
     ) -> bool:
-        """Add the words and assigned names of statements and of all scripts that they include.
+        """Collect words and assigned names of statements and of all included scripts.
 
-        False where a script that is included cannot be told before it is.
+        Returns False if an included script is not known in advance.
         """
         code = statements[0].raw.source.text if statements else ""
         words.update(re.findall(_WORD, re.sub(r'"[^"\n]*"|#[^\n]*', " ", code)))

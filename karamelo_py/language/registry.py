@@ -1,4 +1,4 @@
-"""Families of commands and styles: built-in ones are listed in styles.toml, others by packages.
+"""Families of commands and styles: built-in ones in styles.toml, others from packages.
 
 A package offers a style with a line in its pyproject.toml, for example::
 
@@ -25,7 +25,7 @@ _loaded: dict[tuple[str, str], Any] = {}
 
 @cache
 def _families() -> dict[str, dict[str, list[EntryPoint]]]:
-    """Family -> name -> entry points (more than one where packages clash)."""
+    """Family -> name -> entry points (several if packages clash)."""
     table = {
         family: {name: [EntryPoint(name, PREFIX + at, PREFIX + family)] for name, at in one.items()}
         for family, one in tomllib.loads(BUILT_IN.read_text(encoding="utf-8")).items()
@@ -50,22 +50,22 @@ def _origin(entry: EntryPoint) -> str:
 
 
 def families() -> list[str]:
-    """List names of all families of words for scripts, such as command, fix, region."""
+    """List all families, such as command, fix, region."""
     return [family for family in _families() if family != "engine"]
 
 
 def names(family: str) -> list[str]:
-    """List names of all styles of `family`, sorted."""
+    """List all styles of `family`, sorted."""
     return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
 
 
 def knows(family: str, name: str) -> bool:
-    """Tell if `family` has a style of this name (which may still be broken)."""
+    """Tell if `family` has a style of this name (which may be broken)."""
     return name in _families().get(family, {})
 
 
 def name_of(family: str, style: type) -> str:
-    """Find the style's name of a class; of one that a style is made of too, its own ``style``."""
+    """Return the style name of a class; for classes with several, its attribute ``style``."""
     own = f"{style.__module__}:{style.__qualname__}"
     for name, entries in _families().get(family, {}).items():
         if any(entry.value == own for entry in entries):
@@ -74,12 +74,12 @@ def name_of(family: str, style: type) -> str:
 
 
 def origin(family: str, name: str) -> str:
-    """Name the package that offers a style, with its version."""
+    """Return the package of a style, with its version."""
     return " and ".join(_origin(entry) for entry in _entries(family, name))
 
 
 def find(family: str, name: str) -> Any:
-    """Find the class or function behind a style; imported when it is first asked for.
+    """Return the class or function of a style, imported on first use.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """Find the same for a statement that has an ID in front of it, and not the style."""
+    """The same for a statement whose first argument is an ID, not the style."""
     if not knows(family, name) and knows(family, ID):
         raise ScriptError(
             f"'{ID}' is a style, and the ID comes first",
@@ -141,11 +141,11 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
 
 
 def foreign() -> list[tuple[str, str]]:
-    """List styles of other packages that have been asked for."""
+    """List the styles of other packages used so far."""
     return [key for key, style in _loaded.items() if not style.__module__.startswith(PREFIX)]
 
 
 def forget() -> None:
-    """Look for packages anew (tests install and remove them)."""
+    """Search packages again (tests install and remove them)."""
     _families.cache_clear()
     _loaded.clear()

@@ -1,4 +1,4 @@
-"""A script gone through once more, up to the place where an earlier run of it left off."""
+"""Repeat a script up to the place where an earlier run stopped."""
 
 import re
 from collections.abc import Iterable
@@ -13,9 +13,9 @@ _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
 def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
-    """Write the text of a statement without what means nothing: blanks, comments, line ends.
+    """Return the text of a statement without blanks, comments and line ends.
 
-    Nor has it the keywords `without` which it is read.
+    Keywords in `without` are omitted, too.
     """
     text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
     for word in without:
@@ -25,30 +25,30 @@ def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
 
 @dataclass
 class Record:
-    """The statements that a script has done so far, in the order in which they were begun.
+    """The statements executed so far, in order.
 
-    Commands that only say how a run continues or what it writes (``may_differ``) are not in it. By
-    the number of a statement it has the `values` that its calls of value(...) gave.
+    Commands that only control how a run continues or what it writes (``may_differ``) are omitted.
+    `values` has the results of value(...) by statement number.
     """
 
     statements: list[str] = field(default_factory=list)
     values: dict[int, list[float]] = field(default_factory=dict)
 
     def note(self, value: float) -> None:
-        """Note that a call of value(...) in the last statement gave `value`."""
+        """Record the result of a call of value(...) in the last statement."""
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
     def forget_from(self, number: int) -> None:
-        """Forget the statements from `number` on, which have not been done, and their values."""
+        """Remove the statements from `number` on, which were not executed, and their values."""
         del self.statements[number:]
         self.values = {k: given for k, given in self.values.items() if k < number}
 
 
 class Replay:
-    """Compares a script that is gone through once more with the record of the first time.
+    """Compares a repeated script with the record of the first time.
 
-    The record is of what was done up to the state that is gone on from, its last statement perhaps
-    `within`, in progress then: a run. Messages name the `file` that it comes from.
+    The record ends at the restart state; its last statement may have been in progress (`within`): a
+    run. Messages name the `file` of the record.
     """
 
     def __init__(self, record: Record, within: bool, file: str):
@@ -64,11 +64,11 @@ class Replay:
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
-        """Take the next statement, `text`; refuse another one than the first time."""
+        """Take the next statement, `text`; refuse it if it differs from the record."""
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]
-        # A run that was in progress may become longer or shorter.
+        # An unfinished run may become longer or shorter.
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
                 raise self._was_over(before, place)
@@ -77,8 +77,8 @@ class Replay:
             raise error
 
     def _was_over(self, run: str, place: Place | None) -> ScriptError:
-        """Make the error for another length of a run that the state of the file lies behind."""
-        behind = "" if self.within else f", a further run behind {self.record.statements[-1]}"
+        """Make the error for a changed length of a run that ended before the state of the file."""
+        behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
         return ScriptError(
             f"{self.file} was written when this run was over, by {run}",
             place=place,
@@ -87,7 +87,7 @@ class Replay:
         )
 
     def _longer_by(self, before: str, text: str) -> str | None:
-        """Give a run that was in progress the length that a variable of it now has."""
+        """Give an unfinished run the length that one of its variables now gives."""
         run = self.record.statements[-1]
         name, assigns, value = text.partition("=")
         if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
@@ -96,15 +96,15 @@ class Replay:
         return (
             None
             if longer == run
-            else f"leave {before} as it was here, and write {longer} in the place of {run}"
+            else f"leave {before} as it was here, and write {longer} instead of {run}"
         )
 
     def value(self) -> float:
-        """Look up the number that the next value(...) of the present statement gave."""
+        """Return the recorded result of the next value(...) in the present statement."""
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, place: Place | None = None) -> ScriptError:
-        """Make the error for a script that is not the one that wrote the file."""
+        """Make the error for a script that differs from the one that wrote the file."""
         return ScriptError(
             f"{self.file} was written by another script: {message}",
             place=place,
@@ -114,4 +114,4 @@ class Replay:
         )
 
     def _state_alone(self) -> str:
-        return f"read_restart({self.file}) in a script of its own takes the state alone"
+        return f"read_restart({self.file}) in a separate script takes only the state"

@@ -1,11 +1,11 @@
-"""The scene as parts below the hub may ask it."""
+"""The interface of the scene for lower layers."""
 
 from pathlib import Path
 from typing import Any, Protocol
 
 
 class Scene(Protocol):
-    """The hub, as parts see it that the hub itself is made of (:mod:`karamelo_py.scene.hub`)."""
+    """The hub, as seen by the parts it is made of (:mod:`karamelo_py.scene.hub`)."""
 
     console: Any
     settings: Any
@@ -30,7 +30,7 @@ class Scene(Protocol):
 
     @property
     def simulation(self) -> Any:
-        """The arrays of the scene as it is now."""
+        """The arrays of the present scene."""
 
     @property
     def lattices(self) -> list:
@@ -42,7 +42,7 @@ class Scene(Protocol):
     def warn(
         self, message: str, place: Any = None, hint: str | None = None, expected: str | None = None
     ) -> None:
-        """Tell the user of something that may not be meant."""
+        """Warn the user."""
 
     def rehearse(self) -> None:
-        """Try the rest of the script, once, before the first work that takes time."""
+        """Try the rest of the script once, before the first expensive work."""

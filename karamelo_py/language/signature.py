@@ -1,16 +1,15 @@
-"""The signature is the syntax: from a script's arguments to a Python call, and to help about it.
+"""Signatures define syntax: they convert script arguments to a Python call, and give help.
 
-Commands are functions and styles are classes; the first parameter is the hub, the others say by
-their annotations what a script has to give::
+Commands are functions and styles are classes. The first parameter is the hub; the annotations of
+the others define the arguments::
 
     class Gravity(Fix):
         def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
 
-Annotations that are understood: float, int, bool, str, Literal words, Expression, InputFile,
-TableFile, OutputFile, Argument (left to the callee), any class with a classmethod
-``from_script(cls, hub, argument)``, and unions of these, where None is the word NULL. Constraints
-are added with Annotated. ``*args`` take any number, keyword-only parameters are given as
-``name=value``.
+Supported annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile,
+OutputFile, Argument (left to the callee), classes with a classmethod
+``from_script(cls, hub, argument)``, and unions of these, with None for the word NULL. Annotated
+adds constraints. ``*args`` take any number; keyword-only parameters are given as ``name=value``.
 """
 
 import inspect
@@ -48,9 +47,9 @@ __all__ = [
 
 @cache
 def parameters(target: Callable) -> list[Parameter]:
-    """List the parameters of a command or style, without the hub; of a record, its fields.
+    """List the parameters of a command or style, without the hub; for a record, its fields.
 
-    A TypeError says that the signature cannot be understood, a fault of whoever wrote it.
+    Raises TypeError if the signature is not supported, which is a fault of its author.
     """
     record = is_record(target)
     try:
@@ -70,8 +69,8 @@ def parameters(target: Callable) -> list[Parameter]:
 def is_record(target: Any) -> bool:
     """Tell if a style is a NamedTuple, a tag that needs no hub.
 
-    Its fields are its arguments, or those of its classmethod ``given`` where it has one. A method
-    ``checked`` returns what is used in its place.
+    Its fields are its arguments, or the parameters of its classmethod ``given``. A method
+    ``checked`` returns a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 
@@ -91,10 +90,10 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 def call(
     target: Callable, hub: Any, arguments: Sequence[Argument], name: str, given: Any = None
 ) -> Any:
-    """Call a command or make a style with the hub and a script's arguments; note them in `given`.
+    """Call a command or make a style with the hub and script arguments; store values in `given`.
 
-    The user calls it by `name`: ``run``, or ``fix body_force``. Whatever is wrong, with the count
-    or kind of arguments or in the target itself, is a ScriptError with a place in the script.
+    `name` is the user's name for it: ``run``, or ``fix body_force``. Raises ScriptError with a
+    place for anything wrong with the arguments or in the target itself.
     """
     try:
         expected = parameters(target)
@@ -140,9 +139,9 @@ def call(
 def style_of(
     hub: Any, family: str, ID: str, style: str, arguments: Sequence[Argument], given: Any = None
 ) -> Any:
-    """Make what a style of a family, called `ID` by the script, makes of its arguments.
+    """Make a style of a family, with the `ID` in the script.
 
-    Their values are noted in `given`, a dict, by name.
+    Argument values are stored in `given`, a dict, by name.
     """
     with in_new_words(family, ID, style, arguments):
         target = registry.called(family, ID, style)
@@ -152,9 +151,9 @@ def style_of(
 def remade(
     hub: Any, family: str, ID: str, style: str, given: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
-    """Make a law again from the values `given` to it, but for those of ``name=value`` arguments.
+    """Make a law again from its values `given`, changed by ``name=value`` arguments.
 
-    Returns what was made, and its values.
+    Returns the law and its values.
     """
     target, name = registry.called(family, ID, style), f"{family} {style}"
     expected = {p.name: p for p in parameters(target)}
@@ -186,7 +185,7 @@ def remade(
 
 @contextmanager
 def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]) -> Iterator[None]:
-    """Let an error about a line of a former Karamelo end in the line to write."""
+    """Add the current form to errors about lines of an older Karamelo."""
     try:
         yield
     except ScriptError as error:
@@ -197,7 +196,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
-    """Call a command or make a style with values; a fault of its author is told as such."""
+    """Call a command or make a style with values; report faults as its author's."""
     place = getattr(hub, "place", None)
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
@@ -218,12 +217,12 @@ def _bind(
     name: str,
     bound: dict[str, list[Argument]],
 ) -> None:
-    """Add to `bound` the arguments of each parameter: by position, or by name where it is given."""
+    """Add to `bound` the arguments of each parameter, by position or by name."""
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
     given: list[Argument] = []
-    # Raw arguments are passed on to a style, which knows the names.
+    # Raw arguments are passed to a style, which knows the names.
     passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
         word, value = argument.keyword() or ("", argument)
@@ -245,7 +244,7 @@ def _bind(
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
-    """Convert an argument, the one of this number, to the value of a parameter."""
+    """Convert an argument, with this index, to the value of a parameter."""
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
         raise explain.misfit(parameter, argument, number, Unfit(NULL))
     try:
@@ -259,7 +258,7 @@ def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | No
 
 
 def _joined(expected: list[Parameter]) -> str:
-    """Write ``a, b[, c[, d]][, e=...]``: arguments as they are written."""
+    """Format ``a, b[, c[, d]][, e=...]``: arguments as written."""
     text, open_brackets = "", 0
     for parameter in expected:
         comma = ", " if text else ""
@@ -275,12 +274,12 @@ def _joined(expected: list[Parameter]) -> str:
     return text + "]" * open_brackets
 
 
-# The commands that name styles of families without a command of their own.
+# Commands that name styles of families without a command.
 _HOMES = {"transfer": "method", "basis": "method"}
 
 
 def syntax(target: Callable, name: str) -> str:
-    """Write the line that shows how a command or style is called."""
+    """Format the line that shows how a command or style is called."""
     own = getattr(target, "syntax", None)
     if not isinstance(own, str):
         own = _joined(documented(target))
@@ -301,11 +300,11 @@ def syntax(target: Callable, name: str) -> str:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """List parameters for help: with the word that chooses a variant of a style."""
+    """List parameters for help, including the word that selects a variant of a style."""
     variants = getattr(target, "variants", None)
     if not variants:
         return parameters(target)
-    # A method chooses by it the shape of domains, which must have one.
+    # For a method it selects the shape of domains, which must have one.
     needed = not is_record(target)
     default = getattr(target, "default_variant", None)
     kind = kind_of(Literal[tuple(variants)])

@@ -1,4 +1,4 @@
-"""Names that nothing answers to, or that cannot be given: what may have been meant."""
+"""Unknown names, and names that cannot be used: errors with suggestions."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,7 +29,7 @@ MEANINGS = {
 
 
 def unknown_statement(script: Any, name: str) -> ScriptError:
-    """Make the error for a statement that is no more than a name nobody knows."""
+    """Make the error for a statement that is just an unknown name."""
     meaning = "quit" if name.lower() in ("exit", "stop", "end") else name
     known = ["quit", *registry.names("command"), *script.variables]
     message = f"'{name}' is neither a command nor a variable"
@@ -38,7 +38,7 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
 
 
 def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
-    """Make the error for a call of what is no command, or no function."""
+    """Make the error for a call of an unknown command or function."""
     commands = registry.names("command")
     what = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
@@ -60,8 +60,8 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
 
 
 def no_value(name: str, place: Any) -> ScriptError:
-    """Make the error for a command that gives no value in an expression."""
-    message, hint = f"{name}(...) gives no value", f"{name}(...) stands on a line of its own"
+    """Make the error for a command without a value in an expression."""
+    message, hint = f"{name}(...) gives no value", f"{name}(...) goes on a separate line"
     expected = "a function, or a command that gives a value, such as value(...)"
     return ScriptError(message, place=place, expected=expected, hint=hint)
 
@@ -70,7 +70,7 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     """Make the error for a name in an expression."""
     kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
-        expected = "a number or formula; NULL, INF and EDGE stand alone, where a command knows them"
+        expected = "a number or formula; NULL, INF and EDGE are arguments by themselves"
         return ScriptError(f"{name} is not a number", place=place, expected=expected)
     if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
@@ -100,7 +100,7 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
 
 
 def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None]:
-    """Guess what a name in an expression stands for: the hint, and the known name if it is one."""
+    """Guess the meaning of a name in an expression: a hint, and the known name if there is one."""
     own, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
         alone = isinstance(own, Assignment) and own.right.code.strip() == name
@@ -120,10 +120,10 @@ def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None
     }
     close = "time" if name == "t" else nearest(name, known)
     close = close or by_style.get(nearest(name, by_style) or "")
-    if close and not (name in energies and close in script.variables):  # Ek is no modulus E
+    if close and not (name in energies and close in script.variables):  # Ek is not a modulus E
         return f"did you mean '{close}'?", close
     if re.match("leq|geq", name):
-        return f"{name[:3]} stands in front of a bound in fix velocity_nodes only", None
+        return f"{name[:3]} goes before a bound, in fix velocity_nodes only", None
     makes = ("", "fix", "compute")
     later = {ID: line for _, kind, ID, line in _ahead(script) if kind in makes}
     if below := nearest(name, later):
@@ -132,14 +132,14 @@ def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None
 
 
 def _publishing(script: Any) -> Iterator[tuple[str, str, Any]]:
-    """List the fixes and computes of a scene: what they are, ID and object."""
+    """Yield the fixes and computes of a scene: kind, ID and object."""
     for kind, items in (("fix", "fixes"), ("compute", "computes")):
         for ID, item in getattr(script.hub, items, {}).items():
             yield kind, ID, item
 
 
 def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
-    """Make the error for a value that the fix or compute of this ID does not set."""
+    """Make the error for a value that the fix or compute of this ID does not publish."""
     for kind, ID, item in _publishing(script):
         if name in (ID, f"{ID}_{name[-1]}"):
             names = [f"{ID}_{s}" if s else ID for s in item.published]
@@ -152,9 +152,9 @@ def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """List what statements further down make: the command ("" of a variable), ID and line.
+    """Yield what later statements define: command ("" for a variable), ID and line.
 
-    Those of the innermost script come first, from `back` statements before its next one on.
+    Starts with the innermost script, `back` statements before its next one.
     """
     for frame in reversed(getattr(script, "frames", ())):
         for statement in frame.statements[max(frame.next - back, 0) :]:
@@ -166,13 +166,13 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
 
 
 def line_below(script: Any, kind: str, ID: str) -> int | None:
-    """Find the line further down that defines a part of this kind and ID."""
+    """Find the later line that defines a part of this kind and ID."""
     found = (line for _, made, name, line in _ahead(script) if (made, name) == (kind, ID))
     return next(found, None)
 
 
 def _needs(script: Any, name: str, other: str) -> bool:
-    """Tell if the variable `name`, as it is set further down, comes to need `other`."""
+    """Tell if the variable `name`, as defined later, depends on `other`."""
     set_there = [s for s, kind, *_ in _ahead(script) if not kind]
     below = {s.name: set(re.findall(r"\w+", s.right.code)) for s in reversed(set_there)}
     reached: set[str] = set()
@@ -184,7 +184,7 @@ def _needs(script: Any, name: str, other: str) -> bool:
 
 
 def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
-    """Make the error for a `name` that is defined further down."""
+    """Make the error for a `name` that is defined later."""
     ID = re.sub(r"_[^_]+$", "", name)
     own = script.statement.name if isinstance(script.statement, Assignment) else ""
     for statement, kind, made, line in _ahead(script, back=1):
@@ -207,7 +207,7 @@ def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
 
 
 def check_name(name: str) -> None:
-    """Refuse to assign what already means something else."""
+    """Refuse to assign a name with another meaning."""
     kinds = {
         "a logical operator": name in ("and", "or", "not"),
         MEANINGS.get(name, ""): name in MEANINGS,
@@ -231,7 +231,7 @@ def check_name(name: str) -> None:
 
 
 def check_ID(kind: str, ID: str) -> None:
-    """Refuse an ID whose values no formula could name."""
+    """Refuse an ID whose values could not be used in formulas."""
     if ID.isidentifier() and ID not in ("and", "or", "not"):
         return
     better = re.sub(r"\W", "_", ID)
@@ -249,35 +249,35 @@ def listed(names: Iterable[str]) -> str:
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
 
 
-# ---- older forms of Karamelo, in the words of the script at hand ---------------------------------
+# ---- older forms of Karamelo, translated with the words of the script ----------------------------
 
-# Words that stood in the place of the style region in 2020, and what fills the same.
+# Words used instead of the style region in 2020, and the equivalent shapes.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "cylinder": "cylinder",
     "sphere": "sphere",
 }
 FLIPS = ("FLIP", "AFLIP", "ASFLIP")
-# What scripts of Karamelo call the temperatures of rest and of melting.
+# Names of reference and melting temperature in Karamelo scripts.
 OWN_NAMES = {"T0": ("T0", "Tr", "Troom"), "Tm": ("Tm", "Tmelt", "Tmelting")}
 
 
 def words_of(statement: Any) -> list[str]:
-    """List the arguments of a call, as they are written."""
+    """List the arguments of a call, as written."""
     arguments = statement.arguments if isinstance(statement, CommandCall) else ()
     return [" ".join(argument.code.split()) for argument in arguments]
 
 
 def in_own_words(script: Any, name: str) -> str | None:
-    """Write the line for a command of Karamelo that a script calls and that is not one here."""
+    """Translate the call of a Karamelo command that does not exist here."""
     calls = [s for frame in script.frames for s in frame.statements if isinstance(s, CommandCall)]
     own = next((call for call in calls if call.name == "method"), None)
     asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
     before, rest = words_of(own), words_of(asked[0] if asked else None)
-    where = f"in the place of line {own.place.line}" if own else "before the first solid"
+    where = f"instead of line {own.place.line}" if own else "before the first solid"
     if name == "method_modify" and rest:
         if registry.knows("method", rest[0]):
             before, rest = [rest[0], *before[1:]], rest[1:] or before[1:] or ["FLIP"]
-        elif not registry.knows("transfer", rest[0]):  # a share alone
+        elif not registry.knows("transfer", rest[0]):  # only a FLIP coefficient
             rest = [*(before[1:3] if len(before) > 2 else ("FLIP", "linear")), *rest]
         if len(rest) == 1 or not registry.knows("basis", rest[1]):
             rest.insert(1, before[2] if len(before) > 2 else "linear")
@@ -291,7 +291,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """Write a region and a solid for ``solid(ID, block, xlo, ..., ppc, material, h)``."""
+    """Translate ``solid(ID, block, xlo, ..., ppc, material, h)`` to a region and a solid."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None
@@ -300,7 +300,7 @@ def filled(statement: Any) -> str | None:
 
 
 def longer(name: str, given: Sequence[Any]) -> str | None:
-    """Write the line of a style (`name`: ``eos shock``) that was `given` fewer arguments."""
+    """Complete the line of a style (`name`: ``eos shock``) that was `given` fewer arguments."""
     forms = table()["shorter"].get(name)
     if forms is None or not given:
         return None
@@ -317,7 +317,7 @@ def longer(name: str, given: Sequence[Any]) -> str | None:
 
 
 def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | None:
-    """Write a line of Karamelo that has a former style, or no argument behind it."""
+    """Translate a Karamelo line with a renamed style, or without arguments after it."""
     form = table()["renamed"].get(f"{family} {style}")
     try:
         return form and f"{family}({form.format(*words, ID=ID, all=', '.join(words))})"
@@ -326,7 +326,7 @@ def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | Non
 
 
 def size_of_cells(script: Any) -> tuple[str, int | None]:
-    """Find the size of cells that a solid further down is given, and the line that sets it."""
+    """Find the cell size that a later solid is given, and the line that sets it."""
     solids = (words_of(s) for s, kind, *_ in _ahead(script) if kind == "solid")
     size = next((words[5 if len(words) == 7 else -1] for words in solids if len(words) > 4), "h")
     return size, line_below(script, "", size)

@@ -206,7 +206,7 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
     assert domain.h is not None
     if abs(h - domain.h) > 1e-9 * domain.h:
         raise ScriptError(
-            f"cell size {h:g} differs from that of the domain's grid, {domain.h:g}, "
+            f"cell size {h:g} differs from the domain's, {domain.h:g}, "
             "which is common to all solids",
             argument="h",
             expected=f"{domain.h:g}, as in dimension(...)",

@@ -55,10 +55,10 @@ known_failure(
     USL,
     "affine noise",
     when=_thin_edges,
-    reason="{scene.transfer_name} with {scene.basis_name} functions and usl: in some places of the "
-    "grid the moments of points at an edge push nodes with next to no mass, and a body breaks "
+    reason="{scene.transfer_name} with the basis {scene.basis_name} and usl: in some places of the "
+    "grid the moments of points at an edge act on nodes with almost no mass, and a body breaks "
     "within two periods",
-    cure="scheme(musl), or a spline in the place of the basis",
+    cure="scheme(musl), or a spline basis",
 )
 
 

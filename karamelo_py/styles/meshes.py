@@ -34,8 +34,8 @@ CURVED = 0.01  # of the length of an edge: of a circle with 80 elements
 def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
     if bulge > CURVED:
         hub.warn(
-            f"{file.name} has edges that bend by {bulge:.2g} of their length, and elements count "
-            "by their corners: what lies behind the bend is missing",
+            f"{file.name} has edges curved by {bulge:.2g} of their length, and elements are taken "
+            "with straight edges: the volume beyond them is missing",
             hint="a finer mesh",
         )
 

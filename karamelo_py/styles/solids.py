@@ -102,7 +102,7 @@ class RegionSolid(Solid):
             points = "regular"
         if self.cut and corners:
             raise ScriptError(
-                "the domains of cpdi tile a body, and those of points that are cut do not",
+                "domains of cpdi tile a body, which cut points do not",
                 argument="points",
                 hint="points=regular, a solid from a mesh, or another basis",
             )

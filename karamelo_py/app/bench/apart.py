@@ -1,9 +1,8 @@
-"""Workloads measured by processes of their own: karamelo-py bench of several, and with --ranks.
+"""Workloads measured in separate processes: karamelo-py bench of several, and with --ranks.
 
-What workloads before it leave in memory has no part in the speed of one then. This module is the
-program of such a process, too: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement`
-in JSON as its argument, writes what it finds to a file, and ends with the process that has started
-it, which closes its input then.
+So the memory left by earlier workloads does not affect the speed. This module is also the program
+of such a process: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement` in JSON as
+argument, writes results to a file, and ends when the process that started it closes its input.
 """
 
 import json
@@ -30,7 +29,7 @@ from karamelo_py.script.errors import ScriptError
 _SIGNALS = {one.value: one.name for one in signal.Signals}
 MODULE = "karamelo_py.app.bench.apart"
 COMMAND = (sys.executable, "-m", MODULE)
-# With --ranks, unless workloads are named: those whose scaling has an aim.
+# Default workloads with --ranks: those with a target for scaling.
 USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
 HEADING = (
     f"  {'processes x threads':<22}{'points':>9} {'million/s':>10} {'times one':>10} "
@@ -45,11 +44,11 @@ class Measurement(NamedTuple):
     threads: int
     presets: dict[str, str]
     seconds: float
-    triad: float = 0.0  # bandwidth of the memory (bytes/s)
+    triad: float = 0.0  # memory bandwidth (bytes/s)
     debug: bool = False
     ranks: int = 1
-    scaling: bool = False  # what is asked for is a `Scaled`
-    file: str = ""  # for what is found
+    scaling: bool = False  # requests a `Scaled`
+    file: str = ""  # for the results
 
 
 # ---- one process --------------------------------------------------------------------------------
@@ -63,7 +62,7 @@ def measured(part: Measurement) -> Measured | Solved:
 
 
 def measured_apart(part: Measurement) -> Measured | Solved | int:
-    """Measure a workload in a process of its own; its status where it went wrong and said why."""
+    """Measure a workload in a separate process; return its exit status if it failed."""
     status, found = _found_apart(part)
     if found:
         return Solved(**found) if "stages" in found else Measured(**found)
@@ -74,14 +73,14 @@ def measured_apart(part: Measurement) -> Measured | Solved | int:
 
 
 def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
-    """Measure with processes of their own; their exit status, and what they have found."""
+    """Measure in separate processes; return their exit status and the results."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(part._replace(file=str(file)))]
         if part.ranks > 1:
             status = launch(part.ranks, words, module=MODULE)
         else:
-            # A session of its own: Ctrl-C comes to this process alone, with which the other ends.
+            # A separate session: Ctrl-C reaches this process only, and the other ends with it.
             with subprocess.Popen(
                 [*COMMAND, *words], stdin=subprocess.PIPE, start_new_session=True
             ) as process:
@@ -93,19 +92,19 @@ def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
 
 
 class Scaled(NamedTuple):
-    """Measured speed with some processes of some threads each."""
+    """Measured speed with several processes and threads."""
 
     ranks: int
     threads: int
-    weak: bool  # of a scene so many times as large
+    weak: bool  # the scene grows with the number of processes
     points: int
     best: float  # particle-steps per second of the fastest repetition
-    exchange: float  # share of its time that the process which waits least waits for others
-    imbalance: float  # share that the others wait longer than that one, their mean
+    exchange: float  # fraction of time that the least waiting process waits for others
+    imbalance: float  # mean fraction that the others wait longer
 
 
 def scaled(part: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
-    """Measure a workload with one process, then with several, or as many threads; then grown."""
+    """Measure a workload with one process, with several or as many threads, then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
         yield measured_with_ranks(part._replace(ranks=n))
@@ -117,7 +116,7 @@ def scaled(part: Measurement, ranks: Sequence[int], available: int) -> Iterator[
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
-    """Find the variable for the size of a scene with so many times the points."""
+    """Return the variable setting for a scene with `times` the points."""
     d = int(re.search(r"dimension\((\d)", script)[1])
     name, value = re.search(r"^(N|coarser) = (\S+)$", script, re.M).groups()
     value = float(presets.get(name, value))
@@ -127,7 +126,7 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
 
 
 def measured_with_ranks(part: Measurement, *, weak: bool = False) -> Scaled:
-    """Measure a workload with so many processes, which are started as those of a run."""
+    """Measure a workload with several processes, started like a run."""
     status, found = _found_apart(part._replace(scaling=True))
     if not found:
         why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
@@ -154,7 +153,7 @@ def _share(part: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
 
 
 def line(row: Scaled, one: Scaled) -> str:
-    """Write a line of the table: speeds, and their ratios to that of one process."""
+    """Format a line of the table: speeds, and ratios to one process."""
     who = f"{row.ranks} x {row.threads}" + (" (larger)" if row.weak else "")
     shares = f"{'-':>9} {'-':>10}"
     if row.ranks > 1:
@@ -167,12 +166,12 @@ def line(row: Scaled, one: Scaled) -> str:
 
 
 def main() -> int:
-    """Measure what the argument says."""
+    """Measure according to the argument."""
     part = Measurement(*json.loads(sys.argv[1]))
     keep_to_oneself()
     if part.ranks > 1:
         return together(part.ranks, lambda comm: _measure(part, comm))
-    # The input is closed where nobody waits for what is found any more.
+    # The input closes when the parent no longer waits.
     threading.Thread(target=lambda: (os.read(0, 1), os._exit(0)), daemon=True).start()
     status, text = outcome_of(lambda: _measure(part), debugging=part.debug)
     if text:
@@ -181,7 +180,7 @@ def main() -> int:
 
 
 def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
-    """Measure, and write what is found, if this is the first process."""
+    """Measure, and write the results on rank 0."""
     found = _share(part, comm) if part.scaling else measured(part)._asdict()
     if comm is None or comm.leads:
         Path(part.file).write_text(json.dumps(found), encoding="utf-8")

@@ -1,7 +1,7 @@
-"""The subcommand karamelo-py bench: how fast this machine runs known scenes.
+"""karamelo-py bench: speed of this machine on known scenes.
 
-Speeds are of the fastest of several repetitions; they are meant for comparison within one run of
-this command, since machines are shared and their clocks change.
+Speeds are of the fastest repetition. Compare them within one bench only, because machines are
+shared and clocks change.
 """
 
 import json
@@ -30,14 +30,14 @@ WIDTH = max(map(len, WORKLOADS))
 DESCRIPTION = f"""\
 Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
 second of the fastest of five repetitions, bytes per particle, the time of each stage of a step, and
-what limits it: memory, arithmetic, nodes or overhead. Each of several has a process of its own.
+what limits it: memory, arithmetic, nodes or overhead. Each of several runs in a separate process.
 
 workloads:
 {chr(10).join(f"  {name:<{WIDTH}}  {w.title}" for name, w in WORKLOADS.items())}"""
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
+    """Add the options of the subcommand."""
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
     add_variables(parser, "set a variable of the scenes, such as N, their fineness")
     parser.add_argument(
@@ -46,7 +46,7 @@ def add_options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--ranks", type=_counts, metavar="N,M,...",
-        help="measure with so many processes instead, and with as many threads: on the scene as it "
+        help="measure with this number of processes, and with as many threads: on the scene as it "
         f"is, and on one as many times as large (default workloads: {', '.join(apart.USUAL)})",
     )  # fmt: skip
     parser.add_argument(
@@ -65,7 +65,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Measure what the command line asks for; returns the exit status."""
+    """Measure as requested; return the exit status."""
     for name in options.workloads:
         if name not in WORKLOADS:
             raise unknown(f"unknown workload '{name}'", name, WORKLOADS)
@@ -108,7 +108,7 @@ def run(options: Namespace) -> int:
 
 
 def _ended(found: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Path | None) -> int:
-    """Compare what was found with an earlier bench, and name the file; the exit status."""
+    """Compare with an earlier bench, and name the file; return the exit status."""
     if earlier:
         print("\n" + "\n".join(comparison(found, earlier)))
     if out:
@@ -119,7 +119,7 @@ def _ended(found: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Pat
 def _on_card(
     options: Namespace, chosen: Any, known: Mapping[str, set], out: Path | None, earlier: Any
 ) -> int:
-    """Measure workloads on the GPU of this machine."""
+    """Measure workloads on the GPU."""
     try:
         gpu = card()
     except NoCard as error:
@@ -148,7 +148,7 @@ def _counts(text: str) -> list[int]:
 
 
 def _scaling(part: apart.Measurement, ranks: list[int], available: int) -> dict[str, Any]:
-    """Measure and print how a workload scales; its record, in which the speed of one is first."""
+    """Measure and print the scaling of a workload; the record starts with one process."""
     rows: list[apart.Scaled] = []
     print(f"\n{part.workload}: {WORKLOADS[part.workload].title}\n{apart.HEADING}")
     for row in apart.scaled(part, ranks, available):
@@ -171,7 +171,7 @@ def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool
     print(f"  {'bytes per particle':<34} {one.bytes_per_particle:8d}")
     print(f"  {'bytes moved per particle-step':<34} {one.bytes_per_particle_step:8.0f}")
     cached = " (above 100 %: caches hold a part)" if one.roofline > 1 else ""
-    print(f"  {'share of the memory bandwidth':<34} {100 * one.roofline:8.1f} %{cached}")
+    print(f"  {'fraction of the memory bandwidth':<34} {100 * one.roofline:8.1f} %{cached}")
     print(f"  {'the same, of arrays of its size':<34} {100 * one.roofline_in_place:8.1f} %")
     stages = one.sweeps_of_points | one.sweeps_of_nodes if one.told_apart else {}
     for stage, per in stages.items():
@@ -179,7 +179,7 @@ def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool
     print(f"    {'together, in one compiled loop':<38} {1e9 / best:8.2f} ns")
     shares = "sweeps are too short to be timed one by one"
     if one.told_apart:
-        shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % beside them"
+        shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % outside"
     print(f"  {'limited by':<34} {one.limit:>8} ({shares})")
 
 
@@ -192,11 +192,11 @@ def _print_solved(one: measure.Solved) -> None:
         print(f"    {stage:<38} {100 * share:6.1f} %")
 
 
-# ---- files of what was measured -----------------------------------------------------------------
+# ---- files --------------------------------------------------------------------------------------
 
 
 def commit() -> str | None:
-    """Find the commit of the program where it runs from its repository."""
+    """Return the commit of the program if it runs from its repository."""
     folder = Path(karamelo_py.__file__).parent
 
     def git(*words: str) -> str:
@@ -206,14 +206,14 @@ def commit() -> str | None:
         ).stdout.strip()  # fmt: skip
 
     try:
-        git("ls-files", "--error-unmatch", "__init__.py")  # not a folder in another repository
+        git("ls-files", "--error-unmatch", "__init__.py")  # excludes folders in other repositories
         return git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
     except (OSError, subprocess.SubprocessError):
         return None
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read a bench that was written before."""
+    """Read a bench file."""
     expected = "a file that karamelo-py bench -o has written"
     text = read_text(path, expected)
     try:
@@ -228,7 +228,7 @@ def read(path: Path) -> dict[str, Any]:
 
 
 def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
-    """Compare a bench with an earlier one: ratios of speeds, then what differs around, by line."""
+    """Compare two benches: ratios of speeds, then other differences, as lines."""
     lines = [f"{'workload':<24} {'then':>10} {'now':>10} {'ratio':>7}   (best, million/s)"]
     ours, theirs = now["workloads"], then["workloads"]
     for name in dict.fromkeys((*ours, *theirs)):
@@ -236,7 +236,7 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
         before, after = (f"{each['best'] / 1e6:.2f}" if each else "-" for each in (other, one))
         ratio, said = "-", "new" if other is None else "not measured now"
         if one and other:
-            # Of what differs here, ratios say something about the surroundings, too.
+            # If these differ, ratios also reflect the environment.
             about = ("points", "precision", "variables")
             said = ", ".join(f"other {key}" for key in about if one.get(key) != other.get(key))
             ratio = "-" if said else f"{one['best'] / other['best']:.2f}"
@@ -245,7 +245,7 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
 
 
 def _differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
-    """List other differences between two benches, a line each: machine, threads, versions."""
+    """List other differences between two benches: machine, threads, versions."""
 
     def about(found: Mapping[str, Any]) -> dict[str, Any]:
         keys = ("processor", "cores", "system", "commit", "threads")

@@ -1,4 +1,4 @@
-"""The speed of a scene: time of its stages, bytes that it moves, bandwidth of the memory."""
+"""Speed of a scene: times of its stages, memory traffic, and memory bandwidth."""
 
 import statistics
 import time
@@ -29,10 +29,10 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 MOST_STEPS = 2500  # in the scenes nothing leaves the domain before
-ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
+ARRAYS = 3 * 256 * 2**20  # bytes, far larger than caches
 REPETITIONS = 5
-ALONE = 0.5  # the share of a step from which on something is said to limit it
-APART = 1.5  # times a step in one compiled loop, up to which its sweeps one by one are believed
+ALONE = 0.5  # fraction of a step that counts as a bottleneck
+APART = 1.5  # largest ratio of separately timed sweeps to a compiled step that is trusted
 
 
 class Workload(NamedTuple):
@@ -40,9 +40,9 @@ class Workload(NamedTuple):
 
     title: str
     script: str
-    # Steps before the measuring begins.
+    # Steps before the measurement.
     lead: int = 3
-    # Published million particle-steps per second of Karamelo (C++) on one core of a small AMD EPYC.
+    # Published million particle-steps per second of Karamelo (C++), one core of a small AMD EPYC.
     karamelo: float | None = None
 
 
@@ -68,9 +68,9 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """A way of sweeping that notes how long each sweep took, then does as `mode` does.
+    """Mode that records the time of each sweep, then does as `mode` does.
 
-    What it takes to call the same sweep over nothing is taken off.
+    The time of the same call on no points is subtracted.
     """
 
     mode: Any
@@ -84,13 +84,13 @@ class Measured(NamedTuple):
     points: int
     speeds: list[float]  # particle-steps per second of each repetition
     bytes_per_particle: int
-    bytes_per_particle_step: float  # that move in a particle-step if no cache keeps them
-    roofline: float  # share of the memory's bandwidth that these take at the best speed
-    roofline_in_place: float  # the same, of arrays as large as the scene, which caches may keep
-    # Seconds per step in sweeps over points and over nodes, without the way there.
+    bytes_per_particle_step: float  # memory traffic of a particle-step without caches
+    roofline: float  # fraction of the memory bandwidth used at the best speed
+    roofline_in_place: float  # the same for arrays as large as the scene, which may be cached
+    # Seconds per step in sweeps over points and over nodes, without call overhead.
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
-    waits: float  # seconds per step of these in which threads begin and wait for each other
+    waits: float  # seconds per step that threads spend starting and waiting
     precision: str
 
     @property
@@ -103,35 +103,34 @@ class Measured(NamedTuple):
 
     @property
     def swept(self) -> float:
-        """Sweeps one by one, as a share of a step in one compiled loop."""
+        """Time of separate sweeps as a fraction of a step in one compiled loop."""
         swept = sum(self.sweeps_of_points.values()) + sum(self.sweeps_of_nodes.values())
         return (swept - self.waits) * self.best / self.points
 
     @property
     def told_apart(self) -> bool:
-        """True if sweeps are long enough to be timed one by one: of few points they are not."""
+        """True if sweeps are long enough to be timed separately, which needs many points."""
         return self.swept <= APART
 
     @property
     def rest(self) -> float:
-        """The share of a step beside the work of sweeps: control, threads that wait."""
+        """Fraction of the step outside of sweeps: control and waiting threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
     def nodes(self) -> float:
-        """The share of sweeps over nodes in the time of all sweeps."""
+        """Fraction of the time of sweeps spent on nodes."""
         nodes = sum(self.sweeps_of_nodes.values())
         swept = nodes + sum(self.sweeps_of_points.values())
         return nodes / swept if swept else 0.0
 
     @property
     def limit(self) -> str:
-        """The first of these that takes at least half of a step.
+        """Return the first of these that takes at least half of a step.
 
         ``overhead`` (the rest), ``nodes``, ``memory`` (at least half of the bandwidth of arrays as
-        large as the scene), else ``arithmetic``: sweeps over points that wait for instructions,
-        or for single numbers, more than for bandwidth. ``unknown`` where sweeps are not
-        `told_apart`.
+        large as the scene), else ``arithmetic``: sweeps over points that are limited by
+        instructions or latency. ``unknown`` if sweeps are not `told_apart`.
         """
         if not self.told_apart:
             return "unknown"
@@ -142,7 +141,7 @@ class Measured(NamedTuple):
         return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
     def record(self) -> dict[str, Any]:
-        """Write what is kept in a file; speeds in particle-steps/s, times in seconds."""
+        """Return the data for a file; speeds in particle-steps/s, times in seconds."""
         speeds = {"best": self.best, "median": self.median, "limited_by": self.limit}
         return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
@@ -153,15 +152,15 @@ class Solved(NamedTuple):
     points: int
     speeds: list[float]  # particle-steps per second of each repetition
     unknowns: int
-    corrections: float  # of Newton's method in a step
-    stages: dict[str, float]  # shares of a step
+    corrections: float  # Newton iterations per step
+    stages: dict[str, float]  # fractions of a step
     precision: str
 
     best = Measured.best
     median = Measured.median
 
     def record(self) -> dict[str, Any]:
-        """Write what is kept in a file; speeds in particle-steps/s."""
+        """Return the data for a file; speeds in particle-steps/s."""
         return {"best": self.best, "median": self.median} | self._asdict()
 
 
@@ -202,9 +201,9 @@ def build(
     workload: Workload, threads: int | None, presets: Mapping[str, str],
     comm: MpiComm | None = None, card: Any = None,
 ) -> Simulation:  # fmt: skip
-    """Build the simulation of a workload, ready to step; `presets` set variables of its script.
+    """Build the simulation of a workload, ready to step; `presets` set script variables.
 
-    A `card` takes its steps, if one is given.
+    With a `card`, steps run on it.
     """
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
@@ -219,7 +218,7 @@ def build(
 
 
 def measured(simulation: Simulation, seconds: float, triad: float, lead: int) -> Measured | Solved:
-    """Measure a scene for about so many seconds; `triad` is the bandwidth of the memory."""
+    """Measure a scene for about `seconds`; `triad` is the memory bandwidth."""
     if simulation.implicit:
         return _solved(simulation, seconds, lead)
     count, found = repeated(simulation, seconds, lead)
@@ -240,7 +239,7 @@ def measured(simulation: Simulation, seconds: float, triad: float, lead: int) ->
 
 def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
     """Measure load steps."""
-    timed_steps(simulation, lead)  # and compile
+    timed_steps(simulation, lead)  # includes compilation
     steps, before = simulation.load_steps, simulation.step
     steps.seconds.clear()
     steps.corrections = 0
@@ -257,12 +256,12 @@ def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
 def repeated(
     simulation: Simulation, seconds: float, lead: int
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
-    """Step a scene again and again from the state after `lead` steps, for `seconds` in all.
+    """Repeat steps from the state after `lead` steps, for `seconds` in all.
 
     Returns
     -------
     count, found
-        Steps of a repetition; the seconds that each took, and those that each process waited.
+        Steps per repetition; the seconds of each, and the seconds that each process waited.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -273,19 +272,19 @@ def repeated(
         simulation.restore(start)
         before, begun = _waits(simulation), time.perf_counter()
         timed_steps(simulation, count)
-        after = _waits(simulation)  # all have finished then
+        after = _waits(simulation)  # synchronises all processes
         found.append((time.perf_counter() - begun, after - before))
     simulation.restore(start)
     return count, found
 
 
 def _waits(simulation: Simulation) -> np.ndarray:
-    """Seconds that each process has waited for others in steps so far."""
+    """Seconds that each process has waited for others so far."""
     return np.array(simulation.comm.allgather(simulation.comm.waited))
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:
-    """Take `count` steps; returns the seconds, until a card has done them."""
+    """Take `count` steps; return the seconds until they are done, also on a GPU."""
     card = simulation.hub.settings.card
     wait = card.wait if card else lambda: None
     wait()
@@ -297,9 +296,9 @@ def timed_steps(simulation: Simulation, count: int) -> float:
 
 
 def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Time each sweep of a fused step over points and over nodes, in seconds per step.
+    """Time each sweep of a fused step over points and nodes, in seconds per step.
 
-    They are called one by one, some in each step more than once; sums of medians.
+    Sweeps are called separately, some more than once per step; returns sums of medians.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {}, {})
@@ -313,7 +312,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
         _take_step(simulation, timed)
         count += 1
         clock = s.control.clock[0]
-        if clock.drift > clock.drift_limit:  # points would give nothing any more
+        if clock.drift > clock.drift_limit:  # points would be out of date
             simulation.sort()
             begin(scheme, Fused(), simulation.mode, s)
     of_points, of_nodes = (
@@ -323,7 +322,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
 
 
 def _per_step(taken: list[float], count: int) -> float:
-    real, way = taken[::2], taken[1::2]  # a sweep, then the same over nothing
+    real, way = taken[::2], taken[1::2]  # a sweep, then the same without points
     return len(real) / count * max(0.0, statistics.median(real) - statistics.median(way))
 
 
@@ -335,12 +334,12 @@ def _take_step(simulation: Simulation, mode: Any) -> None:
 
 
 class _Recorder(NamedTuple):
-    """Sweeps nothing, and notes what a sweep would read and write."""
+    """Mode that records what a sweep would read and write, without sweeping."""
 
     points: list
     nodes: list
     sums: list
-    regions: list  # how often threads begin and wait for each other
+    regions: list  # number of parallel regions
 
 
 @sweep_points.on(_Recorder)
@@ -367,11 +366,10 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Count bytes per particle-step that have to move if nothing stays in a cache.
+    """Count bytes per particle-step moved without caches, bytes of the scene, and thread starts.
 
-    Also the bytes that the scene holds, and how often in a step threads begin. Fields of the points
-    count once for each sweep that reads and once for each that writes them; of node fields, those
-    that loops over nodes go through; of the tiles' buffers, what is given to them and summed.
+    Point fields count once per sweep that reads and once per sweep that writes them; node fields,
+    in loops over nodes; buffers of tiles, when written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])
@@ -412,7 +410,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Measure bytes/s of a[i] = b[i] + factor c[i] over three arrays of `size` bytes together."""
+    """Measure bytes/s of a[i] = b[i] + factor c[i] over three arrays of `size` bytes in total."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     team = new_team(threads)
@@ -422,5 +420,5 @@ def bandwidth(threads: int, size: float = ARRAYS) -> float:
 
 
 def start_of_threads() -> float:
-    """Measure the seconds in which threads begin and wait for each other, with no work."""
+    """Measure the seconds to start and join threads without work."""
     return _fastest(200, _triad, Threaded(), *np.ones((3, 64)), 0.5, config.NUMBA_NUM_THREADS, 1)

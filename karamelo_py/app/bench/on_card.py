@@ -1,4 +1,4 @@
-"""karamelo-py bench --gpu: workloads at sizes of a GPU, measured against its memory's bandwidth."""
+"""karamelo-py bench --gpu: workloads of GPU size, relative to memory bandwidth."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -17,8 +17,8 @@ from karamelo_py.app.bench.measure import (
 from karamelo_py.kernels.gpu import OTHERS, STAGES
 
 USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
-MOST = 200  # steps of a repetition: nothing leaves the scenes in five
-SIZES = (1e6, 4e6, 16e6)  # points, where no variable is set
+MOST = 200  # steps per repetition: nothing leaves the scenes in five
+SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
 
 
 class OnCard(NamedTuple):
@@ -26,18 +26,18 @@ class OnCard(NamedTuple):
 
     points: int
     speeds: list[float]  # particle-steps per second of each repetition
-    bytes_per_particle_step: float  # that move in a particle-step if no cache keeps them
-    roofline: float  # share of the memory's bandwidth that these take at the best speed
+    bytes_per_particle_step: float  # memory traffic of a particle-step without caches
+    roofline: float  # fraction of the memory bandwidth used at the best speed
     bytes_on_card: int
     stages: dict[str, float]  # seconds per step
-    made: float  # seconds until the code of a step was there
+    made: float  # seconds to compile a step
     precision: str
 
     best, median, record = Solved.best, Solved.median, Solved.record
 
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """The variables of a workload at each of `SIZES`; as they are, where one is set."""
+    """Yield the variables of a workload for each of `SIZES`; unchanged if one is set."""
     if {"N", "coarser"} & {*presets}:
         yield dict(presets)
         return
@@ -50,7 +50,7 @@ def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
 def measured(
     name: str, presets: Mapping[str, str], card: Any, copied: float, seconds: float
 ) -> OnCard:
-    """Measure a workload on a card for about so many seconds; `copied` is its bandwidth."""
+    """Measure a workload on a GPU for about `seconds`; `copied` is the memory bandwidth."""
     simulation = build(WORKLOADS[name], 1, presets, card=card)
     begun = perf_counter()
     simulation.compile()
@@ -73,14 +73,14 @@ def measured(
 
 
 def say(name: str, one: OnCard, presets: Mapping[str, str]) -> None:
-    """Print what was measured."""
+    """Print the results."""
     words = ", ".join(f"{variable} = {value}" for variable, value in presets.items())
     print(f"\n{name}: {WORKLOADS[name].title}; {words}; {one.points} points, {one.precision}")
     print(
         f"  {'particle-steps/s':<38} {one.best / 1e6:8.1f} million (median {one.median / 1e6:.1f})"
     )
     print(f"  {'bytes moved per particle-step':<38} {one.bytes_per_particle_step:8.0f}")
-    print(f"  {'share of the memory bandwidth':<38} {100 * one.roofline:8.1f} %")
+    print(f"  {'fraction of the memory bandwidth':<38} {100 * one.roofline:8.1f} %")
     print(f"  {'memory of the GPU':<38} {one.bytes_on_card / 1e9:8.2f} GB")
     print(f"  {'compilation':<38} {one.made:8.1f} s")
     for stage, spent in one.stages.items():

@@ -1,7 +1,7 @@
-"""Pages in a browser that follow what goes on: a study, a run, dumps that another run writes.
+"""Live pages in a browser: for a study, a run, or dumps written by another run.
 
-A page is served to this machine alone, at an address that holds a secret word. It reads what is
-written, or a copy at an output: what runs does not change, and costs nothing where nobody asks.
-The browser's own WebGL draws points, Plotly curves and charts, as on the pages of karamelo-py
-chart; both work without a network. docs/live-measurements.md compares with trame and Rerun.
+A page is served to this machine only, at an address with a secret word. It reads what is written,
+or copies at an output, so runs are unchanged, and without a page there is no cost. Points are drawn
+with WebGL, curves and charts with Plotly, as on pages of karamelo-py chart; no network is needed.
+docs/live-measurements.md compares with trame and Rerun.
 """

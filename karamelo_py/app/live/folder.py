@@ -1,4 +1,4 @@
-"""The page of a folder: the dumps and the log of a run that goes on elsewhere, or has ended."""
+"""The live page of a folder: dumps and log of a run that continues elsewhere, or has ended."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-PAUSE = 0.5  # seconds between looks into the folder, once all files are read
-FILES = 8  # that are read at a look: what they hold is seen before all are read
-WHOLE = (".h5", ".hdf5", ".pvd")  # dumps that hold many states
+PAUSE = 0.5  # seconds between polls of the folder, once all files are read
+FILES = 8  # files read per poll, so that the first are shown early
+WHOLE = (".h5", ".hdf5", ".pvd")  # dumps with many states in a file
 
 
 class FolderPage:
-    """Shows what is in a folder, and what comes.
+    """Shows the content of a folder and its updates.
 
     Raises
     ------
     ScriptError
-        Where there is no such folder, or neither a log nor a dump of points in it.
+        If there is no such folder, or it has neither a log nor a particle dump.
     """
 
     def __init__(self, folder: Path):
         if not folder.is_dir():
             raise ScriptError(f"{folder} is no folder", expected="the folder of a run")
         self.folder = folder
-        self._states: list[tuple[Path, int, int, float, int]] = []  # file, place, step, time, count
+        self._states: list[tuple[Path, int, int, float, int]] = []  # file, index, step, time, count
         self._seen: dict[Path, float] = {}
-        self._read: dict[Path, int] = {}  # states of each file that were looked at
-        self._widths: dict[str, int] = {}  # columns, by names of dumps
+        self._read: dict[Path, int] = {}  # number of states read from each file
+        self._widths: dict[str, int] = {}  # number of columns, by dump name
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
         self._dimension, self._column, self._more = 2, "", False
@@ -53,7 +53,7 @@ class FolderPage:
         )
 
     def follow(self) -> None:
-        """Look for news until somebody interrupts."""
+        """Poll for news until interrupted."""
         while True:
             if self.look():
                 self.server.changed()
@@ -61,7 +61,7 @@ class FolderPage:
                 time.sleep(PAUSE)
 
     def look(self) -> bool:
-        """Look into the folder; tell whether there is anything new."""
+        """Read the folder; tell whether anything is new."""
         log, before = read_log(self.folder), len(self._states)
         grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
         self._log, files = log, 0
@@ -77,13 +77,13 @@ class FolderPage:
                     self._add(path, place, snapshot)
                     self._read[path] = place + 1
                 self._seen[path], files = changed, files + 1
-            except (ScriptError, OSError):  # it is being written, or has gone
+            except (ScriptError, OSError):  # being written, or deleted
                 continue
         self._more = files == FILES
         return grown or len(self._states) > before
 
     def _dumps(self) -> list[Path]:
-        """List the dumps of points of one name, but for numbers: of those with most columns."""
+        """List particle dumps whose names differ by number only: the set with most columns."""
         kinds: dict[str, list[Path]] = {}
         for path in sorted(self.folder.iterdir()):
             if path.is_file() and (path.suffix in WHOLE or _is_text_dump(path)):
@@ -95,7 +95,7 @@ class FolderPage:
 
     def _add(self, path: Path, place: int, snapshot: Snapshot) -> None:
         columns = snapshot.columns
-        if not len(columns.get("x", ())):  # no points, or no places of theirs
+        if not len(columns.get("x", ())):  # no points, or no positions
             return
         self._columns = self._columns or [name for name in columns if name not in "xyz"]
         if not self._states:
@@ -137,7 +137,7 @@ class FolderPage:
         return count, {**told, "over": False}
 
     def _frame(self, words: Mapping[str, str]) -> bytes | None:
-        """Read a state again; its column is the one that the page shows now."""
+        """Read a state again, with the column that the page shows now."""
         k = number_in(words)
         if not 0 <= k < len(self._states):
             return None

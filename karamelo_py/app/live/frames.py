@@ -1,4 +1,4 @@
-"""States of points that a page has at hand: thinned, in single precision, as many as fit."""
+"""States of points available to a page: thinned, in single precision, as many as fit."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from typing import Any, NamedTuple
 import numpy as np
 
 PAGE = Path(__file__).with_name("run.html")
-POINTS = 1_000_000  # of a frame, about, at most
+POINTS = 1_000_000  # of a frame, approximately at most
 BYTES = 1 << 29  # of all frames
 COUNT = 400
-SEEN = 1.0  # seconds in which a page asks for what it was told of
+SEEN = 1.0  # seconds for a page to request an announced frame
 
 
 class Frame(NamedTuple):
-    """Points at one moment."""
+    """Points at one time."""
 
     step: int
     time: float
     column: str
     numbers: np.ndarray  # (d + 1, n) positions and the column
-    of: int  # points before they were thinned
+    of: int  # number of points before thinning
 
     @classmethod
     def of_columns(
         cls, step: int, time: float, axes: str, column: str, read: Callable[[str], np.ndarray]
     ) -> Frame:
-        """Make a frame of columns that ``read(name)`` gives, (n,) each."""
+        """Make a frame from columns (n,) that ``read(name)`` returns."""
         columns = [np.asarray(read(name)) for name in (*axes, column)]
         count = len(columns[0])
         if count > POINTS:
@@ -41,9 +41,10 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """Choose (n,) about `POINTS` points of many: by chance, but the same ones in each state.
+    """Select about `POINTS` of many points (n,): randomly, but the same ones in each state.
 
-    Of small solids all are taken, up to their part of a tenth; others have the same share.
+    Small solids, of up to 10 % of that in equal parts, stay complete; the others are thinned
+    equally.
     """
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
@@ -55,16 +56,16 @@ def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
 
 
 class KeptFrames:
-    """States of points by number; where there are too many, every second goes from then on."""
+    """States of points by number; if there are too many, every second one is dropped."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}
         self._next, self._every = 0, 1
-        self._new: deque[tuple[int, float]] = deque()  # numbers, and when they came
+        self._new: deque[tuple[int, float]] = deque()  # numbers, and times of arrival
         self._lock = threading.Lock()
 
     def add(self, frame: Frame) -> None:
-        """Keep a frame."""
+        """Add a frame."""
         with self._lock:
             now = time.perf_counter()
             self._kept[self._next] = frame
@@ -79,7 +80,7 @@ class KeptFrames:
                 del self._kept[number]
 
     def replace_last(self, take: Callable[[], Frame]) -> None:
-        """Keep a frame, taken while nobody else takes one, in place of the newest."""
+        """Replace the newest frame with one taken under the lock."""
         with self._lock:
             self._kept[self._next - 1] = take()
             self._new[-1] = (self._next - 1, time.perf_counter())
@@ -90,20 +91,20 @@ class KeptFrames:
             return [[k, f.step, plain(f.time), f.column, f.of] for k, f in self._kept.items()]
 
     def answer(self, words: Mapping[str, str]) -> bytes | None:
-        """Give the numbers of a frame, position by position, then the column."""
+        """Return the numbers of a frame, position by position, then the column."""
         with self._lock:
             frame = self._kept.get(number_in(words))
         return None if frame is None else frame.numbers.tobytes()
 
 
 def number_in(words: Mapping[str, str]) -> int:
-    """Read the number of a frame; -1 where there is none."""
+    """Read the number of a frame; -1 if there is none."""
     text = words.get("k", "")
     return int(text) if text.isdecimal() and len(text) < 19 else -1
 
 
 def plain(value: Any) -> Any:
-    """Give a number that JSON has; others as they are."""
+    """Convert numbers to those that JSON has; others are unchanged."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return value

@@ -1,4 +1,4 @@
-"""The page of a run: points in colour, curves of the log, what limits the step; pause and stop."""
+"""The live page of a run: points, log curves and what limits the step; pause and stop."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
 
-WINDOW = 2000  # rows of the log that a page gets when it opens
-GRACE = 10.0  # seconds that a run is held while no page is open, which may be loaded anew
+WINDOW = 2000  # rows of the log sent to a new page
+GRACE = 10.0  # seconds that a paused run waits without an open page, which may be reloading
 
 
 class Row(NamedTuple):
@@ -34,7 +34,7 @@ class Row(NamedTuple):
     time: float
     dt: float
     limit: str  # what limits the step
-    gain: float | None  # of energy in percent, where it is watched
+    gain: float | None  # energy gain in percent, if monitored
     log: dict[str, float]
 
 
@@ -44,9 +44,9 @@ class RunPage(Rhythmic, Listener):
     Parameters
     ----------
     hub
-        The scene, before its script is carried out.
+        The scene, before its script is executed.
     title
-        What stands above the page.
+        Heading of the page.
     """
 
     remembers = ()
@@ -60,7 +60,7 @@ class RunPage(Rhythmic, Listener):
         self._rows: list[Row] = []
         self._paused = self._once = False
         self._column, self._unwatched = "seq", ""
-        self._ended, self._failed = "", ""  # how it did, and the message of an error
+        self._ended, self._failed = "", ""  # status, and the message of an error
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
             {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
@@ -73,16 +73,16 @@ class RunPage(Rhythmic, Listener):
         """Hold the run no longer."""
         self._paused = False
 
-    # ---- in the run's own thread ----------------------------------------------------------------
+    # ---- in the thread of the run ---------------------------------------------------------------
 
     def write(self) -> None:
-        """Show the present state; wait here while the page holds the run."""
+        """Show the present state; wait here while the page pauses the run."""
         hub, simulation = self.hub, self.hub.simulation
-        self.every = hub.output.log.every  # each run begins with an output
+        self.every = hub.output.log.every  # each run starts with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         clock = simulation.control.clock[0]
-        known = clock.watch_energy and clock.looks >= energy.FEW  # a mean of so many
+        known = clock.watch_energy and clock.looks >= energy.FEW  # a mean over this many
         gain = -100 * energy.share_lost(simulation) if known else None
         why = energy.unknown_work(hub)
         self._unwatched = f"energy {energy.not_watched(why)}" if why else ""
@@ -93,10 +93,10 @@ class RunPage(Rhythmic, Listener):
         self._wait()
 
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
-        """Bring the last news to open pages, an error that ends the run among them.
+        """Send the last news to open pages, including an error that ends the run.
 
-        They are answered until they are closed. At a terminal a page that nobody has opened `waits`
-        for that, if it is to.
+        Requests are answered until the pages are closed. With `waits`, at a terminal, waits for a
+        page that has not been opened yet.
         """
         server = self.server
         error = sys.exception()
@@ -104,7 +104,7 @@ class RunPage(Rhythmic, Listener):
         if isinstance(error, FAILURES):
             ended, self._failed = "failed", rendered(error)
             self.hub.warned.append((self.hub.update.time, self._failed))
-        self._ended = ended  # last: a page that asks meanwhile sees a run that goes on
+        self._ended = ended  # last, so that a page sees a running run until then
         server.changed()
         server.flush()
         waits = waits and self.hub.console.terminal and not server.opened
@@ -117,7 +117,7 @@ class RunPage(Rhythmic, Listener):
         server.close()
 
     def detach(self) -> None:
-        """End the page; the run goes on without."""
+        """Close the page; the run continues."""
         if self not in self.hub.output.pages:
             return
         self.hub.output.pages.remove(self)
@@ -150,7 +150,7 @@ class RunPage(Rhythmic, Listener):
 
     def _news(self, seen: int) -> tuple[int, dict]:
         rows = new = self._rows[seen:]
-        if len(rows) > WINDOW:  # of a page that opens: a curve needs no more
+        if len(rows) > WINDOW:  # enough for the curves of a new page
             rows = [rows[k] for k in np.linspace(0, len(rows) - 1, WINDOW).astype(int)]
         told = {
             "rows": [

@@ -1,4 +1,4 @@
-"""The server of a page: answers at a secret address, and news as they come (server-sent events)."""
+"""Server of a live page: answers at a secret address, and pushes news (server-sent events)."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from urllib.parse import parse_qsl, urlsplit
 
 from karamelo_py.script.errors import ScriptError
 
-PATIENCE = 1.0  # seconds that the last news may take to a page, when all is over
-BEAT = 2.0  # seconds after which something is said, so that a closed page is noticed
-STUCK = 30.0  # seconds after which a page that takes nothing counts as closed
-UNKNOWN = 5.0  # seconds that a connection has for a request with the secret word
-MOST = 64  # connections at once: files that the run needs are not theirs
-LARGEST = 1 << 16  # bytes behind a request, which nobody needs
-# Names that this machine has for itself; another one is a site that has made its own stand for it.
+PATIENCE = 1.0  # seconds for the last news to reach a page at the end
+BEAT = 2.0  # seconds between keep-alive messages, which reveal closed pages
+STUCK = 30.0  # seconds after which a page that receives nothing counts as closed
+UNKNOWN = 5.0  # seconds for a connection to send a request with the secret word
+MOST = 64  # connections at once: leaves file descriptors to the run
+LARGEST = 1 << 16  # bytes in the body of a request, which is not needed
+# Names of this machine; another one means a site that resolves its name to this machine.
 HERE = ("127.0.0.1", "localhost", "::1")
-# Plotly makes styles and functions as it draws.
+# Plotly creates styles and functions while drawing.
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
@@ -45,20 +45,20 @@ class Server:
     Parameters
     ----------
     page
-        The file of the page (HTML).
+        The HTML file of the page.
     news
-        ``news(seen)`` gives what is seen then, and tells what has come since `seen`, 0 at first;
-        called in threads of the server, at once when a page opens, then after each `changed`.
+        ``news(seen)`` returns the new `seen` and what is new since the old one (0 at first); called
+        in server threads when a page opens, then after each `changed`.
     answers
-        What is given for further addresses, by their names: bytes or what becomes JSON, None where
-        there is none. Called with the words behind the question mark.
+        Responses to further addresses by name: bytes, something JSON can express, or None. Called
+        with the query parameters.
     actions
-        What a page may ask for (POST), by name.
+        Actions that a page may request (POST), by name.
 
     Attributes
     ----------
     address
-        What to open; whoever knows it sees the page and may use its actions.
+        The URL; with it anybody on this machine can see the page and use its actions.
     """
 
     def __init__(
@@ -74,17 +74,17 @@ class Server:
         self.actions = actions
         self.version = 0
         self._changed = threading.Condition()
-        self._shown: dict[int, int] = {}  # the version that each open page has
-        self.opened = False  # by any page so far
-        self.framed = False  # shown within a notebook
+        self._shown: dict[int, int] = {}  # the version sent to each open page
+        self.opened = False  # some page has been open
+        self.framed = False  # displayed in a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
-        # It ends as soon as it has looked whether it should.
+        # A short poll interval, so that it ends quickly.
         threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
-        """Let all pages know that there are news."""
+        """Announce news to all pages."""
         with self._changed:
             self.version += 1
             self._changed.notify_all()
@@ -95,25 +95,25 @@ class Server:
         return bool(self._shown)
 
     def flush(self) -> None:
-        """Wait, a moment at most, until open pages have the last news."""
+        """Wait briefly until open pages have the last news."""
         with self._changed:
             self._changed.wait_for(
                 lambda: all(shown >= self.version for shown in self._shown.values()), PATIENCE
             )
 
     def stay(self) -> None:
-        """Go on answering until a page has been open, and none is any more."""
+        """Keep serving until a page has been opened and all are closed."""
         with self._changed:
             self._changed.wait_for(lambda: self.opened and not self._shown)
 
     def close(self) -> None:
-        """Bring the last news, and end."""
+        """Send the last news, and close."""
         self.flush()
         self._http.shutdown()
         self._http.server_close()
 
     def events(self, write: Callable[[bytes], Any]) -> None:
-        """Write news as they come, until the page is closed."""
+        """Write news as they come until the page is closed."""
         key, seen, version = threading.get_ident(), 0, -1
         try:
             while True:
@@ -125,7 +125,7 @@ class Server:
                 with self._changed:
                     self._shown[key], self.opened = version, True
                     self._changed.notify_all()
-                time.sleep(0.1)  # more often nobody sees
+                time.sleep(0.1)  # more often is not visible
         finally:
             with self._changed:
                 self._shown.pop(key, None)
@@ -133,7 +133,7 @@ class Server:
 
 
 def require_plotly() -> None:
-    """See that Plotly is there, which takes long to import."""
+    """Check that Plotly is installed, without importing it, which is slow."""
     if importlib.util.find_spec("plotly") is None:
         raise ScriptError(
             "a page needs the package plotly",
@@ -142,7 +142,7 @@ def require_plotly() -> None:
 
 
 class _Quiet(ThreadingHTTPServer):
-    """Says nothing of pages that are closed while they load; takes so many connections at most."""
+    """Ignores pages that close while loading, and limits the number of connections."""
 
     daemon_threads = True
 
@@ -161,7 +161,7 @@ class _Quiet(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, *_: Any) -> None:
-        """The terminal is that of the run."""
+        """Print nothing on the terminal of the run."""
 
 
 def _plotly(_: Mapping[str, str]) -> bytes:
@@ -181,7 +181,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
         server_version, sys_version = "karamelo-py", ""
 
         def log_message(self, *_: Any) -> None:
-            """Say nothing: the terminal is that of the study."""
+            """Print nothing on the terminal of the study."""
 
         def do_GET(self) -> None:
             name, words = self._asked()
@@ -210,7 +210,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             name, words = self._asked()
             length = self.headers.get("Content-Length", "0")
             if length.isdecimal() and len(length) < 9 and int(length) <= LARGEST:
-                self.rfile.read(int(length))  # else it would count as the next request
+                self.rfile.read(int(length))  # otherwise it would be read as the next request
             else:
                 self.close_connection = True
             if not self._is_from_here():
@@ -222,7 +222,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 self._give(b"{}", "application/json")
 
         def _is_from_here(self) -> bool:
-            """Tell whether a page of this server asks, as far as browsers say."""
+            """Tell whether the request comes from a page of this server, if browsers report it."""
             host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
             try:
                 here = urlsplit(f"//{host}").hostname in HERE
@@ -231,7 +231,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 return False
 
         def _asked(self) -> tuple[str | None, dict[str, str]]:
-            """Read which address is asked for; None without the secret word."""
+            """Return the requested address; None without the secret word."""
             asked = urlsplit(self.path)
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())

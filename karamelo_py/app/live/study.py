@@ -1,4 +1,4 @@
-"""The page of a study: its runs as they wait, run and end, and a chart that fills."""
+"""The live page of a study: state of its runs, and a chart that fills."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from karamelo_py.app.live.server import Server
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import COLUMNS, command_of, said_in, worded
 
-MOST = 400  # rows of a log that a page draws
-LINES = 12  # of what a run has said
+MOST = 400  # rows of a log drawn on a page
+LINES = 12  # last lines of a run's output
 
 
 class StudyPage:
-    """Shows a study in browsers; `stopped` is set when somebody there ends it.
+    """Shows a study in browsers; `stopped` is set when a viewer ends it.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class StudyPage:
     names
         The variables of the study.
     recorded
-        Names of what is recorded of each run.
+        Names of the values recorded for each run.
     axes
-        What the chart shows at first; empty: what suits the names.
+        Initial axes of the chart; empty: chosen from the names.
     beside
         The folder that folders of rows are relative to.
     """
@@ -70,7 +70,7 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """Show the class of each row, and why, by colours of classes: ``judged(row)`` adds them."""
+        """Colour rows by class: ``judged(row)`` adds class and reason, `colours` maps classes."""
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(
@@ -80,7 +80,7 @@ class StudyPage:
         running: Sequence[tuple[Mapping[str, str], Path, float]],
         **progress: Any,
     ) -> None:
-        """Take what is known: rows of runs that have ended, cases with their folders."""
+        """Update rows of finished runs, and cases with their folders."""
         for row in rows[len(self._rows) :]:
             case = {name: row[name] for name in self._names}
             self._rows.append({**self._judged(row), "title": worded(case)})
@@ -94,7 +94,7 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """Tell of rows and cases that have come; cases without a row that do not run wait."""
+        """Report new rows and cases; cases without a row that do not run are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         told = {
@@ -107,7 +107,7 @@ class StudyPage:
         return (first_row + len(rows), first_case + len(cases)), told
 
     def _run(self, words: Mapping[str, str]) -> dict | None:
-        """Tell of one run: the last lines that it has said, and the columns of its log."""
+        """Report one run: its last lines of output, and the columns of its log."""
         folder = self._folders.get(words.get("title", ""))
         if folder is None:
             return None
@@ -125,5 +125,5 @@ class StudyPage:
 
 
 def _some(count: int) -> np.ndarray:
-    """Number rows of a log that are drawn, the first and the last among them."""
+    """Choose rows of a log to draw, including the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(int))

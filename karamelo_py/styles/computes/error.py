@@ -308,7 +308,7 @@ class Reference(Compared, Compute):
         known = [*hub.fields.particle_names(), "ux", "uy", "uz"]
         for name in (self.along, self.column):
             if name not in known:
-                hint = f"in {file} the coordinate first, then columns named as those of a dump"
+                hint = f"in {file} the coordinate first, then columns named as in dumps"
                 message = f"points have no column '{name}'"
                 raise unknown(message, name, known, hint, place=column.place)
         refuse_absent(hub, (self.column,))

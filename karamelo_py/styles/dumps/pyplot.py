@@ -294,7 +294,7 @@ def look_of(
             )
     if outlines and dimension == 1:
         raise ScriptError(
-            "outlines are drawn in the plane and in space, and this scene is on a line",
+            "outlines are drawn in 2D and 3D, and this scene is 1D",
             argument="outlines",
             expected="false",
         )

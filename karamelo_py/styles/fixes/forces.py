@@ -149,7 +149,7 @@ class PointForces(Fix):
         soft = (s for s, r in zip(solids, rigid, strict=True) if not r)
         if self.rigid and not any(map(group.touches, soft)):
             raise ScriptError(
-                f"solid '{self.rigid[0].id}' is rigid: no force moves it, only what it is told",
+                f"solid '{self.rigid[0].id}' is rigid: forces do not move it",
                 argument="group",
                 expected="points of other solids; fix velocity_particles moves rigid ones",
             )
@@ -195,7 +195,7 @@ class ForceParticles(PointForces):
         super().__init__(hub, group)
         if self.rigid:
             hub.warn(
-                f"solid '{self.rigid[0].id}' is rigid: its share of the force moves nothing",
+                f"solid '{self.rigid[0].id}' is rigid: its part of the force has no effect",
                 hint="a group without its points",
             )
         self.force = per_direction(hub, "f", force)
@@ -366,6 +366,6 @@ known_failure(
     "initial tension",
     when=_unborne_tension,
     reason="fix {part.id} pulls {pulled:.0%} of the points of solid '{solid}' with a mean stress "
-    "of up to {most:.3g}, which its material does not bear: they come apart in the first step",
+    "of up to {most:.3g}, which its material cannot sustain: they separate in the first step",
     cure="compression is negative: {line}",
 )

@@ -69,6 +69,6 @@ def judge_friction(hub: Hub, mu: float) -> None:
     """Warn of a coefficient that no pair of materials has."""
     if mu > USUAL_FRICTION:
         hub.warn(
-            f"the coefficient of friction is {mu:g}: measured ones stay below 1.5",
-            hint=f"a share of the pressing force: {mu / 100:g} is {mu:g} %" if mu >= 5 else None,
+            f"the coefficient of friction is {mu:g}; measured ones are below 1.5",
+            hint=f"a fraction of the normal force: {mu / 100:g} is {mu:g} %" if mu >= 5 else None,
         )

@@ -55,9 +55,9 @@ class PairContact(Gripping):
         method = hub.update.method
         if not method.own_grids:
             hub.warn(
-                "solids that share a grid touch there already; "
-                "the forces of this fix come on top of that",
-                hint="method(tlmpm, ...) gives every solid a grid of its own"
+                "solids on one grid are in contact there already; "
+                "this fix adds further forces",
+                hint="method(tlmpm, ...) uses a separate grid for each solid"
                 + (
                     "; fix contact/friction is for the contact on the grid"
                     if method.fields_per_solid
@@ -327,7 +327,7 @@ class ContactFriction(Fix):
         method = hub.update.method
         if not method.fields_per_solid:
             raise ScriptError(
-                "contact/friction is for solids with velocity fields of their own",
+                "contact/friction needs a velocity field per solid",
                 expected="method(ulmpm/contacts, ...)",
                 hint="in ulmpm solids that meet on the grid stick together; "
                 "for tlmpm there is fix contact/minimize_penetration",

@@ -47,7 +47,7 @@ class PythonFunction:
             raise ScriptError(
                 f"'{name}' names no module",
                 place=argument.place,
-                expected="module.function, of a module beside the script or an installed one",
+                expected="module.function, of a module next to the script or an installed one",
             )
         folder = hub.interpreter.folder.absolute()
         sys.path.insert(0, str(folder))
@@ -176,8 +176,8 @@ class Python(Fix):
         if forgotten:
             self.told = True
             self.hub.warn(
-                f"fix python: {_name(self.function)} has changed {', '.join(forgotten)}, and files "
-                "to go on from do not hold that: a run goes on from there in another way",
+                f"fix python: {_name(self.function)} has changed {', '.join(forgotten)}, and "
+                "restart files do not contain that: a restarted run will differ",
                 place=self.place,
                 hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.place}, or in the "
                 "class of an object that is called",
@@ -217,7 +217,7 @@ class Python(Fix):
                 "on another",
                 place=self.place,
                 hint="each has a part of the points: sum by points.total(values) or "
-                "nodes.total(values), which all share, or leave point_by_point out",
+                "nodes.total(values), the same on all, or leave point_by_point out",
             )
 
 

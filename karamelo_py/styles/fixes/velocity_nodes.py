@@ -188,7 +188,7 @@ class VelocityNodes(Fix):
             raise ScriptError(
                 "a fix has bounds of one kind: leq, geq, or none",
                 argument="velocity",
-                hint="fixes with IDs of their own: " + " and ".join(lines),
+                hint="fixes with different IDs: " + " and ".join(lines),
             )
         return next(iter(bounds), "")
 
@@ -297,10 +297,10 @@ class Reaction(Compute):
         inside = np.isin(fix.group.members, self.group.members)
         if inside.any() and not inside.all():
             raise ScriptError(
-                f"fix '{fix.id}' holds nodes of group '{self.group.id}' and others: "
-                "its reaction is that of both",
+                f"fix '{fix.id}' holds nodes of group '{self.group.id}' and further ones: "
+                "its reaction contains both",
                 place=self.place,
                 expected="a group that has all nodes of a fix or none",
-                hint=f"two fixes, one for the nodes of {self.group.id}, in the place of '{fix.id}'",
+                hint=f"two fixes, one for the nodes of {self.group.id}, instead of '{fix.id}'",
             )
         return bool(inside.all()) and len(inside) > 0

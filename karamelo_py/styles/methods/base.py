@@ -175,11 +175,11 @@ class Method:
         )
         if unsteady and not scheme.traits.maps_velocity_again:
             raise ScriptError(
-                f"{registry.name_of('transfer', type(transfer))} with {self.basis_name} functions "
+                f"{registry.name_of('transfer', type(transfer))} with the basis {self.basis_name} "
                 f"and {registry.name_of('scheme', type(scheme))} is unstable: D of the affine "
-                "transfers vanishes at nodes, and there the moments push where there is next to no "
+                "transfers vanishes at nodes, where moments then act on almost no "
                 "mass",
-                hint="scheme(musl), or quadratic-spline in the place of the basis, or method tlmpm",
+                hint="scheme(musl), or quadratic-spline, or method tlmpm",
             )
 
 

@@ -43,7 +43,7 @@ class Convected(Method):
         if moves_corners and isinstance(hub.update.transfer, ASFLIP):
             raise ScriptError(
                 "ASFLIP moves points faster than the grid, and the corners of "
-                f"{type(self.basis).__name__} domains, which go with the grid, would stay behind",
+                f"{type(self.basis).__name__} domains, which move with the grid, would not follow",
                 hint="AFLIP or another transfer, or domains of the shape "
                 + ("R4" if hub.domain.dimension == 2 else "R8"),
             )
@@ -70,7 +70,7 @@ class Convected(Method):
             else:
                 fits = element is not None and element.kind == solid.shape
                 fit = [n for n, other in own.items() if other and other.kind == solid.shape]
-                hint = f"{fit[0]} in the place of {name}" if fit else "a mesh of linear elements"
+                hint = f"{fit[0]} instead of {name}" if fit else "a mesh of linear elements"
             if not fits:
                 raise ScriptError(
                     f"points of solid '{solid.id}' have {has} around them, and {name} domains "

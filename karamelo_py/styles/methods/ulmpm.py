@@ -90,7 +90,7 @@ class TLMPM(Method):
             if hub.update.scheme.traits.implicit:
                 hint = "method(ulmpm/contacts, ...) where they may meet"
             hub.warn(
-                f"solids with grids of their own pass through each other: {', '.join(alone)}",
+                f"solids on separate grids pass through each other: {', '.join(alone)}",
                 hint=hint,
             )
 

@@ -226,10 +226,10 @@ class ULMPMContacts(Method):
                 first, second = (solid.id for solid in fix.solids)
                 line = f" (line {other.place.line})" if other.place else ""
                 error = ScriptError(
-                    f"the friction of solids '{first}' and '{second}' is that of fix "
-                    f"'{other.id}'{line} already",
+                    f"the friction of solids '{first}' and '{second}' is already set by fix "
+                    f"'{other.id}'{line}",
                     place=fix.place,
-                    expected="one fix contact/friction for each pair of solids (those that are "
+                    expected="one fix contact/friction for each pair of solids (solids "
                     "glued together count as one)",
                     hint=f"fix({other.id}, contact/friction, {first}, {second}, ...) replaces it",
                 )

@@ -54,7 +54,7 @@ class CuttingTool(ToolFix):
     ):  # fmt: skip
         super().__init__(hub, group)
         if hub.domain.dimension != 2:
-            raise ScriptError("the tool is one in the plane", expected="a domain in 2D")
+            raise ScriptError("this tool is for 2D", expected="a domain in 2D")
         self.K = K
         self.tip = self.of_time("", (x_tip, y_tip, z_tip))
         self.ends = (xA, yA), (xB, yB)

@@ -60,7 +60,7 @@ class MeldTool(ToolFix):
     ):  # fmt: skip
         super().__init__(hub, group)
         if hub.domain.dimension != 3:
-            raise ScriptError("the tool is one in space", expected="a domain in 3D")
+            raise ScriptError("this tool is for 3D", expected="a domain in 3D")
         self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
         self.now(*self.numbers)  # refuses formulas of position
         self.along = "xyz".index(axis)
