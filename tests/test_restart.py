@@ -240,7 +240,7 @@ def test_what_a_function_forgets_is_told(run_interpreted, tmp_path):
     (tmp_path / "run" / "ropes.py").write_text(dedent(module), encoding="utf-8")
     fixes = "fix(p, python, all, ropes.pull)\nfix(r, python, all, ropes.rope)\n"
     err = run_interpreted(with_files(FLY.replace("run(4)", fixes + "run(4)"))).err
-    assert err.count("pull has changed total, list_of, and files to go on from") == 1
+    assert err.count("pull has changed total, list_of, and restart files") == 1
     assert "remembers = ('total', 'list_of') in the module ropes" in err
     assert err.count("Rope has changed pulled, and") == 1
     assert "remembers = ('length', 'pulled') in the class Rope" in err

@@ -163,7 +163,7 @@ def test_the_size_of_cells_is_found_where_solids_name_it(run_interpreted):
     script = "dimension(2, 0, 1, 0, 1)\ncell = 1/8\nregion(box, block, 0, 1, 0, 1)\n"
     script += "solid(s, box, 2, mat, cell)\n"
     err = run_interpreted(script, status=1).err
-    assert "hint: dimension(2, 0, 1, 0, 1, cell), behind line 2, which sets cell\n" in err
+    assert "hint: dimension(2, 0, 1, 0, 1, cell), after line 2, which sets cell\n" in err
     assert err.count("error") == 1
 
 

@@ -179,7 +179,7 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "q.dump"], "p.dump and q.dump both have step 0"),
         (["p.dump", "--only", "not tool"], "--script FILE the groups, solids and variables"),
         (["p.dump", "-c", "tool"], "--script FILE the groups"),
-        (["p.dump", "--title", "load {load} N"], "a log in the folder of the dumps (log.mpm, log.csv)"),
+        (["p.dump", "--title", "load {load} N"], "a log in the folder of the dumps"),
         (["p.dump", "--title", "v_{max}"], "($v_{max}$), or {{max}} for braces"),
         (["p.dump", "--title", "{1/0}"], "error: {1/0} in --title: division by zero"),
         ([], "FILE"),
