@@ -39,7 +39,7 @@ class Row(NamedTuple):
 
 
 class RunPage(Rhythmic, Listener):
-    """Shows a run in browsers: goes on in the rhythm of the log, and holds it where it is paused.
+    """Shows a run in browsers: updated with the log, and pauses the run on request.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ class RunPage(Rhythmic, Listener):
         hub.listeners.append(self)
 
     def signalled(self, number: int) -> None:
-        """Hold the run no longer."""
+        """Resume a paused run."""
         self._paused = False
 
     # ---- in the thread of the run ---------------------------------------------------------------
@@ -136,7 +136,7 @@ class RunPage(Rhythmic, Listener):
             left = time.perf_counter() if self.server.watched else left
             if time.perf_counter() - left > GRACE:
                 self._paused = False
-                self.hub.console.say("the live page that held the run is closed: it goes on")
+                self.hub.console.say("the live page that paused the run is closed: it continues")
             if shown != self._column:
                 shown = self._column
                 self._take_again()
@@ -195,6 +195,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Interrupt the run, if one goes on, as Ctrl-C does: the last state is written."""
+        """Interrupt the run, if there is one, like Ctrl-C: the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)
