@@ -9,10 +9,10 @@ import pytest
 from conftest import INPUTS
 from scenes import block
 
+from karamelo_py.advice.energy import cause_of_gain
+from karamelo_py.advice.known_failures import warn
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.advice.known_failures import warn
-from karamelo_py.run.diagnosis.energy import cause_of_gain
 from karamelo_py.scene.hub import Hub
 
 SCENE = """

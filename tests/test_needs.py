@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
 
+from karamelo_py.advice.suggestions import _output as output
+from karamelo_py.advice.suggestions import _precision as precision
+from karamelo_py.advice.suggestions import suggestions
 from karamelo_py.app.cli import main
 from karamelo_py.compiler.fields import name_of, rows_of_points, some_points
 from karamelo_py.compiler.fingerprint import classes_in
@@ -21,9 +24,6 @@ from karamelo_py.kernels.step import advance
 from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.advice.suggestions import _output as output
-from karamelo_py.run.advice.suggestions import _precision as precision
-from karamelo_py.run.advice.suggestions import suggestions
 from karamelo_py.run.implicit.load_steps import LoadSteps
 from karamelo_py.run.lower.memory import bytes_per_point, node_fields, point_fields
 from karamelo_py.run.timestep import own_weight_of_drift

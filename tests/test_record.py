@@ -5,11 +5,11 @@ import json
 import re
 from pathlib import Path
 
+from karamelo_py.advice import known_failures
+from karamelo_py.advice.explain import DOUBTED_UNITS
 from karamelo_py.language import rules
 from karamelo_py.output.console import show
 from karamelo_py.output.record import RunRecord
-from karamelo_py.run.advice import known_failures
-from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS
 from karamelo_py.script.errors import codes
 
 PAGE = Path(__file__).parent.parent / "docs" / "run-record.md"

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from karamelo_py.advice import known_failures
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
-from karamelo_py.run.advice import known_failures
 from karamelo_py.run.loop import RunLoop
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError

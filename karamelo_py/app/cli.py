@@ -459,7 +459,7 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:
-            from karamelo_py.run.advice.report import report
+            from karamelo_py.advice.report import report
 
             report(hub)
         hub.console.say(render_message("note", message, hint=RUN_COMMANDS))

@@ -4,13 +4,13 @@ from math import inf, isnan
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from karamelo_py.advice import known_failures
+from karamelo_py.advice.narrator import Narrator
+from karamelo_py.advice.report import report
 from karamelo_py.language.kinds import kind_of
 from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Positive
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
-from karamelo_py.run.advice import known_failures
-from karamelo_py.run.advice.listener import Narrator
-from karamelo_py.run.advice.report import report
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.loop import RunLoop
 from karamelo_py.run.lower.build import check_scene

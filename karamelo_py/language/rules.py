@@ -11,7 +11,7 @@ rules are declared beside it, those of plug-ins as well::
         cure="APIC, or FLIP, in the place of PIC",
     )
 
-`when` gets the part and the facts of the scene (:class:`karamelo_py.run.advice.facts.SceneFacts`).
+`when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`).
 It returns whether the rule speaks, or the numbers for its words, by name, or a list of these, one
 for each time that it speaks. Between braces words have these numbers and what ``part``, ``scene``
 and ``owner`` have, such as ``{scene.turn:.2g}``; the owner of a law, or of one of its parts, is the

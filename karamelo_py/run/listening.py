@@ -23,6 +23,11 @@ def when(simulation: Any, later: int = 0) -> str:
     return f"step {simulation.step + later}, t = {simulation.time:.6g}"
 
 
+def where(x: Any) -> str:
+    """Write a position."""
+    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
+
+
 class Listener:
     """Hears what happens in a run; a subclass overrides what it cares for."""
 

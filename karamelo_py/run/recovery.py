@@ -8,9 +8,9 @@ from typing import NoReturn
 
 from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
+from karamelo_py.run import energy
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
-from karamelo_py.run.diagnosis import energy, explain
 from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
@@ -50,7 +50,7 @@ class RollBack:
         read between any two steps (`looks`).
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
-        self.too_large = explain.is_too_large(simulation)
+        self.too_large = simulation.too_large
         # Deleted points would not come back.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
@@ -60,7 +60,7 @@ class RollBack:
 
     def before(self) -> None:
         """Store the present state if it is due and good; else note the memory of parts."""
-        if self.point.step == self.begun_at and explain.is_too_large(self.simulation):
+        if self.point.step == self.begun_at and self.simulation.too_large:
             return  # only the first state is good, and its rows are not rewound
         step = self.simulation.step
         # When states are stored must not depend on the speed of steps: runs return to them.

@@ -16,11 +16,11 @@ from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
 from karamelo_py.run import timestep
-from karamelo_py.run.diagnosis.energy import unknown_heat, unknown_work
-from karamelo_py.run.diagnosis.explain import refuse_endless_speeds
+from karamelo_py.run.energy import unknown_heat, unknown_work
 from karamelo_py.run.light_nodes import stable_share
 from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_of
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
+from karamelo_py.run.no_number import refuse_endless_speeds
 from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -189,6 +189,11 @@ class Simulation(SceneArrays):
 
     def above_limit(self) -> bool:
         return not self.implicit and self.control.values[DT] > self.limit * (1 + 1e-12)
+
+    @property
+    def too_large(self) -> bool:
+        """Return True if the step was above the stability limit from the start of the run."""
+        return not self.control.clock[0].watch_limit and not self.implicit
 
     def _watch_limit(self) -> None:
         """Watch the limit, unless the step exceeds it from the start, as the user wants."""

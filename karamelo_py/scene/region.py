@@ -27,6 +27,8 @@ class Region(Named):
     # Direction (0, 1, 2) and centre of the axis of a 3D region that is a cylinder of constant
     # `radius`.
     axis: tuple | None = None
+    radius = 0.0
+    skin: Any = None  # the surface of a region from a file
     catalogue = "regions"
 
     def __init__(

@@ -15,6 +15,7 @@ from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.lattice import CHUNK
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
+from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
@@ -40,6 +41,10 @@ class Solid(Named):
     source = "region"  # argument that gives the positions of points, for messages
     # Volume of the points, and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
+    region: Region | None = (
+        None  # that it fills, with `ppc` points per cell and direction, perhaps `cut`
+    )
+    ppc, cut = 0, False
     warm = False  # its points have individual temperatures
 
     def __init__(

@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice import energy
 from karamelo_py.app.launch import rendered
 from karamelo_py.app.live import frames
 from karamelo_py.app.live.frames import Frame, KeptFrames, plain
 from karamelo_py.app.live.server import Server
+from karamelo_py.kernels.watch import FEW
 from karamelo_py.output.rhythm import Rhythmic
-from karamelo_py.run.diagnosis import energy
+from karamelo_py.run.energy import share_lost, unknown_work
 from karamelo_py.run.listening import Listener
 from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
@@ -82,9 +84,9 @@ class RunPage(Rhythmic, Listener):
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         clock = simulation.control.clock[0]
-        known = clock.watch_energy and clock.looks >= energy.FEW  # a mean over this many
-        gain = -100 * energy.share_lost(simulation) if known else None
-        why = energy.unknown_work(hub)
+        known = clock.watch_energy and clock.looks >= FEW  # a mean over this many
+        gain = -100 * share_lost(simulation) if known else None
+        why = unknown_work(hub)
         self._unwatched = f"energy {energy.not_watched(why)}" if why else ""
         limit = "load steps" if simulation.implicit else ruling_limit(simulation)
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.advice.energy import not_watched
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look, records, variables
@@ -20,7 +21,6 @@ from karamelo_py.app.studies.study import Study, live_page
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure, tick_texts
-from karamelo_py.run.diagnosis.energy import not_watched
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 

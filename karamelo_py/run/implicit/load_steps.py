@@ -16,7 +16,6 @@ from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import used
-from karamelo_py.run.diagnosis.explain import no_number
 from karamelo_py.run.implicit.conduction import conduct
 from karamelo_py.run.implicit.contact import Contact, contact_of
 from karamelo_py.run.implicit.equations import Equations, Moduli
@@ -25,6 +24,7 @@ from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFa
 from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import PushingTool, tools_of
+from karamelo_py.run.no_number import no_number
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 

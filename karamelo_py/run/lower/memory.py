@@ -163,7 +163,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
-        ppc = getattr(solid, "ppc", 0)  # else nothing is known of the cells that it fills
+        ppc = solid.ppc  # else nothing is known of the cells that it fills
         cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
     d, per_cell = kin.dimension, hub.update.method.basis.traits.nodes_per_cell**kin.dimension
     of_node = np.dtype(real).itemsize * (

@@ -211,7 +211,7 @@ class OnEdge(Fix):
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
         """Find faces from the surface of the region; None to find them from the boxes."""
-        return faces_cut(solid, self.region, ids) if getattr(solid, "cut", False) else None
+        return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:

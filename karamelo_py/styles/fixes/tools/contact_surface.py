@@ -122,7 +122,7 @@ class ContactSurface(StiffTool):
 
     def faces_of(self) -> np.ndarray | None:
         """Return the present faces (m, d, d) of the region, if it consists of faces."""
-        skin = getattr(self.region, "skin", None)
+        skin = self.region.skin
         return None if skin is None else skin.faces + self.moved(1.0)[0]
 
     def _touch(self, row: int, values: tuple) -> Touch:

@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice.bodies import fixes_at, lattice_at, sides, yields
+from karamelo_py.advice.crossing import loses
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion, fixes_at, lattice_at, sides, yields
-from karamelo_py.run.crossing import loses
+from karamelo_py.run.body_motion import BodyMotion
 
 CELLS = 0.25  # of displacement at rest: with less, hardly a point crosses a cell
 

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.advice.facts import SceneFacts, is_zero, script_text
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.points.laws import parameter
-from karamelo_py.run.advice.facts import SceneFacts, script_text
+from karamelo_py.advice.facts import SceneFacts, script_text
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
 
@@ -78,7 +79,7 @@ def _precision(hub: Hub, simulation: Any) -> Words:
     if (
         sum(solid.count for solid in hub.solids.values()) < LARGE
         or hub.settings.precision != "double"
-        or getattr(simulation, "implicit", False)
+        or simulation.implicit
     ):
         return
     x = max(float(np.abs(solid.x0).max()) for solid in hub.solids.values() if solid.count)
@@ -92,7 +93,7 @@ def _precision(hub: Hub, simulation: Any) -> Words:
 
 def _output(hub: Hub, simulation: Any) -> Words:
     """Find output that takes longer than the steps, by rough times of one core."""
-    span = getattr(simulation.control.clock[0], "end_time", inf) - hub.update.time
+    span = simulation.control.clock[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):
         return

@@ -4,55 +4,22 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.watch import BORNE, FEW, LOOKS, WITHIN, growth, keeps, unit_of
+from karamelo_py.advice.facts import SceneFacts
+from karamelo_py.kernels.watch import LOOKS
 from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
-from karamelo_py.points.laws import can, constrained_velocity
-from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run import timestep
-from karamelo_py.run.advice.facts import SceneFacts
+from karamelo_py.run.energy import TOLD, has_grown, share_lost
 from karamelo_py.run.listening import Trouble, when
-from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
 LOSS = 0.05  # of the largest energy, at the end of a run: more gives a warning; WITHIN before
-TOLD = 2  # consecutive windows of growth, after which a run warns
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
 def not_watched(why: str) -> str:
     return f"is not monitored: the work of {why} is not tracked"
-
-
-def unknown_work(hub: Hub) -> str:
-    """Name the source of work that is not tracked; empty if energy can be watched.
-
-    The loops sum the work of compiled hooks on nodes and points. Fixes in Python declare by
-    `Fix.conserves` that they do no other work.
-    """
-    method, implicit = hub.update.method, hub.update.scheme.traits.implicit
-    apart = method.own_grids or (implicit and method.fields_per_solid)
-    for fix in hub.fixes.values():
-        acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
-        if acts and not fix.first_step_only and not fix.conserves:
-            return f"fix {fix.style} '{fix.id}'"
-    for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity) and apart:
-            return f"rigid solid '{solid.id}'"
-        if hub.update.thermal and can(solid.material.law, initial_heat):
-            return "heat"
-    return ""
-
-
-def unknown_heat(hub: Hub) -> bool:
-    """Return True if a fix in Python may supply heat, or friction does."""
-    return warms_by_friction(hub) or any(
-        name in HEAT_STAGES and not isinstance(hook, CompiledHook)
-        for fix in hub.fixes.values()
-        for name, hook in fix.hooks().items()
-    )
 
 
 def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
@@ -137,12 +104,6 @@ def swelling(points: PointTable) -> np.ndarray:
     return points.particle("volume") / points.reference_volume
 
 
-def has_grown(simulation: Any) -> bool:
-    """Judge, by looks at it, that energy shows a spurious gain."""
-    clock = simulation.control.clock[0]
-    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
-
-
 def words_of_growth(hub: Hub, simulation: Any) -> Trouble | None:
     """Describe a spurious gain of energy; None where there is none."""
     clock = simulation.control.clock[0]
@@ -174,13 +135,6 @@ def taken_by(hub: Hub) -> list[str]:
         braking = dict.fromkeys(fix.style for fix in hub.fixes.values() if fix.brakes)
         found += [f"fix {style}" for style in braking]
     return found
-
-
-def share_lost(simulation: Any) -> float:
-    """Fraction of the largest energy so far lost since the first step; negative: a gain."""
-    clock = simulation.control.clock[0]
-    mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
-    return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
 
 
 def words_of_loss(hub: Hub, simulation: Any, within: float) -> Trouble | None:
@@ -243,34 +197,6 @@ def collides(hub: Hub) -> tuple[str, str] | None:
     return None
 
 
-def grown_little(simulation: Any) -> bool:
-    """Return True if the present state is good, judged by its energy and its last step."""
-    clock = simulation.control.clock[0]
-    swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
-    if swings or has_grown(simulation):
-        return False
-    if not clock.watch_energy:
-        return True
-    # The last look, too: noise that grows by half in a hundred steps is already in the state.
-    before = clock.first_mean if clock.looks >= FEW else clock.first_balance
-    return bool(keeps(before, clock.balance, unit_of(clock)))
-
-
-def growth_since(simulation: Any, before: float) -> float:
-    """Return the energy growth relative to `before`; NaN if energy is not watched."""
-    unit = max(abs(before), float(simulation.control.clock[0].energy_floor), 1e-300)
-    return growth(before, simulation.energy(), unit)
-
-
-def change_of_energy(simulation: Any) -> float | None:
-    """Return the energy change since the first step, in % of the largest; None if unknown."""
-    clock = simulation.control.clock[0]
-    if not clock.watch_energy or clock.looks <= FEW:
-        return None
-    # Since the first balance, not `first_few`, which `forget_growth` changes.
-    return -100 * share_lost(simulation)
-
-
 def words_of_change(hub: Hub, share: float) -> str:
     """Describe an energy change in % for the end of a run, and known dissipation."""
     takers, by = taken_by(hub), ""
@@ -285,10 +211,3 @@ def words_of_change(hub: Hub, share: float) -> str:
     # Losses add up, and may exceed the largest energy at any time.
     much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
     return f"{much} {words}{by}"
-
-
-def forget_growth(simulation: Any) -> None:
-    """Measure growth from the present state: a warning has been given."""
-    clock = simulation.control.clock[0]
-    clock.first_few = clock.first_mean = clock.largest_mean
-    clock.windows, clock.grown = 0, 0.0

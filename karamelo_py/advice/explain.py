@@ -1,24 +1,21 @@
 """Troubles of a run: found and explained, with the formula that gives no number."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.advice import energy
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
-from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.points.laws import by_rates
-from karamelo_py.run.diagnosis import energy
-from karamelo_py.run.listening import Trouble, when
+from karamelo_py.run.energy import has_grown
+from karamelo_py.run.listening import Trouble, when, where
+from karamelo_py.run.no_number import no_number
 from karamelo_py.run.timestep import own_step_instead, step_by_script
-from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 DOUBTED_UNITS = "units of "  # begins the names of warnings that doubt them
 ABSURD = 10.0  # cells in one step: no smaller one mends that
@@ -35,7 +32,7 @@ def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Troubl
         return _above_limit(hub, simulation)
     if status == SHRUNK:
         return _shrunk(hub, simulation)
-    smaller, too_large = _smaller_step(hub, simulation, smaller), is_too_large(simulation)
+    smaller, too_large = _smaller_step(hub, simulation, smaller), simulation.too_large
     if status in (GAINED, HEATED):
         found = (_gained if status == GAINED else _heated)(hub, simulation)
         found = found._replace(fix=smaller) if too_large else found
@@ -46,7 +43,7 @@ def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Troubl
     else:
         found = _wrong_point(hub, simulation, smaller)
         seen = f" after a spurious energy gain ({when(simulation, 1)})"
-        if found.place is None and energy.has_grown(simulation):
+        if found.place is None and has_grown(simulation):
             cause, fix = energy.cause_of_gain(hub, simulation)
             fix = smaller if too_large else fix
             found = found._replace(message=found.message + seen, fix=fix, cause=cause)
@@ -57,17 +54,12 @@ def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Troubl
     return found
 
 
-def is_too_large(simulation: Any) -> bool:
-    """Tell whether the step was above the stability limit from the start of the run."""
-    return not simulation.control.clock[0].watch_limit and not simulation.implicit
-
-
 def _above_limit_as_cause(hub: Hub, simulation: Any) -> str:
     update = hub.update
     if step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of:
         return "time step above the stability limit (see the warning)"
     # The limit of a state that went wrong says nothing of the step of a good one.
-    here = "" if is_too_large(simulation) else f" {simulation.limit:.4g}"
+    here = "" if simulation.too_large else f" {simulation.limit:.4g}"
     return f"time step {simulation.dt:.4g} above the stability limit{here}"
 
 
@@ -163,7 +155,7 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
         hint = f"look for a formula that gives NaN; else {smaller}"
         return no_number(hub, simulation, f"{name} has no position (NaN)", hint)
     if not np.isfinite(new).all() or not np.isfinite(v).all():
-        what = f"{name} at {_place(old)} gets a velocity that is not a number"
+        what = f"{name} at {where(old)} gets a velocity that is not a number"
         hint = f"look for a formula that gives NaN, such as a division by zero; else {smaller}"
         return no_number(hub, simulation, what, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
@@ -174,17 +166,17 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         if move > ABSURD:
             what = (
-                f"{name} at {_place(old)} moves by {move:.3g} cells in one step, out of the domain"
+                f"{name} at {where(old)} moves by {move:.3g} cells in one step, out of the domain"
             )
             return Trouble(what, unstable, "point-lost")
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
-            what = f"{name} at {_place(old)} is thrown out of the domain"
+            what = f"{name} at {where(old)} is thrown out of the domain"
             return Trouble(what, smaller, "point-lost")
         loose = _loose(simulation, number, old, LOOSE * h)
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
         return Trouble(
-            f"{name} leaves the domain at {_place(new)} (through {'xyz'[side]} = "
+            f"{name} leaves the domain at {where(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
             "a larger domain, fix velocity_nodes at the wall, or boundary(delete); if the point "
             f"should not have got there, {smaller}{keep}",
@@ -192,20 +184,20 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
             f"point separated from its solid: numerical fracture ({APART})" if loose else "",
         )
     if move > 1:
-        what = f"{name} at {_place(old)} moves by {move:.3g} cells in one step"
+        what = f"{name} at {where(old)} moves by {move:.3g} cells in one step"
         return Trouble(what, unstable, "moves-too-far")
     if any(simulation.points.seen(_is_tangled, place, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} instead of {tangled}" if tangled in ("Q4", "H8") else ""
         return Trouble(
-            f"the domain of {name} at {_place(old)} is tangled: one of its corners folds over",
+            f"the domain of {name} at {where(old)} is tangled: one of its corners folds over",
             f"more points per cell{instead}, method tlcpdi, or {smaller}",
             "tangled",
         )
     law = solid_with(hub, number).material.law
     other = ", or a law that resists the compression (neo-hookean)" if by_rates(law) else ""
     return Trouble(
-        f"{name} at {_place(old)} is turned inside out (det F <= 0)",
+        f"{name} at {where(old)} is turned inside out (det F <= 0)",
         f"{smaller}, or a finer grid{other}",
         "inside-out",
     )
@@ -252,85 +244,3 @@ def _smaller_step(hub: Hub, simulation: Any, instead: str = "") -> str:
         return own_step_instead(hub)
     fixed = hub.update.fixed_dt is not None
     return "a smaller time step (set_dt)" if fixed else "a smaller dt_factor"
-
-
-def _first_bad(simulation: Any) -> tuple | None:
-    """Find the first such fix by numbers, at hand: (fix, formula, place), value, position."""
-    hub, values = simulation.hub, simulation.hub.values
-    for which, fix in enumerate(hub.fixes.values()):
-        over = simulation.step > 0 and fix in simulation.begun
-        if over or not fix.hooks():
-            continue
-        for k, formula in enumerate(formulas_of(tuple(vars(fix).values()))):
-            # What reads a NaN shows the damage, and not where it comes from.
-            read = formula.names.difference(POINT_SEEDS)
-            readable = all(n in values and np.isfinite(values.get(n)) for n in read)
-            if formula.is_constant or not readable:
-                continue
-            bad = []
-            for numbers, x, x0 in _places(simulation, fix.group, formula):
-                given = formula.evaluate_points(values, x, x0)
-                rows = np.flatnonzero(~np.isfinite(given))
-                if len(rows):
-                    p = rows[np.argmin(numbers[rows])]
-                    key = which, k, int(numbers[p])
-                    bad.append((key, float(given[p]), x[p] if x.size else None))
-            if bad:
-                return min(bad, key=lambda one: one[0])
-    return None
-
-
-def formulas_of(value: Any) -> Iterator[Expression]:
-    """List the formulas among the attributes of a fix, and in tuples and lists of these."""
-    if isinstance(value, Expression):
-        yield value
-    elif isinstance(value, (tuple, list)):
-        for one in value:
-            yield from formulas_of(one)
-
-
-def _places(simulation: Any, group: Any, formula: Expression) -> Iterator[tuple]:
-    """List places at hand at which a fix evaluates a formula: numbers; now (n, d), and at first."""
-    if not formula.names.intersection(POINT_SEEDS):
-        yield np.zeros(1, np.int64), np.empty((1, 0)), None
-    elif isinstance(group, NodeGroup):
-        nodes = simulation.nodes.with_mass()
-        nodes = nodes if group.all else np.intersect1d(nodes, group.nodes, assume_unique=True)
-        x = places_of(simulation.hub, nodes)
-        yield nodes, x, x
-    else:
-        for some in simulation.points.some(group):
-            there = np.isfinite(some.position).all(axis=1)
-            yield some.numbers[there], some.position[there], some.reference_position[there]
-
-
-def no_number(hub: Hub, simulation: Any, message: str, hint: str) -> Trouble:
-    """Make the trouble for what is NaN, and the first fix whose formula gives NaN or infinity."""
-    found = [one for one in simulation.points.seen(_first_bad) if one is not None]
-    if not found:
-        return Trouble(message, hint, "not-a-number")
-    (which, k, _), value, x = min(found, key=lambda one: one[0])
-    fix = list(hub.fixes.values())[which]
-    formula = list(formulas_of(tuple(vars(fix).values())))[k]
-    what = "NaN" if np.isnan(value) else f"{value:g}"
-    where = "" if x is None else f" at {_place(x[: hub.domain.dimension])}"
-    return Trouble(
-        f"{message}: fix {fix.id} gets {what}{where} from {formula.text}",
-        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
-        "if(condition, a, b)",
-        "not-a-number",
-        place=fix.place,
-    )
-
-
-def refuse_endless_speeds(hub: Hub, simulation: Any) -> None:
-    """Refuse velocities of points that are no numbers, with the formula that they come from."""
-    if not np.isfinite(simulation.fastest()):
-        what = f"points have a velocity that is not a number at time {simulation.time:.6g}"
-        hint = "look for a formula that gives NaN or infinity, such as a division by zero"
-        found = no_number(hub, simulation, what, hint)
-        raise ScriptError(found.message, place=found.place, hint=found.fix, code=found.code)
-
-
-def _place(x: np.ndarray) -> str:
-    return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"

@@ -9,22 +9,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice import settling
+from karamelo_py.advice.bodies import drift_of, held, lag_of, pressed_evenly, turn_of
+from karamelo_py.advice.crossing import expected
+from karamelo_py.advice.neighbours import bent_row, parting, uneven
 from karamelo_py.compiler.fields import declared
 from karamelo_py.language import registry, rules
 from karamelo_py.points import transfers
 from karamelo_py.points.laws import can, constrained_velocity, law_parts, law_traits
 from karamelo_py.points.transfers import flip_coefficient, stores_moment
-from karamelo_py.run import settling, timestep, uneven
-from karamelo_py.run.body_motion import (
-    drift_of,
-    held,
-    lag_of,
-    motions,
-    pressed_evenly,
-    turn_of,
-)
-from karamelo_py.run.crossing import expected
-from karamelo_py.run.neighbours import bent_row, parting
+from karamelo_py.run import timestep
+from karamelo_py.run.body_motion import motions
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed, foreign_parts
 from karamelo_py.script.errors import ScriptError
@@ -63,6 +58,7 @@ class SceneFacts:
         # Gradients jump at the faces of cells, with nodes at their corners alone.
         traits = self.basis.traits
         self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
+        self.hats = self.linear or bool(traits.shape)  # on the nodes, or on domains of points
         solids = hub.solids.values()
         # Whether laws store all work, and sustain tension.
         self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
@@ -96,8 +92,13 @@ class SceneFacts:
     motions = cached_property(lambda self: motions(self.simulation))
     drift, rotation = cached_property(drift_of), cached_property(turn_of)
     lag, crossing = cached_property(lag_of), cached_property(expected)
-    settling, uneven = cached_property(settling.expected), cached_property(uneven.expected)
+    settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
+    # The step over the stable one, and over what holds for uneven neighbours.
+    share = property(lambda self: self.simulation.dt / self.simulation.limit)
+    share_of_uneven = property(lambda self: self.share * self.uneven.of_step)
+    fastest = cached_property(lambda self: self.simulation.fastest())  # component of a velocity
+    turns = property(lambda self: self.turn > TURN)  # by an angle that counts
 
     @property
     def reads_temperature(self) -> bool:
@@ -110,21 +111,6 @@ class SceneFacts:
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((one.spin for one in self.motions), default=0.0) * self.duration
-
-    @property
-    def share_of_uneven(self) -> float:
-        """Return the fraction of the stable step that holds for them."""
-        return self.share * self.uneven.of_step
-
-    @property
-    def share(self) -> float:
-        """Return the step over the stable one."""
-        return self.simulation.dt / self.simulation.limit
-
-    @property
-    def hats(self) -> bool:
-        """Tell whether functions are hats, or hats over the domains of points."""
-        return self.linear or bool(self.basis.traits.shape)
 
     @property
     def locks(self) -> bool:
@@ -156,11 +142,6 @@ class SceneFacts:
         moving = (rigid[m.number] and np.any([m.slow, m.fast]) for m in self.motions)
         return any(rigid) and (any(led) or any(moving))
 
-    @property
-    def turns(self) -> bool:
-        """Tell whether a solid turns by an angle that counts."""
-        return self.turn > TURN
-
     @cached_property
     def free_turns(self) -> float:
         """Return the turns of the solid that turns most and is held nowhere."""
@@ -172,11 +153,6 @@ class SceneFacts:
         """Return the speed of waves."""
         clock = self.simulation.control.clock[0]
         return float(clock.rate) - self.simulation.fastest(clock.common[0])
-
-    @cached_property
-    def fastest(self) -> float:
-        """Find the largest component of a velocity."""
-        return self.simulation.fastest()
 
     @property
     def speed(self) -> float:
@@ -284,4 +260,4 @@ def script_text(hub: Hub) -> str:
 
 def is_zero(formula: Any) -> bool:
     """Tell whether a formula is not given, or always 0."""
-    return formula is None or (getattr(formula, "is_constant", False) and formula.constant == 0)
+    return formula is None or (formula.is_constant and formula.constant == 0)

@@ -4,18 +4,19 @@ from collections.abc import Callable
 from math import inf
 from typing import Any
 
+from karamelo_py.advice.energy import not_watched
+from karamelo_py.advice.suggestions import seconds_of_step, suggestions
 from karamelo_py.compiler.gpu import NoCard, card
 from karamelo_py.kernels.step import Staged, rows_of
 from karamelo_py.kernels.table import one_by_one, says
 from karamelo_py.points.basis import support
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
-from karamelo_py.run.advice.suggestions import seconds_of_step, suggestions
-from karamelo_py.run.diagnosis.energy import not_watched, unknown_work
-from karamelo_py.run.diagnosis.explain import refuse_endless_speeds
+from karamelo_py.run.energy import unknown_work
 from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
+from karamelo_py.run.no_number import refuse_endless_speeds
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import (
     own_step_instead_of,

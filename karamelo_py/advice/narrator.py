@@ -3,13 +3,12 @@
 from math import inf
 from typing import Any
 
+from karamelo_py.advice import crossing, energy, explain, known_failures
+from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.kernels.step import DONE
 from karamelo_py.kernels.watch import WITHIN
 from karamelo_py.points.basis import support
-from karamelo_py.run import crossing
-from karamelo_py.run.advice import known_failures
-from karamelo_py.run.advice.facts import SceneFacts
-from karamelo_py.run.diagnosis import energy, explain
+from karamelo_py.run.energy import change_of_energy, unknown_work
 from karamelo_py.run.listening import Listener, Trouble
 from karamelo_py.run.loop import RunLoop
 from karamelo_py.run.lower.memory import bytes_per_point
@@ -51,17 +50,17 @@ class Narrator(Listener):
             known_failures.warn_about_factor(hub)
             known_failures.warn_about_loads(hub, steps)
             known_failures.warn_about_laws(hub, simulation, duration)
-            return
-        known_failures.warn(hub, simulation, duration, halve)
-        known_failures.warn_about_length(hub, simulation, run.end_time)
+        else:
+            known_failures.warn(hub, simulation, duration, halve)
+            known_failures.warn_about_length(hub, simulation, run.end_time)
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
         """Begin the record of this run, and print it."""
-        hub, why = self.hub, energy.unknown_work(self.hub)
+        hub, why = self.hub, unknown_work(self.hub)
         if not simulation.implicit:
             self.limits, self.least = {simulation.ruling_limit}, simulation.limit
         # Said of the first state: a later one is ruined, and its limit with it.
-        if explain.is_too_large(simulation):
+        if simulation.too_large:
             self.smaller = self.smaller or own_step_instead(hub)
         facts: dict[str, Any] = {
             "method": hub.update.words,
@@ -152,7 +151,7 @@ class Narrator(Listener):
             "wall_s": wall,
             "steps": steps,
             "time": simulation.time,
-            "energy_change_percent": energy.change_of_energy(simulation),
+            "energy_change_percent": change_of_energy(simulation),
             "path_cells": inf if simulation.implicit else float(simulation.control.clock[0].path),
             "point_steps_per_s": steps * simulation.count / in_steps if in_steps > 0 else 0.0,
             "processor_s_in_steps": float(worked),

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice.explain import DOUBTED_UNITS
+from karamelo_py.advice.facts import SceneFacts, is_zero
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
@@ -19,8 +21,7 @@ from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import timestep
-from karamelo_py.run.advice.facts import SceneFacts, is_zero
-from karamelo_py.run.diagnosis.explain import DOUBTED_UNITS, formulas_of, refuse_endless_speeds
+from karamelo_py.run.no_number import formulas_of, refuse_endless_speeds
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -57,7 +58,7 @@ def _rests(hub: Hub, simulation: Any) -> bool:
     parts += [kind for law in laws for kind in law_kind(law)]
     own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
     for fix in hub.fixes.values():
-        formulas = getattr(fix, "formulas", ())
+        formulas = fix.formulas
         holds_at_zero = formulas and all(map(is_zero, formulas))  # walls, loads that are none
         if fix.for_method or (fix.hooks() and not holds_at_zero):
             return False
@@ -181,6 +182,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
     """Look for materials whose numbers are in others than those that `units` names."""
     units = s.hub.output.units
     for solid in s.hub.solids.values() if units else ():
+        assert units is not None
         law = solid.material.law
         density = units.si(DENSITY) / float(specific_volume(law))
         speed = units.si(VELOCITY) * timestep.elastic_speed(s.simulation, solid)[0]
@@ -333,7 +335,7 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
     """Say so, once, where groups of nodes that were to have some, or a body, have none."""
     for fix in hub.fixes.values():
         of_mass = any(
-            getattr(hook, "uses_share", False) or moment in HEAT_STAGES
+            hook.uses_share or moment in HEAT_STAGES
             for moment, hook in fix.hooks().items()
             if isinstance(hook, CompiledHook) and hook.on_nodes
         )

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice.bodies import sides
 from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import timestep
-from karamelo_py.run.body_motion import BodyMotion, sides
+from karamelo_py.run.body_motion import BodyMotion
 
 STRESSED = 0.1  # of the initial energy: less does not count as initial stress
 OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
