@@ -266,11 +266,10 @@ def advice(lowered):
     def say(script, dt=1.0, limit=1.0, **variables) -> str:
         hub = lowered(script, **variables)
         weight = own_weight_of_drift(hub)
-        clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf, weight=weight)
+        clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf, weight=weight, end_time=inf)
         control = SimpleNamespace(clock=[clock])
-        found = suggestions(
-            hub, SimpleNamespace(dt=dt, limit=limit, control=control, fastest=lambda: 0.0)
-        )
+        known = {"dt": dt, "limit": limit, "control": control, "implicit": False}
+        found = suggestions(hub, SimpleNamespace(**known, fastest=lambda: 0.0))
         return "\n".join(f"{suggestion.reason} / {suggestion.cure}" for suggestion in found)
 
     return say
@@ -394,7 +393,12 @@ def test_half_of_a_scene_gives_the_results_of_the_whole(state_interpreted):
 def test_double_precision_of_a_large_scene(lowered):
     hub = lowered(plane(side=170, n=160))
     said = [
-        [reason for reason, _ in precision(hub, SimpleNamespace(dt=1e-3, fastest=lambda v=v: v))]
+        [
+            reason
+            for reason, _ in precision(
+                hub, SimpleNamespace(dt=1e-3, implicit=False, fastest=lambda v=v: v)
+            )
+        ]
         for v in (100.0, 1.0)
     ]
     assert len(said[0]) == 1 and "0.6 of the memory" in said[0][0]
