@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.advice.facts import SceneFacts, is_zero, script_text
+from karamelo_py.advice.facts import SceneFacts, script_text
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.points.laws import parameter
-from karamelo_py.advice.facts import SceneFacts, script_text
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
 
