@@ -16,7 +16,6 @@ STYLES = {
     "rigid bodies": [("fix", "rigid_body"), ("fix", "rigid")],
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("material", "orthotropic"), ("material", "transverse")],
-    "Mooney-Rivlin": [("material", "mooney"), ("material", "ogden"), ("material", "hyperelastic")],
     "viscoelasticity": [("command", "viscosity"), ("material", "visco"), ("strength", "norton")],
     "explosives": [("eos", "jwl"), ("strength", "johnson-holmquist"), ("eos", "p-alpha")],
     "UMAT": [("material", "umat")],

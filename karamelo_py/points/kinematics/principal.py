@@ -179,6 +179,14 @@ def _principal_slopes(s):
     return tuple(made), TurningFrame(directions, tuple([t[1] for t in turned]), tuple(apart))
 
 
+class PairLimits(NamedTuple):
+    """(f_a - f_b) / (s_a - s_b) of the pairs of principal values where they are equal."""
+
+    first: Any
+    second: Any
+    third: Any
+
+
 # For values closer than this fraction, mean slopes are more accurate than quotients of differences.
 ALIKE = 1e-5
 
@@ -186,8 +194,11 @@ ALIKE = 1e-5
 def turning_ratios(values, directions, slopes):
     """(f_a - f_b) / (s_a - s_b) of the pairs of principal values."""
     ratios = []
-    for (a, b), apart in zip(PAIRS, directions.apart, strict=False):
-        if slopes is None:  # equal principal values stay equal, at an edge or the apex
+    for k, ((a, b), apart) in enumerate(zip(PAIRS, directions.apart, strict=False)):
+        if isinstance(slopes, PairLimits):
+            limit = slopes[k]
+            alike = abs(apart) < ALIKE
+        elif slopes is None:  # equal principal values stay equal, at an edge or the apex
             alike, limit = apart == 0, 0
         else:
             limit = 0.5 * (slopes[a] + slopes[b])

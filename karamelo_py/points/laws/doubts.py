@@ -13,6 +13,7 @@ from karamelo_py.points.laws import (
     specific_volume,
     wave_speed_squared,
 )
+from karamelo_py.points.laws.by_energy import ByEnergy, first_instability
 from karamelo_py.points.laws.eos import bulk_modulus
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
@@ -46,6 +47,12 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
         yield from _doubts_of_expansion(alpha, "the coefficient of linear expansion")
     if isinstance(law, EosStrength):
         yield from _doubts_of_parts(law, state)
+    if isinstance(law, ByEnergy) and (unstable := first_instability(law)):
+        path, stretch = unstable
+        yield (
+            f"it loses its stiffness in {path} at a stretch of {stretch:.2g}",
+            "stay below, or add terms that stiffen: beyond, strain localizes in one cell",
+        )
 
 
 def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:

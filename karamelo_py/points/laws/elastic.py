@@ -37,8 +37,14 @@ class ElasticLaw(NamedTuple):
 tell_of_locking(ElasticLaw)
 
 
-class Hyperelastic(ElasticLaw):
+class OfDeformation:
     """Base of laws whose stress is a function of the deformation gradient."""
+
+    __slots__ = ()
+
+
+class Hyperelastic(OfDeformation, ElasticLaw):
+    """Base of laws of the deformation gradient with Young's modulus and Poisson's ratio."""
 
     __slots__ = ()
 
@@ -49,15 +55,15 @@ class State(NamedTuple):
     F: Any  # deformation gradient
 
 
-laws.initial_state.on(Hyperelastic)(lambda law, kin, like: State(unit(kin)))
-laws.by_rates.on(Hyperelastic)(lambda law: False)
-laws.deformation.on(Hyperelastic)(lambda law, kin, state: state.F)
-laws.jacobian.on(Hyperelastic)(lambda law, kin, state: det(state.F))
+laws.initial_state.on(OfDeformation)(lambda law, kin, like: State(unit(kin)))
+laws.by_rates.on(OfDeformation)(lambda law: False)
+laws.deformation.on(OfDeformation)(lambda law, kin, state: state.F)
+laws.jacobian.on(OfDeformation)(lambda law, kin, state: det(state.F))
 
 
-laws.advance.on(Hyperelastic)(lambda law, kin, state, dl, dt: State(state.F.after(dl)))
+laws.advance.on(OfDeformation)(lambda law, kin, state, dl, dt: State(state.F.after(dl)))
 
 
-@laws.cauchy_stress.on(Hyperelastic)
-def _cauchy_stress_hyperelastic(law, kin, state):
+@laws.cauchy_stress.on(OfDeformation)
+def _cauchy_stress_of_deformation(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / det(state.F)

@@ -1,0 +1,511 @@
+"""Hyperelastic laws given by their stored energy, a formula.
+
+The formula is differentiated once, when a script defines the material. Its structure belongs to the
+class of the law, so that kernels contain it as code; its numbers are parameters, so that laws that
+differ only in them have the same kernels. Formulas of invariants need no principal directions and
+are computed in lanes; formulas of principal stretches take points one by one.
+"""
+
+import hashlib
+import sys
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+from math import cos, cosh, isfinite, sin, sinh, sqrt, tan, tanh
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.powers import exponential, logarithm, power
+from karamelo_py.compiler.trace import one_at_a_time
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import I, det, total, tr
+from karamelo_py.points.kinematics.principal import PairLimits, from_principal, real_principal
+from karamelo_py.points.laws.elastic import OfDeformation
+from karamelo_py.script import terms
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.script.functions import compute_quietly
+from karamelo_py.script.terms import Term
+
+INVARIANTS = ("I1", "I2", "J")
+STRETCHES = ("l1", "l2", "l3")
+WHOLE = 8  # exponents up to it are code, not parameters
+
+Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
+
+# --- differentiation ----------------------------------------------------------------------------
+
+ZERO, ONE, TWO = map(terms.constant, (0.0, 1.0, 2.0))
+
+
+def _is(term: Term, value: float) -> bool:
+    return term.operation == "number" and term.value == value
+
+
+def _plus(a: Term, b: Term) -> Term:
+    return b if _is(a, 0) else a if _is(b, 0) else terms.applied("+", a, b)
+
+
+def _times(a: Term, b: Term) -> Term:
+    if _is(a, 0) or _is(b, 0):
+        return ZERO
+    return b if _is(a, 1) else a if _is(b, 1) else terms.applied("*", a, b)
+
+
+def _power(base: Term, exponent: float) -> Term:
+    if exponent in (0, 1):
+        return base if exponent else ONE
+    return terms.applied("^", base, terms.constant(exponent))
+
+
+def _of(operation: str, term: Term) -> Term:
+    return terms.applied(operation, term)
+
+
+OF_ONE = {
+    "neg": lambda x, f: terms.constant(-1),
+    "sqrt": lambda x, f: terms.applied("/", terms.constant(0.5), f),
+    "exp": lambda x, f: f,
+    "log": lambda x, f: terms.applied("/", ONE, x),
+    "sin": lambda x, f: _of("cos", x),
+    "cos": lambda x, f: _of("neg", _of("sin", x)),
+    "tan": lambda x, f: _plus(ONE, _power(f, 2)),
+    "tanh": lambda x, f: terms.applied("-", ONE, _power(f, 2)),
+    "sinh": lambda x, f: _of("cosh", x),
+    "cosh": lambda x, f: _of("sinh", x),
+}
+
+
+def derivative(root: Term, name: str) -> Term:
+    """Differentiate a formula with respect to a name."""
+    found: dict[int, Term] = {}
+    for term in terms.in_order(root):
+        found[id(term)] = _derivative(term, name, [found[id(x)] for x in term.operands])
+    return found[id(root)]
+
+
+def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
+    operation, operands = term.operation, term.operands
+    if name not in term.names:
+        return ZERO
+    if operation == "name":
+        return ONE
+    if operation in OF_ONE:
+        return _times(OF_ONE[operation](operands[0], term), slopes[0])
+    (a, b), (s, t) = operands, slopes
+    if operation == "+":
+        return _plus(s, t)
+    if operation == "-":
+        return s if _is(t, 0) else _plus(s, _of("neg", t))
+    if operation == "*":
+        return _plus(_times(s, b), _times(a, t))
+    if operation == "/":
+        return _plus(
+            terms.applied("/", s, b) if not _is(s, 0) else ZERO,
+            _of("neg", terms.applied("/", _times(term, t), b)) if not _is(t, 0) else ZERO,
+        )
+    if b.operation == "number":
+        return _times(_times(b, _power(a, b.value - 1)), s)
+    of_base = _times(terms.applied("/", _times(b, term), a), s)
+    return _plus(of_base, _times(_times(term, _of("log", a)), t))
+
+
+def replaced(root: Term, by: Mapping[str, Term]) -> Term:
+    """Put formulas for names."""
+    found: dict[int, Term] = {}
+    for term in terms.in_order(root):
+        if term.operation == "name":
+            found[id(term)] = by.get(term.value, term)
+        elif term.operands:
+            found[id(term)] = terms.applied(term.operation, *[found[id(x)] for x in term.operands])
+        else:
+            found[id(term)] = term
+    return found[id(root)]
+
+
+# --- stack programs -----------------------------------------------------------------------------
+
+
+class _ProgramWriter:
+    """Writes formulas of `names` as stack programs with common `numbers`."""
+
+    def __init__(self, names: Sequence[str]):
+        self.names = names
+        self.numbers: dict[float, int] = {}
+
+    def code(self, root: Term) -> Code:
+        """Write a formula; () if it is 0."""
+        if _is(root, 0):
+            return ()
+        made: list[tuple[str, Any]] = []
+        self._append(root, made)
+        return tuple(made)
+
+    def _append(self, term: Term, made: list) -> None:
+        operation, operands = term.operation, term.operands
+        if operation == "name":
+            made.append(("name", self.names.index(term.value)))
+        elif operation == "number":
+            made.append(("number", self.numbers.setdefault(term.value, len(self.numbers))))
+        elif operation == "^" and _is_small(operands[1]):
+            self._append(operands[0], made)
+            made.append(("whole power", int(operands[1].value)))
+        else:
+            for operand in operands:
+                self._append(operand, made)
+            made.append((operation, None))
+
+
+def _is_small(term: Term) -> bool:
+    return term.operation == "number" and term.value in range(-WHOLE, WHOLE + 1)
+
+
+def applied(operation, a, b):
+    """An operation on two numbers."""
+    if operation == "+":
+        return a + b
+    if operation == "-":
+        return a - b
+    if operation == "*":
+        return a * b
+    if operation == "/":
+        return a / b
+    return power(a, b)
+
+
+def of_one(operation, a):
+    """A function of a number."""
+    if operation == "neg":
+        return -a
+    if operation == "sqrt":
+        return sqrt(a)
+    if operation == "exp":
+        return exponential(a)
+    if operation == "log":
+        return logarithm(a)
+    if operation == "sin":
+        return sin(a)
+    if operation == "cos":
+        return cos(a)
+    if operation == "tan":
+        return tan(a)
+    if operation == "tanh":
+        return tanh(a)
+    return sinh(a) if operation == "sinh" else cosh(a)
+
+
+def whole_power(a, n):
+    """a^n for a whole number n."""
+    made = a
+    for _ in range(abs(n) - 1):
+        made = made * a
+    return made if n > 0 else 1 / made
+
+
+def evaluated(code, law, arguments):
+    """The value of a stack program at `arguments`, with the numbers of a law; 0 of no program."""
+    if not len(code):
+        return 0
+    stack = ()
+    for operation, operand in code:
+        if operation == "name":
+            stack = (arguments[operand], *stack)
+        elif operation == "number":
+            stack = (law[FIRST + operand], *stack)
+        elif operation == "whole power":
+            stack = (whole_power(stack[0], operand), *stack[1:])
+        elif operation in ("+", "-", "*", "/", "^"):
+            stack = (applied(operation, stack[1], stack[0]), *stack[2:])
+        else:
+            stack = (of_one(operation, stack[0]), *stack[1:])
+    return stack[0]
+
+
+# --- the law ------------------------------------------------------------------------------------
+
+
+class ByEnergy(OfDeformation):
+    """Base of laws by their energy; one class for each formula."""
+
+    __slots__ = ()
+    rebounds = True
+    in_lanes = True
+    energy: ClassVar[Code]
+
+
+class OfInvariants(ByEnergy):
+    """The energy depends on I1, I2 and J."""
+
+    __slots__ = ()
+    first: ClassVar[tuple[Code, ...]]  # derivatives by I1, I2, J
+    second: ClassVar[tuple[Code, ...]]  # by 11, 12, 1J, 22, 2J, JJ
+
+
+class OfStretches(ByEnergy):
+    """The energy depends on the principal stretches."""
+
+    __slots__ = ()
+    scalarised = ("kirchhoff_stress", "wave_speed_squared", "energy_density")
+    first: ClassVar[tuple[Code, ...]]  # derivatives by l1, l2, l3
+    second: ClassVar[tuple[Code, ...]]  # by 11, 12, 13, 22, 23, 33
+
+
+FIELDS = ("specific_volume", "lam", "G", "at_rest")
+FIRST = len(FIELDS)  # index of the first number of the formula
+
+_L = [Term("name", (), name) for name in STRETCHES]
+_SQUARES = [_power(one, 2) for one in _L]
+IN_STRETCHES = {
+    "I1": _plus(_plus(_SQUARES[0], _SQUARES[1]), _SQUARES[2]),
+    "I2": _plus(
+        _plus(_times(_SQUARES[0], _SQUARES[1]), _times(_SQUARES[1], _SQUARES[2])),
+        _times(_SQUARES[2], _SQUARES[0]),
+    ),
+    "J": _times(_times(_L[0], _L[1]), _L[2]),
+}
+
+
+def law_of(rho: float, energy: Expression) -> NamedTuple:
+    """Make the law of a stored energy per reference volume.
+
+    ScriptError for operations without a derivative, stress or no stiffness at rest, and formulas
+    that distinguish directions.
+    """
+    term = energy._term
+    for one in terms.in_order(term):
+        smooth = one.operation in OF_ONE or one.operation in ("number", "name", *"+-*/^")
+        if not smooth:
+            raise ScriptError(
+                f"{one.operation} has no derivative that a stress could come from",
+                argument="energy",
+                expected=f"a formula with + - * / ^ and {', '.join(sorted({*OF_ONE} - {'neg'}))}",
+            )
+    stretched = replaced(term, IN_STRETCHES)
+    slopes = [derivative(stretched, name) for name in STRETCHES]
+    curves = [derivative(slopes[0], name) for name in STRETCHES[:2]]
+    lam, G, at_rest = _judged(stretched, slopes, curves)
+    names, kind = INVARIANTS, OfInvariants
+    if energy.names.intersection(STRETCHES):
+        names, kind, term = STRETCHES, OfStretches, stretched
+    writer = _ProgramWriter(names)
+    first = [derivative(term, name) for name in names]
+    second = [derivative(first[names.index(a)], b) for k, a in enumerate(names) for b in names[k:]]
+    codes = {
+        "energy": writer.code(term),
+        "first": tuple(map(writer.code, first)),
+        "second": tuple(map(writer.code, second)),
+    }
+    made = _class_of(kind, codes, len(writer.numbers))
+    return made(1 / rho, lam, G, at_rest, *writer.numbers)
+
+
+def _class_of(kind: type, codes: dict, count: int) -> type:
+    """The class of laws with these programs; its name is a digest, so that kernels find it."""
+    digest = hashlib.sha256(repr((kind.__name__, codes, count)).encode()).hexdigest()[:16]
+    name, module = f"{kind.__name__}_{digest}", sys.modules[__name__]
+    with one_at_a_time:
+        if not hasattr(module, name):
+            fields = namedtuple(name, (*FIELDS, *[f"number{k}" for k in range(count)]))
+            made = type(name, (kind, fields), {**codes, "__slots__": (), "__module__": __name__})
+            setattr(module, name, made)
+    return getattr(module, name)
+
+
+def value_at(root: Term, stretches: Sequence[float]) -> float:
+    """The value of a formula of stretches."""
+    at = dict(zip(STRETCHES, stretches, strict=True))
+    found: dict[int, float] = {}
+    for term in terms.in_order(root):
+        if term.operands:
+            numbers = [found[id(one)] for one in term.operands]
+            found[id(term)] = compute_quietly(term.operation, *numbers)
+        else:
+            found[id(term)] = at[term.value] if term.operation == "name" else term.value
+    return found[id(root)]
+
+
+def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float, float, float]:
+    """Lame's parameters and the energy at rest, of an energy that is isotropic and stable there."""
+    rest = (1.0, 1.0, 1.0)
+    at_rest, stress = value_at(energy, rest), value_at(slopes[0], rest)
+    stiffness, lam = (value_at(curve, rest) for curve in curves)
+    if not all(map(isfinite, (at_rest, stress, stiffness, lam))):
+        raise ScriptError("the energy has no value at rest", argument="energy")
+    if abs(stress) > 1e-9 * (abs(stiffness) + abs(lam)):
+        raise ScriptError(
+            f"the body has a stress of {stress:.4g} at rest",
+            argument="energy",
+            expected="an energy that is least for I1 = I2 = 3, J = 1 and l1 = l2 = l3 = 1",
+            hint="I1*J^(-2/3) - 3 instead of I1 - 3, or an additional term -mu*log(J)",
+        )
+    some = (1.1, 0.8, 1.3)
+    others = [value_at(energy, (some[i], some[j], some[k])) for i, j, k in ((1, 0, 2), (2, 1, 0))]
+    if not np.allclose(others, value_at(energy, some), rtol=1e-9):
+        raise ScriptError(
+            "the energy changes when l1, l2 and l3 change places",
+            argument="energy",
+            expected="the same term for each of l1, l2 and l3",
+        )
+    G = 0.5 * (stiffness - lam)
+    K = lam + 2 / 3 * G
+    if not (G > 0 and K > 1e-9 * G):
+        raise ScriptError(
+            f"the shear modulus at rest is {G:.4g} and the bulk modulus {K:.4g}",
+            argument="energy",
+            expected="an energy that grows with every strain",
+            hint="+ K/2*(J - 1)^2 resists a change of volume" if G > 0 else None,
+        )
+    return lam, G, at_rest
+
+
+def directional_stiffness(law: NamedTuple, stretches: Sequence[float], a: int) -> float:
+    """l_a^2 d2W/dl_a^2 at principal stretches: rho c^2 of a wave along the direction `a`."""
+    if isinstance(law, OfStretches):
+        return stretches[a] ** 2 * evaluated(law.second[(0, 3, 5)[a]], law, stretches)
+    squares = [x * x for x in stretches]
+    J, first, x = stretches[0] * stretches[1] * stretches[2], sum(squares), squares[a]
+    second = 0.5 * (first * first - sum(x * x for x in squares))
+    return along_direction(law, (first, second, J), x, first - x)
+
+
+PATHS = {
+    "uniaxial stretching at constant volume": lambda x: (x, x**-0.5, x**-0.5),
+    "biaxial stretching at constant volume": lambda x: (x, x, x**-2),
+    "uniaxial strain": lambda x: (x, 1.0, 1.0),
+    "swelling": lambda x: (x, x, x),
+}
+SCANNED = 0.5, 3.0  # stretches
+
+
+def first_instability(law: NamedTuple) -> tuple[str, float] | None:
+    """The path and stretch nearest to rest at which a principal direction loses its stiffness."""
+    found = []
+    for path, stretches in PATHS.items():
+        for end in SCANNED:
+            for x in np.geomspace(1, end, 60)[1:]:
+                at = tuple(map(float, stretches(x)))
+                try:
+                    least = min(directional_stiffness(law, at, a) for a in range(3))
+                except (ValueError, ZeroDivisionError, OverflowError):
+                    least = -1.0  # the formula has no value
+                if not least > 0:
+                    found.append((abs(np.log(x)), path, float(x)))
+                    break
+    return min(found)[1:] if found else None
+
+
+# --- of invariants ------------------------------------------------------------------------------
+
+
+def squared(s):
+    """s s of a symmetric tensor."""
+    a = s.at()
+    return s._make(
+        [
+            total([a[i, k] * a[k, j] for k in range(3) if (i, k) in a and (k, j) in a])
+            for i, j in s.places
+        ]
+    )
+
+
+def invariants(b, J):
+    """I1, I2 and J of b = F F^T."""
+    first = tr(b)
+    return first, 0.5 * (first * first - tr(squared(b))), J
+
+
+@laws.kirchhoff_stress.on(OfInvariants)
+def _kirchhoff_stress_of_invariants(law, kin, state):
+    # tau = 2 (W_1 + I1 W_2) b - 2 W_2 b b + J W_J I (Holzapfel 2000, equation 6.30)
+    b = state.F.left_cauchy_green()
+    at = invariants(b, det(state.F))
+    W1, W2, WJ = [evaluated(code, law, at) for code in law.first]
+    tau = 2 * (W1 + at[0] * W2) * b + at[2] * WJ * I
+    return tau - 2 * W2 * squared(b) if len(law.first[1]) else tau
+
+
+@laws.energy_density.on(OfInvariants)
+def _energy_density_of_invariants(law, kin, state):
+    at = invariants(state.F.left_cauchy_green(), det(state.F))
+    return evaluated(law.energy, law, at) - law.at_rest
+
+
+@laws.wave_speed_squared.on(OfInvariants)
+def _wave_speed_squared_of_invariants(law, kin, state):
+    # The second derivative of W by the logarithm of the stretch with the square x, without the
+    # change of its first; the largest row sum bounds the largest x.
+    b = state.F.left_cauchy_green()
+    at = invariants(b, det(state.F))
+    x = b.largest_row_sum()
+    return max(along_direction(law, at, x, max(at[0] - x, 0)), 0) * law.specific_volume
+
+
+def along_direction(law, at, x, rest):
+    """l^2 d2W/dl^2 of a stretch l = sqrt(x); the squares of the other two sum to `rest`."""
+    J = at[2]
+    W1, W2, _ = [evaluated(code, law, at) for code in law.first]
+    W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
+    along = 2 * x * (W1 + rest * W2) + 4 * x * x * (W11 + 2 * rest * W12 + rest * rest * W22)
+    return along + 4 * x * J * (W1J + rest * W2J) + J * J * WJJ
+
+
+@laws.shear_part.on(OfInvariants)
+def _shear_part_of_invariants(law, kin, state):
+    b = state.F.left_cauchy_green()
+    at = invariants(b, det(state.F))
+    x = b.largest_row_sum()
+    W1, W2, _ = [evaluated(code, law, at) for code in law.first]
+    W11, _, _, W22, _, _ = [evaluated(code, law, at) for code in law.second]
+    y = max(at[0] - x, 0)
+    stiffer = max(4 * x * x * (W11 + y * y * W22), 0)
+    return (2 * (1 + x) * (W1 + y * W2) + stiffer) * law.specific_volume
+
+
+# --- of principal stretches ---------------------------------------------------------------------
+
+
+def stretches_of(b):
+    """Principal stretches, and the directions of the tensor b = F F^T."""
+    values, directions = real_principal(b)
+    return tuple([sqrt(x) for x in values]), directions
+
+
+@laws.kirchhoff_stress.on(OfStretches)
+def _kirchhoff_stress_of_stretches(law, kin, state):
+    # tau_a = l_a dW/dl_a (Ogden 1997, section 4.3)
+    b = state.F.left_cauchy_green()
+    at, directions = stretches_of(b)
+    slopes = [evaluated(code, law, at) for code in law.first]
+    tau = tuple([x * slope for x, slope in zip(at, slopes, strict=True)])
+    W11, W12, W13, W22, W23, W33 = [evaluated(code, law, at) for code in law.second]
+    # At equal stretches a and b, (tau_a - tau_b) / (l_a^2 - l_b^2).
+    twice = (W11 + W22 - 2 * W12, W11 + W33 - 2 * W13, W22 + W33 - 2 * W23)
+    limits = []
+    for (i, j), curve in zip(PAIRS, twice, strict=True):
+        mean = slopes[i] / at[i] + slopes[j] / at[j]
+        limits.append(0.25 * (mean + curve))
+    return from_principal(b, tau, directions, PairLimits(*limits))
+
+
+PAIRS = tuple(combinations(range(3), 2))
+
+
+@laws.energy_density.on(OfStretches)
+def _energy_density_of_stretches(law, kin, state):
+    at, _ = stretches_of(state.F.left_cauchy_green())
+    return evaluated(law.energy, law, at) - law.at_rest
+
+
+@laws.wave_speed_squared.on(OfStretches)
+def _wave_speed_squared_of_stretches(law, kin, state):
+    at, _ = stretches_of(state.F.left_cauchy_green())
+    W11, _, _, W22, _, W33 = [evaluated(code, law, at) for code in law.second]
+    l1, l2, l3 = at
+    return max(l1 * l1 * W11, l2 * l2 * W22, l3 * l3 * W33, 0) * law.specific_volume
+
+
+@laws.elastic_strain.on(ByEnergy)
+def _elastic_strain_by_energy(law, kin, state):
+    """Green-Lagrange strain (F^T F - I) / 2."""
+    return 0.5 * state.F.right_cauchy_green() - 0.5 * I

@@ -1,0 +1,325 @@
+"""Materials by their stored energy: hyperelastic, and ready formulas for rubber and tissue."""
+
+from collections import namedtuple
+from typing import Annotated, Any, ClassVar
+
+from karamelo_py.language.arguments import Argument
+from karamelo_py.language.scene import Scene
+from karamelo_py.language.signature import Positive
+from karamelo_py.points.laws.by_energy import FIELDS, INVARIANTS, STRETCHES, OfInvariants, law_of
+from karamelo_py.script import evaluation, syntax
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.script.parser import parse_text
+
+SEEDS = (*INVARIANTS, *STRETCHES)
+
+
+class EnergyFormula:
+    """For signatures: a stored energy as a formula of invariants or principal stretches."""
+
+    script_kind: ClassVar[str] = "a formula of I1, I2 and J, or of l1, l2 and l3"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Expression:
+        """Read the formula; variables of the script are numbers in it."""
+        value = argument.value_with(SEEDS)
+        if isinstance(value, str):
+            raise ScriptError(
+                f"'{value}' is text", place=argument.place, expected="the formula without quotes"
+            )
+        energy = Expression(value)
+        if others := energy.names.difference(SEEDS):
+            raise ScriptError(
+                f"the energy cannot depend on {min(others)}",
+                place=argument.place,
+                expected="a formula of I1, I2 and J, or of l1, l2 and l3",
+            )
+        if energy.is_constant:
+            raise ScriptError(
+                "the energy is a constant: the body has no stress",
+                place=argument.place,
+                expected="a formula of I1, I2 and J, or of l1, l2 and l3",
+            )
+        return energy
+
+
+_Fields = namedtuple("_Fields", FIELDS)
+
+
+class HyperelasticFormula(OfInvariants, _Fields):
+    """Elastic solid given by its stored energy, a formula.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    energy
+        Stored energy per reference volume: a formula of the invariants I1 = tr C, I2 = (I1^2 - tr
+        C^2)/2 and J = det F, with C = F^T F, or of the principal stretches l1, l2 and l3 (and of
+        I1, I2, J besides). Variables of the script are numbers in it. At rest, I1 = I2 = 3 and J =
+        l1 = l2 = l3 = 1.
+
+    Example
+    -------
+    mu = 4e5
+    K = 2e7
+    material(rubber, hyperelastic, 1000, mu/2*(I1*J^(-2/3) - 3) + K/2*(J - 1)^2)
+    material(sheet, hyperelastic, 1000, mu/2*(l1^2 + l2^2 + l3^2 - 3) - mu*log(J) + K/2*log(J)^2)
+
+    Notes
+    -----
+    The stress is the exact derivative of the formula: tau = 2 (W_1 + I1 W_2) b - 2 W_2 b^2 + J W_J
+    I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. The tangent of load steps and the wave
+    speed are its second derivatives. The energy is that above the state of rest. A formula is
+    refused if the body has stress or no stiffness at rest. A warning names the stretch beyond which
+    the energy is no longer convex along a principal direction, so that the body would localize.
+    Formulas of stretches cost more, because each point needs its principal directions.
+
+    See Also
+    --------
+    neo-hookean, mooney-rivlin, ogden, yeoh, gent, saint-venant-kirchhoff
+    """
+
+    __slots__ = ()
+    syntax = "rho, energy"
+
+    @classmethod
+    def given(cls, rho: Annotated[float, Positive], energy: EnergyFormula) -> Any:
+        """Make the law of a formula."""
+        return law_of(rho, energy)
+
+
+class _Numbers:
+    """Names of a ready formula: its constants; the rest are seeds."""
+
+    def __init__(self, numbers: dict[str, float]):
+        self.numbers = numbers
+
+    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> float | Expression:
+        """Return a constant, or the seed of this name."""
+        return self.numbers[name] if name in self.numbers else Expression.seed(name)
+
+    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Any:
+        """Refuse commands: ready formulas have none."""
+        raise NotImplementedError(node.name)
+
+    def hides(self, name: str) -> bool:
+        """Return False: functions have their usual meaning."""
+        return False
+
+
+def ready(rho: float, formula: str, **numbers: float) -> Any:
+    """Make the law of a formula with named constants."""
+    raw, node = parse_text(formula)
+    value = evaluation.evaluate(node, raw, _Numbers(numbers))
+    return law_of(rho, Expression(value))
+
+
+VOLUME = "K/2*(J - 1)^2"
+
+
+class MooneyRivlin(OfInvariants, _Fields):
+    """Rubber of Mooney (1940) and Rivlin (1948), slightly compressible.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    C10, C01
+        Half the shear modulus in two parts: G = 2 (C10 + C01).
+    K
+        Bulk modulus.
+
+    Example
+    -------
+    material(rubber, mooney-rivlin, 1000, 1.5e5, 0.5e5, 2e7)
+
+    Notes
+    -----
+    W = C10 (I1 J^(-2/3) - 3) + C01 (I2 J^(-4/3) - 3) + K/2 (J - 1)^2.
+
+    See Also
+    --------
+    hyperelastic, yeoh, ogden
+    """
+
+    __slots__ = ()
+    syntax = "rho, C10, C01, K"
+
+    @classmethod
+    def given(
+        cls, rho: Annotated[float, Positive], C10: float, C01: float, K: Annotated[float, Positive]
+    ) -> Any:
+        """Make the law from its constants."""
+        formula = f"C10*(I1*J^(-2/3) - 3) + C01*(I2*J^(-4/3) - 3) + {VOLUME}"
+        return ready(rho, formula, C10=C10, C01=C01, K=K)
+
+
+class Yeoh(OfInvariants, _Fields):
+    """Rubber of Yeoh (1993), slightly compressible: filled rubber that stiffens.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    K
+        Bulk modulus.
+    constants
+        C10, C20 and C30; the last ones may be left out. The shear modulus is 2 C10.
+
+    Example
+    -------
+    material(tyre, yeoh, 1100, 2e8, 5e5, -1e4, 2e3)
+
+    Notes
+    -----
+    W = C10 i + C20 i^2 + C30 i^3 + K/2 (J - 1)^2 with i = I1 J^(-2/3) - 3.
+
+    See Also
+    --------
+    hyperelastic, mooney-rivlin, gent
+    """
+
+    __slots__ = ()
+    syntax = "rho, K, C10[, C20[, C30]]"
+
+    @classmethod
+    def given(
+        cls, rho: Annotated[float, Positive], K: Annotated[float, Positive], *constants: float
+    ) -> Any:
+        """Make the law from its constants."""
+        if not 1 <= len(constants) <= 3:
+            raise ScriptError(
+                "the energy has one to three terms", argument="constants", expected=cls.syntax
+            )
+        numbers = {f"C{k}0": C for k, C in enumerate(constants, 1)}
+        parts = [f"C{k}0*(I1*J^(-2/3) - 3)^{k}" for k in range(1, len(constants) + 1)]
+        return ready(rho, " + ".join([*parts, VOLUME]), K=K, **numbers)
+
+
+class Gent(OfInvariants, _Fields):
+    """Rubber of Gent (1996), whose chains have a limit of extension; slightly compressible.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    G
+        Shear modulus.
+    Jm
+        Limit of I1 J^(-2/3) - 3.
+    K
+        Bulk modulus.
+
+    Example
+    -------
+    material(rubber, gent, 1000, 4e5, 80, 2e7)
+
+    Notes
+    -----
+    W = -G Jm/2 ln(1 - (I1 J^(-2/3) - 3)/Jm) + K/2 (J - 1)^2.
+
+    See Also
+    --------
+    hyperelastic, yeoh
+    """
+
+    __slots__ = ()
+    syntax = "rho, G, Jm, K"
+
+    @classmethod
+    def given(
+        cls,
+        rho: Annotated[float, Positive],
+        G: Annotated[float, Positive],
+        Jm: Annotated[float, Positive],
+        K: Annotated[float, Positive],
+    ) -> Any:
+        """Make the law from its constants."""
+        formula = f"-G*Jm/2*log(1 - (I1*J^(-2/3) - 3)/Jm) + {VOLUME}"
+        return ready(rho, formula, G=G, Jm=Jm, K=K)
+
+
+class SaintVenantKirchhoff(OfInvariants, _Fields):
+    """Hooke's law between second Piola-Kirchhoff stress and Green-Lagrange strain.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    lam, G
+        Lame's parameters.
+
+    Example
+    -------
+    material(frame, saint-venant-kirchhoff, 7850, 1.2e11, 0.8e11)
+
+    Notes
+    -----
+    W = lam/2 (tr E)^2 + G E:E. For large rotations and small strains; a body that is shortened to
+    0.58 of its length loses its stiffness.
+
+    See Also
+    --------
+    hyperelastic, hencky, neo-hookean
+    """
+
+    __slots__ = ()
+    syntax = "rho, lam, G"
+
+    @classmethod
+    def given(
+        cls, rho: Annotated[float, Positive], lam: float, G: Annotated[float, Positive]
+    ) -> Any:
+        """Make the law from its constants."""
+        formula = "lam/8*(I1 - 3)^2 + G/4*(I1^2 - 2*I2 - 2*I1 + 3)"
+        return ready(rho, formula, lam=lam, G=G)
+
+
+class Ogden(OfInvariants, _Fields):
+    """Rubber of Ogden (1972) with up to four terms, slightly compressible.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    K
+        Bulk modulus.
+    pairs
+        mu and alpha of each term; the shear modulus is half the sum of mu alpha.
+
+    Example
+    -------
+    material(rubber, ogden, 1000, 2e7, 6.3e5, 1.3, 1200, 5, -1e4, -2)
+
+    Notes
+    -----
+    W = sum mu/alpha (L1^alpha + L2^alpha + L3^alpha - 3) + K/2 (J - 1)^2 with L = l J^(-1/3).
+
+    See Also
+    --------
+    hyperelastic, mooney-rivlin
+    """
+
+    __slots__ = ()
+    syntax = "rho, K, mu1, alpha1[, mu2, alpha2, ...]"
+
+    @classmethod
+    def given(
+        cls, rho: Annotated[float, Positive], K: Annotated[float, Positive], *pairs: float
+    ) -> Any:
+        """Make the law from the constants of its terms."""
+        if len(pairs) % 2 or not 2 <= len(pairs) <= 8 or 0 in pairs[1::2]:
+            raise ScriptError(
+                "the terms are pairs of mu and alpha, where no alpha is 0",
+                argument="pairs",
+                expected="mu1, alpha1[, mu2, alpha2, ...], at most four pairs",
+            )
+        parts = [VOLUME]
+        numbers = {"K": K}
+        for k, (mu, alpha) in enumerate(zip(pairs[::2], pairs[1::2], strict=True)):
+            powers = f"l1^a{k} + l2^a{k} + l3^a{k}"
+            parts.append(f"m{k}/a{k}*(({powers})*J^(-a{k}/3) - 3)")
+            numbers |= {f"m{k}": mu, f"a{k}": alpha}
+        return ready(rho, " + ".join(parts), **numbers)

@@ -1,0 +1,253 @@
+"""Laws given by their stored energy: closed forms, other laws, and what is refused."""
+
+from math import sqrt
+
+import numpy as np
+import pytest
+from tensors import every_kinematics, flat
+
+from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler.slopes import seeded, slopes_of
+from karamelo_py.points.kinematics import Space, tensor
+from karamelo_py.points.laws import (
+    advance,
+    cauchy_stress,
+    energy_density,
+    initial_state,
+    kirchhoff_stress,
+    wave_speed_squared,
+)
+from karamelo_py.points.laws.by_energy import derivative, first_instability, value_at
+from karamelo_py.points.laws.elastic import State
+from karamelo_py.points.laws.hyperelastic import (
+    Gent,
+    MooneyRivlin,
+    Ogden,
+    SaintVenantKirchhoff,
+    Yeoh,
+    ready,
+)
+from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.parameters import lame_parameters
+
+LAM, G = lame_parameters(1e6, 0.3)
+BUILT_IN = NeoHookean(1e-3, LAM, G)
+FORMULA = "G/2*(I1 - 3) - G*log(J) + lam/2*log(J)^2"
+IN_STRETCHES = "G/2*(l1^2 + l2^2 + l3^2 - 3) - G*log(J) + lam/2*log(J)^2"
+LAWS = {form: ready(1000, form, G=G, lam=LAM) for form in (FORMULA, IN_STRETCHES)}
+SPACE = Space()
+
+
+def deformed(kin, seed=0, size=0.3):
+    F = np.eye(3) + np.random.default_rng(seed).normal(0, size, (3, 3))
+    return State(flat(kin, F))
+
+
+@every_kinematics
+@pytest.mark.parametrize("form", LAWS)
+def test_a_formula_is_the_built_in_law(kin, form):
+    """Neo-Hookean (Bonet & Wood 2008): stress, energy and the wave speed's bound."""
+    law, state = LAWS[form], deformed(kin)
+    exact = kirchhoff_stress(BUILT_IN, kin, state)
+    assert np.allclose(kirchhoff_stress(law, kin, state), exact, rtol=0, atol=1e-10 * LAM)
+    assert energy_density(law, kin, state) == pytest.approx(
+        energy_density(BUILT_IN, kin, state), rel=1e-10
+    )
+    squared = wave_speed_squared(law, kin, state)
+    if form == FORMULA:
+        assert squared == pytest.approx(wave_speed_squared(BUILT_IN, kin, state), rel=1e-10)
+    assert squared <= wave_speed_squared(BUILT_IN, kin, state) * (1 + 1e-10)
+
+
+def tangent(law, kin, F):
+    def stress(dl):
+        return cauchy_stress(law, kin, advance(law, kin, State(F), dl, 1.0))
+
+    count = kin.tensor_size
+    found = on_numbers(stress)(seeded(tensor(kin, (0.0,) * count)))
+    return np.array([slopes_of(x, count) for x in found], float)
+
+
+@every_kinematics
+@pytest.mark.parametrize("form", LAWS)
+@pytest.mark.parametrize("stretches", [(1, 1, 1), (1.3, 0.8, 0.8), (1.3, 1.1, 0.7)])
+def test_tangents_are_exact(kin, form, stretches):
+    """At equal principal stretches, too, where directions are arbitrary."""
+    F = flat(kin, np.diag(stretches).astype(float))
+    assert np.allclose(tangent(LAWS[form], kin, F), tangent(BUILT_IN, kin, F), atol=1e-8 * LAM)
+
+
+def apart(law, stretch, sides=None):
+    """tau_1 - tau_3 at a stretch without change of volume: uniaxial, or with the second given."""
+    second = stretch**-0.5 if sides is None else sides
+    F = flat(SPACE, np.diag([stretch, second, 1 / (stretch * second)]))
+    tau = kirchhoff_stress(law, SPACE, State(F))
+    return tau[0] - tau[2]
+
+
+@pytest.mark.parametrize("x", [0.6, 1.2, 3.0])
+@pytest.mark.parametrize("how", ["uniaxial", "biaxial", "shear"])
+def test_rubber_of_mooney_and_rivlin(x, how):
+    """(l1^2 - l3^2) 2 (C10 + l2^2 C01) at J = 1 (Treloar 1975, equation 10.6)."""
+    second = {"uniaxial": x**-0.5, "biaxial": x, "shear": 1.0}[how]
+    law = MooneyRivlin.given(1000, 1.5e5, 0.5e5, 1e8)
+    exact = 2 * (x**2 - (x * second) ** -2) * (1.5e5 + second**2 * 0.5e5)
+    assert apart(law, x, second) == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize("x", [0.7, 2.0, 5.0])
+def test_rubber_of_ogden(x):
+    """sum mu (l1^alpha - l3^alpha) at J = 1, with the constants of Ogden (1972)."""
+    terms = ((6.3e5, 1.3), (1.2e3, 5.0), (-1e4, -2.0))
+    law = Ogden.given(1000, 1e8, *[number for pair in terms for number in pair])
+    exact = sum(mu * (x**a - x ** (-0.5 * a)) for mu, a in terms)
+    assert apart(law, x) == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize("x", [0.7, 2.0, 5.0])
+def test_rubber_that_stiffens(x):
+    """2 W_1 (l^2 - 1/l) at J = 1: Gent 1996, equation 2; Yeoh 1993, equation 8."""
+    i, shear = x**2 + 2 / x - 3, x**2 - 1 / x
+    gent = Gent.given(1000, 4e5, 80, 1e8)
+    assert apart(gent, x) == pytest.approx(4e5 * 80 / (80 - i) * shear, rel=1e-9)
+    yeoh = Yeoh.given(1000, 1e8, 2e5, -2e3, 100)
+    slope = 2e5 - 2 * 2e3 * i + 3 * 100 * i * i
+    assert apart(yeoh, x) == pytest.approx(2 * slope * shear, rel=1e-9)
+
+
+def test_hookes_law_in_the_reference_frame():
+    """tau = F (lam tr E I + 2 G E) F^T (Saint-Venant 1844, Kirchhoff 1852)."""
+    law, state = SaintVenantKirchhoff.given(1000, LAM, G), deformed(SPACE, 3)
+    F = np.array(state.F).reshape(3, 3)
+    E = 0.5 * (F.T @ F - np.eye(3))
+    tau = F @ (LAM * np.trace(E) * np.eye(3) + 2 * G * E) @ F.T
+    found = kirchhoff_stress(law, SPACE, state).at()
+    assert np.allclose([[found[i, j] for j in range(3)] for i in range(3)], tau, rtol=1e-9)
+    # With lam = 0, P = G (l^3 - l) is least at l = 1/sqrt(3): first across a biaxial stretching.
+    path, stretch = first_instability(SaintVenantKirchhoff.given(1000, 0.0, G))
+    assert path == "biaxial stretching at constant volume"
+    assert stretch == pytest.approx(sqrt(sqrt(3)), rel=0.03)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "l1*exp(-0.3*l2)/l3", "sqrt(l1 + l2^2)*log(l1*l3)", "tanh(l1) - sinh(l2*l1)/cosh(l1)",
+        "l1^l2", "sin(l1)*cos(l1) + tan(0.1*l1)", "(l1 - 3)^3/(l2 + l1)^2", "-l1^(-2/3)", "2^l1",
+    ],
+)  # fmt: skip
+def test_derivatives_of_formulas(form):
+    """Against central differences."""
+    from karamelo_py.points.laws.hyperelastic import _Numbers
+    from karamelo_py.script import evaluation
+    from karamelo_py.script.parser import parse_text
+
+    raw, node = parse_text(form)
+    term, at, h = evaluation.evaluate(node, raw, _Numbers({}))._term, (1.3, 0.8, 1.1), 1e-5
+    found = value_at(derivative(term, "l1"), at)
+    ends = [value_at(term, (at[0] + step, *at[1:])) for step in (h, -h)]
+    assert found == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-7)
+
+
+@every_kinematics
+@pytest.mark.parametrize(
+    "law",
+    [
+        MooneyRivlin.given(1, 0.3, 0.2, 5),
+        Ogden.given(1, 5, 0.6, 1.3, -0.1, -2),
+        Gent.given(1, 1, 9, 5),
+    ],
+)
+def test_stress_is_the_slope_of_the_energy(kin, law):
+    """tau : sym(dl) is the change of W, by central differences."""
+    state, h = deformed(kin, 1, 0.1), 1e-6
+    way = flat(kin, np.random.default_rng(2).normal(0, 1, (3, 3)))
+    ends = [energy_density(law, kin, advance(law, kin, state, way * s, 1.0)) for s in (h, -h)]
+    tau, d = kirchhoff_stress(law, kin, state).at(), way.at()
+    work = sum(tau[i, j] * value for (i, j), value in d.items())
+    assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(work, rel=1e-6)
+
+
+def test_rest_is_without_stress_and_energy():
+    for law in (*LAWS.values(), Ogden.given(1, 5, 0.6, 1.3), Yeoh.given(1, 9, 1, -0.1, 0.1)):
+        state = initial_state(law, SPACE, 1.0)
+        assert np.allclose(kirchhoff_stress(law, SPACE, state), 0, atol=1e-9 * law.G)
+        assert energy_density(law, SPACE, state) == pytest.approx(0, abs=1e-9 * law.G)
+
+
+# --- scenes ---------------------------------------------------------------------------------------
+
+SCENE = """
+    law = "built"
+    G = 1e6/2.6
+    lam = 1e6*0.3/1.3/0.4
+    method(tlmpm, FLIP, linear, 1)
+    SCHEME
+    dimension(2, 0, 1, 0, 1, 0.25)
+    THIN
+    region(box, block, 0, 1, 0, 1)
+    material(built, neo-hookean, 1000, 1e6, 0.3)
+    material(formula, hyperelastic, 1000, G/2*(I1 - 3) - G*log(J) + lam/2*log(J)^2)
+    material(stretches, hyperelastic, 1e3, G/2*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + lam/2*log(J)^2)
+    solid(s, region, box, 2, law, 0.25, 0)
+    region(left, block, INF, 0, INF, INF)
+    group(left, nodes, region, left, all)
+    fix(hold, velocity_nodes, left, 0, 0)
+    fix(load, body_force, all, 100*y, -50)
+    compute(Es, strain_energy, all)
+    log_modify(custom, Es)
+    run(5)
+"""
+
+
+@pytest.mark.parametrize(
+    ("law", "scheme", "thin"),
+    [
+        ("stretches", "set_dt(2e-3)", ""),
+        ("stretches", "scheme(quasi-static)", ""),
+        ("formula", "scheme(quasi-static)", "plane_stress(true)"),
+    ],
+)
+def test_scenes_are_those_of_the_built_in_law(run_interpreted, law, scheme, thin):
+    script = SCENE.replace("SCHEME", scheme).replace("THIN", thin)
+    found = [
+        run_interpreted(script, "-var", "law", name, folder=name).log["Es"]
+        for name in ("built", law)
+    ]
+    assert found[1][1:] == pytest.approx(found[0][1:], rel=1e-7)
+
+
+def test_compiled_formulas_have_the_numbers_of_the_built_in_law(run_script):
+    script = SCENE.replace("SCHEME", "").replace("THIN", "")
+    found = [
+        run_script(script, "-var", "law", name, folder=name).log["Es"]
+        for name in ("built", "formula")
+    ]
+    assert found[1] == pytest.approx(found[0], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("words", "says", "instead"),
+    [
+        ("mu*(I1 - 3)", "a stress of 2 at rest", "least for I1 = I2 = 3"),
+        ("abs(I1 - 3)", "abs has no derivative", "sqrt"),
+        ("-(I1*J^(-2/3) - 3) + (J - 1)^2", "shear modulus at rest is -2", "grows"),
+        ("(I1*J^(-2/3) - 3)", "the bulk modulus", "K/2*(J - 1)^2"),
+        ("l1^2 + l2^2 - log(J^2)", "change places", "each of l1, l2 and l3"),
+        ("I9", "unknown name 'I9'", "I1, I2, J"),
+        ("3", "constant", "a formula of I1"),
+        ("x*(I1 - 3)", "cannot depend on x", "a formula of I1"),
+        ('"I1 - 3"', "is text", "without quotes"),
+        ("log(I1 - 3)", "no value at rest", ""),
+    ],
+)
+def test_energies_that_make_no_law(run_interpreted, words, says, instead):
+    line = f"mu = 1\nmaterial(m, hyperelastic, 1000, {words})\n"
+    error = run_interpreted(line, status=1).err
+    assert says in error and instead in error and ":2:" in error
+
+
+def test_an_energy_that_loses_convexity_is_reported(run_interpreted):
+    line = "material(m, saint-venant-kirchhoff, 1000, 2e7, 4e5)\nelement(e, m, p)\n"
+    said = run_interpreted("load_path(p, 1, exx=0.01)\n" + line).err
+    assert "loses its stiffness in swelling at a stretch of 0." in said
