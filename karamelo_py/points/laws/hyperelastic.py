@@ -62,10 +62,8 @@ class HyperelasticFormula(OfInvariants, _Fields):
 
     Example
     -------
-    mu = 4e5
-    K = 2e7
-    material(rubber, hyperelastic, 1000, mu/2*(I1*J^(-2/3) - 3) + K/2*(J - 1)^2)
-    material(sheet, hyperelastic, 1000, mu/2*(l1^2 + l2^2 + l3^2 - 3) - mu*log(J) + K/2*log(J)^2)
+    material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
+    material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
 
     Notes
     -----
