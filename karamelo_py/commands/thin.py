@@ -1,9 +1,9 @@
 """Commands for thin bodies: plane_stress, uniaxial_stress."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.laws import law_parts, moves_as_told
+from karamelo_py.points.laws import law_parts, law_traits, moves_as_told, parameter
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -104,14 +104,10 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
     if hub.domain is None or not hub.domain.thin or moves_as_told(material.whole):
         return
     parts = law_parts(material.whole)
-    if any(getattr(part, "flows", False) and not _coheres(part) for part in parts):
+    if any(law_traits(part).flows and not parameter(part, "cohesion") > 0 for part in parts):
         raise ScriptError(
             "without stress across the body this material has no strength",
             argument="style",
             expected="a solid that sustains tension, or plane strain",
         )
     material.thin = True
-
-
-def _coheres(part: Any) -> bool:
-    return getattr(part, "cohesion", 0) > 0

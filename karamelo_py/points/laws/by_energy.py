@@ -21,6 +21,7 @@ from karamelo_py.compiler.trace import one_at_a_time
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, total, tr
 from karamelo_py.points.kinematics.principal import PairLimits, from_principal, real_principal
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.script import terms
 from karamelo_py.script.errors import ScriptError
@@ -229,7 +230,7 @@ class ByEnergy(OfDeformation):
     """Base of laws by their energy; one class for each formula."""
 
     __slots__ = ()
-    rebounds = True
+    traits = LawTraits(rebounds=True)
     in_lanes = True
     energy: ClassVar[Code]
 
