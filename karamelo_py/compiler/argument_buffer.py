@@ -1,7 +1,6 @@
-"""Arguments of kernels put into memory by Python, and passed as one number.
+"""Arguments of kernels, written to memory by Python and passed as one address.
 
-Python writes the arguments into memory as kernels hold them
-(:mod:`karamelo_py.compiler.held`), and a kernel is called with its address.
+The memory has the layout of held tuples (:mod:`karamelo_py.compiler.held`).
 """
 
 import ctypes
@@ -21,18 +20,18 @@ from karamelo_py.compiler.held import HeldTuple, held_type, is_held
 
 
 class _Array(NamedTuple):
-    """Keep what is known of an array as long as it lives; NumPy resizes none that is known."""
+    """Facts about a living array; NumPy does not resize arrays that are referenced."""
 
-    alive: weakref.ref  # another array may get the number of one that is gone
+    alive: weakref.ref  # another array may get the id of a deleted one
     shape: tuple[int, ...]
     writeable: bool
-    kind: int  # the same for arrays of one type
+    kind: int  # equal for arrays of one type
     words: tuple[int, ...]  # as kernels have them
 
 
 _arrays: dict[int, _Array] = {}
 _kinds: dict[tuple, int] = {}
-_numbers = itertools.count()  # of these: another thread may look at an array meanwhile
+_numbers = itertools.count()  # thread-safe ids
 
 
 def _array(array: np.ndarray) -> _Array:
@@ -58,48 +57,48 @@ def _array(array: np.ndarray) -> _Array:
 
 
 def _drop(number: int, alive: weakref.ref) -> None:
-    """Forget an array that is gone, unless another one has its number."""
+    """Remove a deleted array, unless another one has its id."""
     known = _arrays.get(number)
     if known is not None and known.alive is alive:
         _arrays.pop(number, None)
 
 
 def forget(array: np.ndarray) -> None:
-    """Before an array is resized in place."""
+    """Remove an array before it is resized in place."""
     _arrays.pop(id(array), None)
 
 
 class Address(int):
-    """Address at which kernels call a Python function; the function lives as long as this number.
+    """Address of a Python function for kernels; the function lives as long as this number.
 
-    A tuple of arguments that has it can outlive whoever made it: its call is never to freed memory.
+    A tuple of arguments that contains it may outlive its maker without dangling addresses.
     """
 
     callback: Any
 
 
 class Plan(NamedTuple):
-    """Describe how the words for arguments of some types are written."""
+    """Layout of the words of arguments of some types."""
 
     text: struct.Struct
-    tuples: tuple[tuple[int, int], ...]  # which word is a tuple in a tuple, where that begins
-    first: int  # where the arguments themselves begin
+    tuples: tuple[tuple[int, int], ...]  # index of a word that is a nested tuple, and its start
+    first: int  # start of the arguments themselves
     types: tuple[types.Type, ...]  # of the arguments
 
 
 class ArgumentBuffer:
-    """Collect what is written for some arguments: held tuples one after another, inner first."""
+    """Collects the words of some arguments: held tuples one after another, inner first."""
 
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
-        self.kinds: list = []  # what decides on the types of the arguments
-        self.words: list = []  # the numbers in the tuples; 0 for a tuple in a tuple
+        self.kinds: list = []  # determine the types of the arguments
+        self.words: list = []  # numbers in the tuples; 0 for a nested tuple
         own, _ = self._of(arguments)
         self.words += own
 
     def _of(self, items: tuple) -> tuple[list, bool]:
-        """Give the words of a tuple, and whether there are arrays in it."""
+        """Return the words of a tuple, and whether it contains arrays."""
         own: list = []
         arrays = False
         kinds = self.kinds
@@ -129,16 +128,16 @@ class ArgumentBuffer:
             elif issubclass(kind, np.generic):
                 kinds.append(item.dtype)
                 signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
-                own.append(signed.item())  # the same bits: words have signs
-            else:  # of which there is nothing to be written: None, classes
+                own.append(signed.item())  # same bits: words are signed
+            else:  # nothing to write: None, classes
                 kinds.append(item)
                 own.append(0)
         return own, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments into memory; where the items of the outermost tuple are.
+        """Write the arguments to memory; also return the offset of the outermost tuple.
 
-        `at` is where that memory is copied to, if it is not used where it is.
+        `at` is the address that the memory will be copied to, if it is not used in place.
         """
         memory = bytearray(max(plan.text.size, 1))
         if at is None:
@@ -158,9 +157,9 @@ def _aligned(at: int, to: int) -> int:
 
 
 def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, int]:
-    """Add where the words of a type are that begins at `at`, and how they are written.
+    """Add offsets and formats of the words of a type that starts at `at`.
 
-    Returns where it ends, and what it is aligned to; LLVM lays types as C does.
+    Returns its end and alignment; LLVM's layout is C's.
     """
     if isinstance(kind, ir.ArrayType | ir.Aggregate):
         items = [kind.element] * kind.count if isinstance(kind, ir.ArrayType) else kind.elements
@@ -180,13 +179,13 @@ def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, in
 
 
 def plan_for(arguments: tuple) -> Plan:
-    """Lay out memory for arguments of these types."""
+    """Make the layout of arguments of these types."""
     places: list[tuple[int, str]] = []
     tuples: list[tuple[int, int]] = []
     end = 0
 
     def lay(held: Any) -> int:
-        """Give where a held tuple begins, behind those in it."""
+        """Return the offset of a held tuple, which follows the tuples in it."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in held]
         model = held.register_type().pointee
@@ -208,7 +207,7 @@ def plan_for(arguments: tuple) -> Plan:
 
 
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
-    """Give how many bytes a result takes, and what reads it."""
+    """Return the size in bytes of a result, and a function that reads it."""
     places: list[tuple[int, str]] = []
     size, _ = _lay(code.memory_type(kind), 0, places)
 

@@ -1,4 +1,4 @@
-"""Operations on numbers: the type of the result, and the code."""
+"""Operations on numbers: result types and code."""
 
 import ctypes
 import functools
@@ -18,10 +18,10 @@ from karamelo_py.compiler.code import Lanes, scalar_of
 
 
 class Operation(NamedTuple):
-    """Describe what a function of numbers of some types is."""
+    """A function for operands of some types."""
 
     result: types.Type
-    arguments: tuple[types.Type, ...]  # what its arguments are cast to
+    arguments: tuple[types.Type, ...]  # types that operands are cast to
     code: Callable  # ``code(builder, values)`` writes it
 
 
@@ -36,7 +36,7 @@ _TYPES = {
 
 
 def common(*kinds: types.Type) -> types.Type:
-    """Give the type of a sum of numbers of these types."""
+    """Return the type of a sum of numbers of these types."""
     return functools.reduce(_wider, kinds)
 
 
@@ -58,7 +58,7 @@ def _wider(a: types.Type, b: types.Type) -> types.Type:
 
 
 def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
-    """Choose the lanes of what two give, at least one of them lanes; literals are of their type."""
+    """Return the common lanes of two types, at least one of them lanes; literals adapt."""
     if isinstance(a, Lanes) and isinstance(b, Lanes):
         if a == b:
             return a
@@ -66,7 +66,7 @@ def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
             return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
         raise TypeError("lanes of several types")
     lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
-    # Numbers of cells beside a real number would be cut off: `real(i, x)` makes lanes of reals.
+    # Integers would truncate a real operand: `real(i, x)` converts lanes to reals.
     if isinstance(other, types.Float) and _is_whole(lanes):
         raise TypeError("whole lanes and a real number")
     return lanes
@@ -89,7 +89,7 @@ def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None)
 
 
 def _binary(kind_of: Callable, write: Callable) -> Callable:
-    """Make an operation on two numbers likewise."""
+    """Make an operation on two numbers, likewise."""
 
     def operation(a: types.Type, b: types.Type) -> Operation | None:
         kind = kind_of(a, b)
@@ -152,7 +152,7 @@ def _compared(sign: str, kind: types.Type) -> Callable:
 
 
 def _mixed(sign: str, first_signed: bool) -> Callable:
-    """Compare a whole number that may be negative with one that may not, but may be larger."""
+    """Compare a signed with an unsigned integer."""
 
     def compared(builder: Any, values: list) -> Any:
         values = [v if v.type.width == 64 else builder.sext(v, code.I64) for v in values]
@@ -166,7 +166,7 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 
 
 def _whole_division(remainder: bool) -> Callable:
-    """Python's division without a fraction; 0 where it is by 0."""
+    """Make Python's integer division; division by 0 gives 0."""
 
     def write(builder: Any, kind: types.Type, *values: Any) -> Any:
         of = _whole_parts if _is_whole(kind) else _real_parts
@@ -181,7 +181,7 @@ def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any
     bad = None
     if not known:
         bad = builder.icmp_signed("==", y, zero)
-        if kind.signed:  # the smallest number over -1
+        if kind.signed:  # the smallest number divided by -1
             least = builder.icmp_signed("==", x, x.type(kind.minval))
             bad = builder.or_(bad, builder.and_(least, builder.icmp_signed("==", y, x.type(-1))))
         y = builder.select(bad, one, y)
@@ -199,7 +199,7 @@ def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any
 
 
 def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, Any]:
-    """As Python's floats are divided (Objects/floatobject.c); what is by 0 is that of NumPy."""
+    """Divide like Python's floats (Objects/floatobject.c); division by 0 gives NumPy's results."""
     real = x.type
     zero, one = real(0.0), real(1.0)
     rest = builder.frem(x, y)
@@ -225,7 +225,7 @@ def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, A
 
 
 def _power(a: types.Type, b: types.Type) -> Operation | None:
-    """Give a power; that of a whole number that is known by products."""
+    """Return a power; known integer exponents become products."""
     if isinstance(b, types.IntegerLiteral) and abs(b.literal_value) <= 0x10000:
         kind, exponent = common(a, a), b.literal_value
         if exponent < 0 and _is_whole(kind):
@@ -284,7 +284,7 @@ def _size(builder: Any, kind: types.Type, value: Any) -> Any:
 
 
 def _extreme(sign: str) -> Callable:
-    """Make the first of the largest numbers, as in Python."""
+    """Make Python's min or max: the first of equal numbers."""
 
     def operation(*kinds: types.Type) -> Operation | None:
         if len(kinds) < 2:
@@ -312,14 +312,14 @@ def _to(kind: types.Type) -> Callable:
 
 
 def _real_of(kind: types.Type) -> types.Type | None:
-    """Give the type of real numbers that those of a type become; whole ones in lanes do not."""
+    """Return the real type that a type converts to; integers in lanes do not convert."""
     if isinstance(kind, Lanes):
         return None if _is_whole(kind) else kind
     return kind if isinstance(kind, types.Float) else types.float64
 
 
 def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
-    """Call a function of LLVM's (whose name tells the type), or of the library of C."""
+    """Call a function of LLVM (whose name contains the type) or of the C library."""
     kinds = [value.type for value in values]
     if name.startswith("llvm."):
         name += f".{code.overloaded(kinds[0])}"
@@ -389,7 +389,7 @@ def _scaled(factor: float) -> Callable:
 
 
 def _numpy_extreme(sign: str) -> Callable:
-    """Make the larger or smaller of two numbers; no number where one of them is none."""
+    """Make NumPy's minimum or maximum; NaN if an operand is NaN."""
 
     def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
@@ -423,10 +423,10 @@ machine.publish_python("karamelo_told_gamma", _TOLD, failing.noting(_gamma_of_py
 
 
 def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
-    """Python's function, whose bits do not depend on the library of C."""
+    """Python's gamma function, whose bits do not depend on the C library."""
     double = code.cast(builder, x, kind, types.float64)
     given = failing.passed_to(builder, builder.function)
-    name = "karamelo_told_gamma" if given else "karamelo_gamma"  # Ctrl-C may come within
+    name = "karamelo_told_gamma" if given else "karamelo_gamma"  # Ctrl-C may interrupt it
     found = _call(builder, name, double.type, [double, *given])
     return code.cast(builder, found, types.float64, kind)
 
@@ -440,7 +440,7 @@ _IN_C = (
 
 for _name, (_real, _ending) in product(
     _IN_C, ((ctypes.c_double, ""), (ctypes.c_float, "f"))
-):  # what this library of C lacks
+):  # missing in this C library
     if not machine.is_known(_name + _ending):
         _kind = ctypes.CFUNCTYPE(_real, _real)
         machine.publish_python(_name + _ending, _kind, failing.never_raising(getattr(math, _name)))
@@ -500,7 +500,7 @@ OPERATIONS: dict[Any, Callable] = {
 }
 
 
-# NumPy's names of the same, and of what is rounded to a real number.
+# NumPy's names of the same, and of functions that convert to reals.
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,
@@ -526,11 +526,11 @@ IN_LANES = {
 }  # fmt: skip
 
 
-_POWERS = {operator.pow, math.pow, np.power}  # by products, where the exponent is known
+_POWERS = {operator.pow, math.pow, np.power}  # as products for known exponents
 
 
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
-    """Give what a function of numbers is for these types; None where it is nothing."""
+    """Return the operation of a function for these types, or None."""
     made, plain = OPERATIONS.get(function), tuple(map(types.unliteral, kinds))
     if made is None or not all(isinstance(kind, _NUMBER) for kind in plain):
         return None
@@ -538,5 +538,5 @@ def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | 
         return None
     try:
         return made(*(kinds if function in _POWERS else plain))
-    except TypeError:  # of another number of arguments, or of lanes that do not agree
+    except TypeError:  # wrong number of arguments, or lanes that do not agree
         return None

@@ -1,10 +1,10 @@
-"""Compiled kernels on disk: found again by what they are made of, and never a reason to stop.
+"""Disk cache of compiled kernels; its errors never stop a run.
 
-One file holds one kernel for one list of argument types. Its name says which, and ends in the
-fingerprint of all that the code depends on (:mod:`~karamelo_py.compiler.fingerprint`); a checksum
-tells whether it is whole. What is read becomes code: only files that this user or the administrator
-alone may write are read. Whatever is wrong with a file or the folder, the kernel is compiled as if
-it were not there, and the user told once.
+A file holds one kernel for one list of argument types. Its name contains the fingerprint of all
+that the code depends on (:mod:`~karamelo_py.compiler.fingerprint`); a checksum shows whether it is
+complete. Since its content is executed, only files that nobody but this user or the administrator
+can write are read. If anything is wrong with a file or the folder, the kernel is compiled as
+without it, and the user is warned once.
 """
 
 import contextlib
@@ -32,25 +32,25 @@ from karamelo_py.compiler import compile_lock, machine
 from karamelo_py.compiler.choices import WHOLE, Unknown, name_of
 from karamelo_py.compiler.fingerprint import describe, fingerprint
 
-VARIANTS = 4  # of a kernel for the same types: as many states of the sources are kept
-ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
+VARIANTS = 4  # of a kernel for the same types: source versions kept
+ROOM = 400e6  # bytes; above it, the least recently used files are deleted
 
 _ENDING, _LOCK = ".kernel", ".lock"
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_AS_IT_IS = (  # no link, no waiting for a pipe
+_AS_IT_IS = (  # not a link, without waiting for a pipe
     getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 )
 _OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
 
 
 def folder() -> Path:
-    """Give the folder where kernels are kept."""
+    """Return the cache folder."""
     home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
     return Path(home) / "kernels"
 
 
 def _refuse_of_others(about: os.stat_result) -> None:
-    """Refuse what another user may have written."""
+    """Refuse a file that another user may have written."""
     if hasattr(os, "geteuid"):
         if about.st_uid not in (0, os.geteuid()):
             raise PermissionError(errno.EACCES, "it belongs to another user")
@@ -59,10 +59,10 @@ def _refuse_of_others(about: os.stat_result) -> None:
 
 
 def _guard(place: Path) -> None:
-    """Refuse a folder in which others may put files; one of this user's is closed to them."""
+    """Refuse a folder that others can write to; close this user's folders to others."""
     for one in (place, place.parent):
         about = one.stat()
-        if about.st_mode & stat.S_ISVTX:  # others may not take away what is there
+        if about.st_mode & stat.S_ISVTX:  # others may not delete files there
             continue
         if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
             one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)
@@ -73,7 +73,7 @@ def _guard(place: Path) -> None:
 def read(path: Path) -> bytes:
     """Read a file that only this user or the administrator can have written.
 
-    Raises OSError where it is another's, and ValueError where it is not what was written.
+    Raises OSError if it belongs to another user, and ValueError if its content is damaged.
     """
     with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
         _guard(path.parent)
@@ -95,7 +95,7 @@ def _trouble(error: OSError) -> None:
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Tell by `tell` what is wrong with the folder meanwhile, once."""
+    """Report problems with the folder through `tell`, once, within this context."""
     told: list[str] = []
 
     def tell_once(text: str) -> None:
@@ -112,10 +112,10 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
 
 
 class KernelFiles:
-    """Keep the kernels of one function in files; what `load` cannot bring into memory is none.
+    """The cached kernels of one function; a kernel that `load` cannot load does not count.
 
-    `about` tells apart functions of one name, and so do the names of functions that they close over
-    (a function may make several); `beside` are others that its kernels may call.
+    `about` and the names of functions in its closure distinguish functions of one name (a function
+    may create several); `beside` are other functions that its kernels may call.
     """
 
     def __init__(
@@ -125,7 +125,7 @@ class KernelFiles:
         self._roots = [function, *beside]
 
     def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], tuple[Any, Any]]) -> Any:
-        """Read a kernel; where there is none, compile it, while others wait for the file."""
+        """Read a kernel, or compile it while other processes wait for the file."""
         try:
             key = self._key(kinds, result)
         except Unknown as what:
@@ -134,7 +134,7 @@ class KernelFiles:
         found = self._found(kinds, key)
         if found is None:
             with compile_lock.lock(folder() / f"{key}{_LOCK}"):
-                # Another process may have compiled it since the first look.
+                # Another process may have compiled it in the meantime.
                 found = self._found(kinds, key)
                 if found is None:
                     found, codes = compiled()
@@ -142,7 +142,7 @@ class KernelFiles:
         return found
 
     def _found(self, kinds: tuple, key: str) -> Any:
-        """Read the kernel in a file; one that is not whole is told of, and taken away."""
+        """Read the kernel in a file; report and delete an incomplete one."""
         for path in self._files(key):
             try:
                 choices, code = pickle.loads(read(path))
@@ -151,7 +151,7 @@ class KernelFiles:
                     continue
                 unit = pickle.loads(code)
                 self._load(unit)
-            except (FileNotFoundError, Unknown):  # taken away, or of what is no longer there
+            except (FileNotFoundError, Unknown):  # deleted, or from sources that no longer exist
                 continue
             except OSError as error:
                 _trouble(error)
@@ -181,14 +181,14 @@ class KernelFiles:
             _trouble(error)
 
     def _tell_of_unknown(self, what: Unknown) -> None:
-        # Never without a word: somebody would wait for it in every run.
+        # Never silently: every run would compile it.
         _told.get()(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
 
     def _name(self) -> str:
         return re.sub(r"[^\w.]", "", f"{self._function.__module__}.{self._function.__qualname__}")
 
     def _key(self, kinds: tuple, result: Any) -> str:
-        """Give the name of the function with a hash of the types and of the machine."""
+        """Return the name of the function with a hash of the types and the machine."""
         words = [name_of(self._function), *_closed_over(self._function), *map(describe, kinds)]
         words += [describe(result) if result is not None else "", repr(machine.describe())]
         words.append(self._about)
@@ -198,7 +198,7 @@ class KernelFiles:
     def _files(self, key: str) -> list[Path]:
         try:
             names = [name for name in os.listdir(folder()) if name.startswith(key)]
-        except (FileNotFoundError, NotADirectoryError):  # told of where a file is to be written
+        except (FileNotFoundError, NotADirectoryError):  # reported when a file is written
             return []
         except OSError as error:
             _trouble(error)
@@ -206,7 +206,7 @@ class KernelFiles:
         return [folder() / name for name in names if _OURS.fullmatch(name)]
 
     def _forget(self, key: str) -> None:
-        """Make room: of this kernel's states all but the last, of all files the oldest."""
+        """Make room: delete old source versions of this kernel, and the oldest files."""
         ages = []
         for path in folder().iterdir():
             if _OURS.fullmatch(path.name):
@@ -228,17 +228,17 @@ class KernelFiles:
 def _closed_over(function: Callable) -> Iterator[str]:
     """Yield the names of the functions in the closure of a function."""
     for cell in getattr(function, "__closure__", None) or ():
-        with contextlib.suppress(ValueError):  # it is empty as yet
+        with contextlib.suppress(ValueError):  # it is still empty
             if hasattr(cell.cell_contents, "__qualname__"):
                 yield name_of(cell.cell_contents)
 
 
 _VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
-_SETTING = repr((_VERSIONS, [Path(file).read_bytes() for file in WHOLE]))  # of all kernels
+_SETTING = repr((_VERSIONS, [Path(file).read_bytes() for file in WHOLE]))  # common to all kernels
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file that `read` takes, whole or not at all."""
+    """Write a file for `read`, completely or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     _guard(path.parent)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")

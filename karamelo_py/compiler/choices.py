@@ -1,4 +1,4 @@
-"""Choices by type that compiled code has made: the key of a kernel has these, and no others."""
+"""Choices by type made in compiled code; the key of a kernel contains them."""
 
 import contextvars
 import functools
@@ -14,10 +14,10 @@ from numba import config
 
 INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
-# Known by name: their versions are part of every key.
+# Identified by name: their versions are part of every key.
 _OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
-# What writes code is in every key as a whole, and so are methods of tensors, which belong to
-# objects and not to names.
+# Code generators are in every key as a whole, and so are methods of tensors, which are found
+# through objects, not names.
 _HERE = Path(__file__).parent
 WHOLE = sorted(
     map(str, [*_HERE.rglob("*.py"), _HERE.parent / "points" / "kinematics" / "__init__.py"])
@@ -25,41 +25,41 @@ WHOLE = sorted(
 
 
 class Unknown(Exception):
-    """Tell that something a kernel depends on cannot be put into a hash."""
+    """Something that a kernel depends on cannot be hashed."""
 
 
 class Choice(NamedTuple):
-    """Record that a kernel asked a point function for these classes of tags, all by name."""
+    """A point function and the classes of tags it was selected for, all by name."""
 
     point_function: str
     classes: tuple[str, ...]
 
 
-point_functions: dict[str, list[Callable]] = {}  # with `find(classes)` and `tags`, by name
-choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
-of_numbers: dict[Callable, list[Callable]] = {}  # what functions are for types of numbers
+point_functions: dict[str, list[Callable]] = {}  # by name; they have `find(classes)` and `tags`
+choosers: dict[Callable, list[Callable]] = {}  # functions that kernels select by type
+of_numbers: dict[Callable, list[Callable]] = {}  # implementations of functions for number types
 
 
 def name_of(thing: Any) -> str:
-    """Name a function or class as ``module:qualified name``."""
+    """Return the name of a function or class as ``module:qualified name``."""
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
-# What was asked of a point function, code of a function that was run, or a class that it names.
+# A selection of a point function, code of a function that was run, or a class that it names.
 Part: TypeAlias = "tuple[Callable, tuple] | Choice | python.CodeType | type"
-# Of the functions that are made, innermost last; in each thread of Python its own.
+# Functions in progress, innermost last; separate for each Python thread.
 _noted: contextvars.ContextVar[tuple[set[Part], ...]] = contextvars.ContextVar("noted", default=())
 
 
 def note(parts: Iterable[Part]) -> None:
-    """Note what the function that is compiled now consists of."""
+    """Record parts of the function that is compiled now."""
     if noted := _noted.get():
         noted[-1].update(parts)
 
 
 @contextmanager
 def parts_noted() -> Iterator[set[Part]]:
-    """Collect what is noted meanwhile."""
+    """Collect the parts recorded within this context."""
     before, parts = _noted.get(), set()
     _noted.set((*before, parts))
     try:
@@ -69,12 +69,12 @@ def parts_noted() -> Iterator[set[Part]]:
 
 
 def tag_class(numba_type: Any) -> Any:
-    """Find the class of a tag, by which point functions select, from its type."""
+    """Return the class of a tag, by which point functions are selected, from its type."""
     return getattr(numba_type, "instance_class", None)
 
 
 def found_by_name(name: str) -> Any:
-    """Find what `name_of` called so."""
+    """Return the object with this `name_of`."""
     module, _, path = name.partition(":")
     try:
         return functools.reduce(getattr, path.split("."), sys.modules[module])
@@ -92,7 +92,7 @@ def class_name(tag: type | None) -> str:
 
 
 def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python.CodeType]]:
-    """Sort what code consists of: choices, and the Python functions that it was made of."""
+    """Separate parts into choices and the Python functions that were compiled."""
     codes = {part for part in parts if isinstance(part, python.CodeType)}
     choices = {
         part if isinstance(part, Choice) else Choice(name_of(part[0]), (*map(class_name, part[1]),))
@@ -103,13 +103,13 @@ def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python
 
 
 def codes_in(code: python.CodeType) -> list[python.CodeType]:
-    """List code, and that of all functions written in it."""
+    """List code objects, including nested functions."""
     inner = (codes_in(c) for c in code.co_consts if isinstance(c, python.CodeType))
     return [code, *itertools.chain.from_iterable(inner)]
 
 
 def is_opaque(thing: Any) -> bool:
-    """Tell whether a thing is known by name: it belongs to a library."""
+    """Tell whether a thing is identified by name because it belongs to a library."""
     is_module = isinstance(thing, python.ModuleType)
     module = thing.__name__ if is_module else getattr(thing, "__module__", None)
     if module is None:

@@ -1,4 +1,4 @@
-"""Types of kernels as LLVM has them, in registers and in memory, and code that takes them apart."""
+"""LLVM types of kernels, in registers and in memory, and code that takes them apart."""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -10,7 +10,7 @@ from llvmlite import ir
 from numba import types
 
 I1, I8, I32, I64 = (ir.IntType(bits) for bits in (1, 8, 32, 64))
-NOTHING = I8.as_pointer()  # what None, classes and functions are
+NOTHING = I8.as_pointer()  # None, classes and functions
 _REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
 
 
@@ -145,7 +145,7 @@ def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
 
 
 def scalar_of(kind: types.Type) -> types.Type:
-    """Give the type of the numbers in lanes; of other types, themselves."""
+    """Return the type of the numbers in lanes; other types are returned unchanged."""
     return kind.scalar if isinstance(kind, Lanes) else kind
 
 
@@ -157,7 +157,7 @@ def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
 
 
 def lane(builder: Any, value: Any, k: int) -> Any:
-    """Give the number of lane `k`."""
+    """Extract lane `k`."""
     return builder.extract_element(value, I32(k))
 
 
@@ -185,13 +185,13 @@ def overloaded(kind: ir.Type) -> str:
 
 
 def room(builder: Any, kind: ir.Type) -> Any:
-    """Give memory of the function that is written, once for all turns of a loop."""
+    """Allocate stack memory of the present function, once for all iterations of a loop."""
     with builder.goto_entry_block():
         return builder.alloca(kind)
 
 
 def at(builder: Any, pointer: Any, *places: int) -> Any:
-    """Give the address of an item of a structure or array in memory."""
+    """Compute the address of an item of a structure or array in memory."""
     return builder.gep(pointer, [I32(place) for place in places], inbounds=True)
 
 
@@ -222,12 +222,12 @@ def _converted(builder: Any, kind: types.Type, value: Any, to: Callable, truth: 
 
 
 def make_tuple(builder: Any, kind: types.Type, items: Sequence) -> Any:
-    """Put a tuple together."""
+    """Build a tuple."""
     return make_struct(builder, register_type(kind), items)
 
 
 def make_struct(builder: Any, kind: ir.Type, items: Sequence) -> Any:
-    """Put a structure, or an array in registers, together."""
+    """Build a structure, or an array in registers."""
     made = ir.Constant(kind, ir.Undefined)
     for k, item in enumerate(items):
         made = builder.insert_value(made, item, k)

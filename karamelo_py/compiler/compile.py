@@ -1,6 +1,7 @@
-"""Functions in kernels, by type: of points, of numbers, and of numbers in lanes.
+"""Functions in kernels, selected by type: of points, of numbers, and of numbers in lanes.
 
-A function of numbers is given first, then what it is of lanes (:mod:`karamelo_py.compiler.lanes`).
+A function of numbers is defined first, then its version for lanes
+(:mod:`karamelo_py.compiler.lanes`).
 """
 
 import math
@@ -36,12 +37,12 @@ from karamelo_py.compiler.values import (
 
 
 def implements(function: Callable, *numbers: type, by_type: bool = False) -> Callable:
-    """Decorate what `function` is in a kernel: for these types of numbers, or for all others.
+    """Decorate the implementation of `function` in kernels for number types (default: all others).
 
-    A type of numbers is a NamedTuple with operators (:func:`~.algebra.algebra`), or lanes. It
-    is looked for in tuples, too. What is decorated is traced, or code written by hand. If
-    `by_type`, it is Python that returns this for the types of the arguments; None leaves them to
-    what was known before.
+    A number type is a NamedTuple with operators (:func:`~.algebra.algebra`), or lanes; it is also
+    found inside tuples. The implementation is traced, or code written by hand. With `by_type` it is
+    a Python function that returns the implementation for argument types; None falls back to the
+    previous one.
     """
 
     def register(made: Callable) -> Callable:
@@ -65,21 +66,20 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
 
 
 def shared(function: Callable) -> Callable:
-    """Mark a helper that lanes or types of numbers may have in a way of their own: `implements`."""
+    """Mark a helper that may have implementations for lanes or number types: `implements`."""
     return implements(function)(function)
 
 
 def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
-    The decorated function gives name, parameters and docstring. Implementations are added with
-    ``name.on(Class, ...)``, serve classes derived from these that have none of their own, and serve
-    both as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and inside kernels, where the types are
-    known at compile time and no branch is left. A plug-in adds its own in the same way. With
-    ``otherwise`` what the decorated function does is for all others.
+    The decorated function gives name, parameters and docstring. ``name.on(Class, ...)`` adds
+    implementations, also in plug-ins; they are inherited by derived classes. They run as plain
+    Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection happens at compile time.
+    With ``otherwise`` the decorated function is the default implementation.
 
-    Point functions serve one point or several at once (:mod:`karamelo_py.compiler.lanes`). Those
-    that a class names in ``scalarised``, since they branch, are called for one point after another.
+    Point functions process one point or several at once (:mod:`karamelo_py.compiler.lanes`).
+    Functions named in ``scalarised`` of a class, because they branch, are called point by point.
     """
 
     def declare(stub: Callable) -> Callable:
@@ -88,7 +88,7 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
         nearest: dict[tuple[type, ...], Callable | None] = {}
 
         def find(classes: tuple) -> Callable | None:
-            known = nearest  # another thread of Python may add implementations meanwhile
+            known = nearest  # another thread may add implementations
             if classes not in known:
                 ways = product(*(getattr(one, "__mro__", (one,)) for one in classes))
                 known[classes] = next((table[way] for way in ways if way in table), fallback)
@@ -144,17 +144,17 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
 
 
 def real(value: float, like: Any) -> Any:
-    """Give `value` the number type of `like`.
+    """Convert `value` to the number type of `like`.
 
-    Literals take the type of what they meet; this is for what meets nothing yet.
+    Literals take the type of the other operand; this is for values without one.
     """
     return type(like)(value)
 
 
 def lanes_of(numba_type: Any) -> int:
-    """Count the lanes of a type, or of a value (:mod:`karamelo_py.compiler.lanes`).
+    """Count the lanes of a type or a value (:mod:`karamelo_py.compiler.lanes`).
 
-    It is 0 for numbers; of tuples, those of what is in them.
+    0 for numbers; for tuples, the lanes of their items.
     """
     if isinstance(numba_type, tuple | types.BaseTuple):
         return max(map(lanes_of, numba_type), default=0)
@@ -181,12 +181,12 @@ def _real(value, like):
 def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
-    whole = Lanes(types.int32, a.width)  # every processor has that, and cells are no more
+    whole = Lanes(types.int32, a.width)  # supported by every processor, and large enough for cells
     return whole(a), lambda builder, given: code.cast(builder, given, a, whole)
 
 
 def round_off(like: Any) -> Any:
-    """Give the relative error of one operation, in the number type of `like`."""
+    """Return the relative error of one operation in the number type of `like`."""
     return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
 
 
@@ -204,9 +204,9 @@ def _round_off(like):
 
 
 def index(i: int) -> int:
-    """Give `i` as an array index that is known not to be negative.
+    """Return `i` as an array index that is known not to be negative.
 
-    Saves a test for indices counted from the end at every access (a tenth of a sweep).
+    Saves the test for negative indices at every access (10 % of a sweep).
     """
     return i
 
@@ -217,10 +217,9 @@ implements(index, Lanes)(lambda i: i)
 
 
 def beside(first: int, steps: int) -> int:
-    """Give `first` + `steps` as the number of a node: an array index, as `index` makes it.
+    """Return `first` + `steps` as a node number: an array index, like `index`.
 
-    Of lanes it keeps the two apart: what is `steps` from the first node of each is found from the
-    places of these.
+    For lanes both parts are stored, so that neighbours of the first nodes are addressed from these.
     """
     return first + steps
 
@@ -230,7 +229,7 @@ implements(beside)(lambda first, steps: types.uint64(first + steps))
 
 @shared
 def fma(a: float, b: float, c: float) -> float:
-    """Add a b to c with one rounding, where compiled: always so, whatever surrounds it."""
+    """Add a b to c with one rounding when compiled, in any context."""
     return a * b + c
 
 
@@ -249,7 +248,7 @@ def _fma(a, b, c):
 
 @intrinsic
 def select(condition, a, b):
-    """Choose lane by lane."""
+    """Select lane by lane."""
     lanes = common(a, b)
     lanes = lanes if isinstance(lanes, Lanes) else Lanes(a, condition.width)
     return lanes(condition, lanes, lanes), lambda builder, *values: builder.select(*values)
@@ -257,7 +256,7 @@ def select(condition, a, b):
 
 @shared
 def where(condition: bool, a: float, b: float) -> float:
-    """Choose `a` where `condition` holds, else `b`; both are computed, and nothing branches."""
+    """Select `a` if `condition`, else `b`; evaluates both, without a branch."""
     return a if condition else b
 
 
@@ -278,7 +277,7 @@ def _all_bits(builder: Any, mask: Any, sign: str, wanted: int) -> Any:
 
 @shared
 def all_lanes(condition: bool) -> bool:
-    """Tell whether a condition holds in all lanes; it itself where there are none."""
+    """Tell whether a condition holds in all lanes; without lanes, the condition itself."""
     return condition
 
 
@@ -290,7 +289,7 @@ def _all(mask):
 
 @shared
 def any_lane(condition: bool) -> bool:
-    """Tell whether a condition holds in any lane; it itself where there are none."""
+    """Tell whether a condition holds in any lane; without lanes, the condition itself."""
     return condition
 
 
@@ -301,7 +300,7 @@ def _any(mask):
 
 
 def all_same(builder: Any, value: Any) -> Any:
-    """Check that all lanes have the same whole number."""
+    """Check that all lanes contain the same integer."""
     first = code.shuffle(builder, value, value, [0] * value.type.count)
     return _all_bits(builder, builder.icmp_signed("==", value, first), "==", -1)
 
@@ -320,7 +319,7 @@ def _branch(value):
 
 @shared
 def largest(a: float) -> float:
-    """Find the largest of the lanes; a number itself."""
+    """Return the maximum over the lanes; for a number, itself."""
     return a
 
 
@@ -339,7 +338,7 @@ def _largest_lane(a):
 
 @shared
 def first_false_lane(condition: bool) -> int:
-    """Find the first lane in which a condition does not hold; 0 where there are none."""
+    """Return the first lane where a condition is false; 0 without lanes."""
     return 0
 
 
@@ -357,7 +356,7 @@ def _first_false(mask):
 
 @shared
 def first_lane(number: int) -> int:
-    """Give the number of the first lane; a number itself."""
+    """Return the number in the first lane; for a number, itself."""
     return number
 
 
@@ -369,7 +368,7 @@ def _first(a):
 
 @shared
 def added(total: float, value: float) -> float:
-    """Add to `total` a value that may be in lanes: one after another, as numbers would be added."""
+    """Add a value to `total`; lanes are added one after another, like numbers."""
     return total + value
 
 
@@ -385,7 +384,7 @@ def _added_lanes(total, a):
 
 
 def _lanes_changed(thing: Any, change: Callable) -> Any:
-    """Give tuples, or a number, with something else for each number in lanes in them."""
+    """Replace each number in lanes in nested tuples."""
 
     def changed(item: Any) -> Any:
         return change(item) if isinstance(item, Value) and isinstance(item._kind, Lanes) else item
@@ -394,7 +393,7 @@ def _lanes_changed(thing: Any, change: Callable) -> Any:
 
 
 def _room(builder: Any, lanes: Lanes) -> Any:
-    """Give memory for lanes; truth takes bytes there."""
+    """Allocate memory for lanes; booleans take bytes there."""
     kind = ir.VectorType(code.memory_type(lanes.scalar), lanes.width)
     return builder and code.room(builder, kind)
 
@@ -414,14 +413,14 @@ def _from_memory(builder: Any, stored: Value) -> Value:
 
 
 def _place(builder: Any, stored: Value, k: Any) -> Any:
-    """Give where one lane in memory is."""
+    """Return the address of one lane in memory."""
     scalar = code.memory_type(stored._kind.scalar)
     return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
 
 
 @in_kernels
 def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: tuple) -> Any:
-    """Do a function of numbers for each lane among its arguments."""
+    """Apply a function of numbers to each lane of its arguments."""
     builder = lowering.builder
     width = lanes_of(tuple(map(lowering.kind_of, arguments)))
     stored = _lanes_changed(arguments, lambda value: _in_memory(builder, value))
@@ -449,7 +448,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
         return run(None)
     count = I64(width)
     if not unrolled:
-        # The loop is to stay one, with one copy of the function: LLVM must not know its count.
+        # Hides the count from LLVM, so that the loop remains, with one copy of the function.
         count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
     with code.counted(builder, count) as k:
         found = run(k)
@@ -463,23 +462,23 @@ for _function in (
     implements(_function, Lanes)(lambda *given, do=_function: lane_by_lane(do, True, given))
 
 
-# --- groups of points, and nodes; in lanes: `lanes/` -------------------------------------------
+# --- groups of points, and nodes; for lanes see `lanes/` ---------------------------------------
 
 
 @shared
 def of_present(p: int, value: float) -> float:
-    """Give `value`, and 0 in the lanes of a group of points that have no point."""
+    """Return `value`, with 0 in the lanes of a group that have no point."""
     return value
 
 
 @shared
 def is_one(number: int) -> bool:
-    """Tell whether all lanes have the same number."""
+    """Tell whether all lanes contain the same number."""
     return True
 
 
 class Weighted(NamedTuple):
-    """Rows of an array in the place of one: read, their weighted sum; given to, each its share."""
+    """Rows of an array used as one: reading gives their weighted sum, writing distributes."""
 
     rows: tuple[int, ...]
     weights: tuple[float, ...]
@@ -487,12 +486,12 @@ class Weighted(NamedTuple):
 
 @shared
 def prefetch(array: Any, at: tuple) -> None:
-    """Have the memory bring what a loop over groups of points reads soon behind an item."""
+    """Prefetch items that a loop over groups of points will read after this one."""
 
 
 @shared
 def prefetch_records(array: Any, i: Any) -> None:
-    """Have the memory bring the records some nodes behind those of number `i`, in lanes."""
+    """Prefetch node records some nodes after those of number `i`, in lanes."""
 
 
 @shared

@@ -1,8 +1,8 @@
-"""One of several processes compiles a kernel, the others wait for its file and read it.
+"""Lock that lets one process compile a kernel while others wait for its file.
 
-A lock that the system drops when its process ends, on a file beside the kernel. It only saves work:
-where there is no such lock, on a folder that is read-only or a file system that knows none, and
-after a while in any case, each process compiles for itself.
+The lock is on a file next to the kernel, and released by the system when its process ends. It only
+saves work: on read-only folders, file systems without locks, and after a timeout, each process
+compiles for itself.
 """
 
 import contextlib
@@ -16,24 +16,24 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-PATIENCE = 120.0  # seconds; who holds a lock so long has been stopped, perhaps with others
-PAUSE = 0.02  # seconds between two looks
+PATIENCE = 120.0  # seconds; a process that holds a lock longer is probably stopped
+PAUSE = 0.02  # seconds between two attempts
 
-waits = True  # until that was in vain
-waiting = contextlib.nullcontext  # within it a process waits: to the user it is as if it compiled
+waits = True  # False after a timeout
+waiting = contextlib.nullcontext  # context while a process waits, reported as compilation
 
 
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
-    """Hold the lock on `path`, if it can be had in time; others have done their work then."""
+    """Hold the lock on `path`, if it is available in time."""
     with contextlib.ExitStack() as held:
-        with contextlib.suppress(OSError):  # nothing can be written there, or nothing locked
+        with contextlib.suppress(OSError):  # read-only, or no locks
             _take(path, held)
         yield
 
 
 def _take(path: Path, held: contextlib.ExitStack) -> None:
-    """Take the lock; `held` gives it back."""
+    """Take the lock; `held` releases it."""
     global waits
     if fcntl is None:
         return
@@ -47,8 +47,8 @@ def _take(path: Path, held: contextlib.ExitStack) -> None:
             waits = _locked(file, PATIENCE)
         if not waits:
             return
-    held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # for a process that was forked meanwhile, too
-    # Who waits has this very file open, and finds the kernel when it has the lock.
+    held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked in the meantime
+    # Waiting processes have this file open, and find the kernel when they get the lock.
     held.callback(_take_away, path)
 
 
@@ -58,7 +58,7 @@ def _take_away(path: Path) -> None:
 
 
 def _locked(file: int, patience: float) -> bool:
-    """Lock a file within so many seconds; whether that was possible."""
+    """Lock a file within this many seconds; return whether it worked."""
     end = time.monotonic() + patience
     while True:
         with contextlib.suppress(BlockingIOError):

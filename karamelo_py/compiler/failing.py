@@ -1,7 +1,7 @@
-"""Exceptions in kernels: noted where they are raised, and raised by Python behind the kernel.
+"""Exceptions in kernels: recorded when raised, and raised again by Python after the kernel.
 
-Each call of a kernel by Python has a `Failure` of its own. The functions of LLVM that it consists
-of hand on its address as their last argument, to other threads too (`told`).
+Each kernel call by Python has a `Failure`. Its LLVM functions pass the address of it as their last
+argument, to other threads too (`told`).
 """
 
 import ctypes
@@ -18,12 +18,12 @@ from karamelo_py.compiler import code, machine
 
 
 class Failure(ctypes.Structure):
-    """Hold the first exception of one call of a kernel; kernels read the first word alone."""
+    """The first exception of one kernel call; kernels read only the first word."""
 
     _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
 
     def raise_first(self) -> None:
-        """Raise what was noted first, if anything was."""
+        """Raise the recorded exception, if there is one."""
         if self.failed:
             error = self.first
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(error))
@@ -35,19 +35,19 @@ _noting = threading.Lock()
 
 
 def note(error: BaseException, at: int) -> None:
-    """Have an exception raised behind the kernel whose `Failure` lies at an address."""
+    """Record an exception in the `Failure` at an address, to be raised after the kernel."""
     failure = Failure.from_address(at)
     with _noting:
         if not failure.failed:
             failure.first = error
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(error))  # `failure` here does not stay
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(error))  # `failure` is a temporary object
             failure.failed = 1
 
 
 def noting(function: Callable) -> Callable:
-    """Note what a function that kernels call raises, Ctrl-C too: Python drops it there.
+    """Record exceptions of a function called by kernels, including Ctrl-C; Python would drop them.
 
-    Behind its arguments it is given the address of the `Failure`.
+    After its arguments it receives the address of the `Failure`.
     """
 
     @functools.wraps(function)
@@ -63,13 +63,13 @@ def noting(function: Callable) -> Callable:
 
 
 def never_raising(function: Callable) -> Callable:
-    """Let a function of numbers that a kernel calls like one of C give NaN where it would raise."""
+    """Let a function called by a kernel like a C function return NaN instead of raising."""
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
         try:
             return function(*arguments)
-        except BaseException:  # Python would drop it, and say so
+        except BaseException:  # Python would drop it with a message
             return math.nan
 
     return call
@@ -91,13 +91,13 @@ def told(function: ir.Function) -> ir.Function:
 
 
 def failure_at(builder: ir.IRBuilder) -> Any:
-    """Give the address of the `Failure` in the function that is written; 0 where there is none."""
+    """Return the address of the `Failure` in the present function, or 0."""
     own = builder.function
     return own.args[-1] if hasattr(own, "told") else code.I64(0)
 
 
 def passed_to(builder: ir.IRBuilder, called: Any) -> list:
-    """List what a function is given behind its arguments."""
+    """List the arguments passed to a function after its own."""
     return [failure_at(builder)] if hasattr(called, "told") else []
 
 
@@ -110,7 +110,7 @@ def _return(builder: ir.IRBuilder) -> None:
 
 
 def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
-    """Write what notes an exception and returns."""
+    """Write code that records an exception and returns."""
     text = pickle.dumps((kind, arguments))
     constant = ir.Constant(ir.ArrayType(code.I8, len(text)), bytearray(text))
     place = code.in_module(builder, constant, "exception")
@@ -122,9 +122,9 @@ def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
 
 
 def go_on(builder: ir.IRBuilder, called: Any, regardless: bool) -> None:
-    """Write what returns at once where a function that was called has noted an exception.
+    """Write code that returns at once if a called function has recorded an exception.
 
-    If `regardless`, it returns as ever, and lets its own caller look.
+    With `regardless` the function continues and leaves the check to its caller.
     """
     if not getattr(called, "raises", False):
         return

@@ -1,7 +1,7 @@
-"""Declared fields: what points and nodes carry, each declared once, by the part that owns it.
+"""Declared fields: data of points and nodes, each declared once by the part that owns it.
 
-A field is a NamedTuple class with one member, its array. The class is what kernels ask for it by,
-and its attributes are all that lowering, sorting, restarts, dumps and `karamelo-py check` need::
+A field is a NamedTuple class with one member, its array. Kernels look it up by class; its
+attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check`::
 
     class Dose(Field):
         \"\"\"Radiation that a point has taken up, in gray.\"\"\"
@@ -10,17 +10,17 @@ and its attributes are all that lowering, sorting, restarts, dumps and `karamelo
 
 shape
     function of the kinematics: the number of components (`scalar` by default, `vector`, `tensor`,
-    `planar`);
-kept
-    whether it outlives a step (the default): then it is carried from run to run;
-start
-    what it starts from: a number (0 by default), or a function of the kinematics that returns one
-    number for each component;
-summed
-    whether points give to this field of the nodes (`False` by default): what they give is summed
-    tile by tile (:mod:`karamelo_py.kernels.p2g`);
-columns
-    names under which dumps, the log, plots and pictures show its components.
+    kept
+        whether it outlives a step (the default): it is carried from run to run;
+    start
+        initial value: a number (default 0), or a function of the kinematics with one number per
+        component;
+    summed
+        whether points contribute to this nodal field (default `False`): contributions are summed
+        tile by tile (:mod:`karamelo_py.kernels.p2g`);
+    columns
+        names of its components in dumps, the log, plots and pictures.
+
 
 A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points have the shape
 (components, points), those of nodes (nodes, components).
@@ -41,7 +41,7 @@ from karamelo_py.compiler.compile import implements, index, real, where
 from karamelo_py.compiler.tuples import count_in, flat, nested_as
 from karamelo_py.compiler.values import intrinsic
 
-LINE = 64  # bytes that caches get at once
+LINE = 64  # bytes per cache line
 
 
 def scalar(kin: Any) -> int:
@@ -65,12 +65,12 @@ def vector(kin: Any) -> int:
 
 
 def tensor(kin: Any) -> int:
-    """The components of a tensor, the one around the axis among them."""
+    """The components of a tensor, including the hoop component."""
     return kin.tensor_size
 
 
 def planar(kin: Any) -> int:
-    """The components of a plain matrix of two vectors."""
+    """The components of a d x d matrix."""
     return kin.dimension**2
 
 
@@ -80,52 +80,52 @@ class Field(NamedTuple):
     array: Any
 
     shape = scalar
-    is_followed = True  # its functions of the kinematics: the key of a kernel has the class
+    is_followed = True  # functions of the kinematics are part of kernel keys
 
 
 class StepField(Field):
-    """One that does not outlive a step."""
+    """A field that does not outlive a step."""
 
     kept = False
 
 
 class SummedField(StepField):
-    """One of nodes, to which points give in a step."""
+    """A nodal field to which points contribute in a step."""
 
     summed = True
 
 
 def name_of(kind: type) -> str:
-    """The name of a field: that of its class, in small letters."""
+    """Name of a field: its class name in lower case."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
 def is_kept(kind: type) -> bool:
-    """Check that a field outlives a step."""
+    """Tell whether a field outlives a step."""
     return getattr(kind, "kept", True)
 
 
 def columns_of(kind: type) -> tuple[str, ...]:
-    """Names under which the components of a field are shown, perhaps none."""
+    """Names of the components of a field in output, possibly none."""
     return getattr(kind, "columns", ())
 
 
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
-    """The fields that the `owners` declare in ``point_fields`` or ``node_fields``, each once."""
+    """Fields declared by `owners` in ``point_fields`` or ``node_fields``, each once."""
     return tuple(dict.fromkeys(kind for owner in owners for kind in getattr(owner, attribute, ())))
 
 
 def rows_of_points(
     shape: tuple[int, ...], dtype: type, room: np.ndarray | None = None
 ) -> np.ndarray:
-    """An array (..., n) for points: rows begin where lines of caches do, an odd number of them on.
+    """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
-    Nothing that is loaded at once lies in two lines then, and a visit, which goes along dozens of
-    rows side by side, has them in different sets of a cache for any number of points; with rows one
-    after another all would be in one set for 512 points, say, or 512 000. No row ends where the
-    next one begins: rows without gaps are of another type, for which loops are compiled anew.
+    No vector load then crosses a line, and the dozens of rows that a visit traverses in parallel
+    fall into different cache sets for any number of points; contiguous rows would collide for 512
+    or 512 000 points. There are always gaps between rows: arrays without gaps are another type,
+    which would need another compilation.
 
-    `room` (k,) is used where it is long enough: `length_of_rows`.
+    `room` (k,) is used if it is long enough: see `length_of_rows`.
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -140,7 +140,7 @@ def _first_of_line(room: np.ndarray) -> int:
 
 
 def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
-    """Of the memory that `rows_of_points` of this shape takes, in numbers."""
+    """Numbers of memory that `rows_of_points` of this shape needs."""
     *rows, count = shape
     return prod(rows) * _distance_of_rows(count, dtype) + LINE // np.dtype(dtype).itemsize
 
@@ -151,7 +151,7 @@ def _distance_of_rows(count: int, dtype: type) -> int:
 
 
 def as_rows_of_points(array: np.ndarray) -> np.ndarray:
-    """`array`, which may have been read or received, as `rows_of_points`."""
+    """Convert `array`, perhaps read or received, to `rows_of_points`."""
     array = np.asarray(array)
     if array.ndim == 1 or not array.flags.c_contiguous:
         return array
@@ -161,37 +161,37 @@ def as_rows_of_points(array: np.ndarray) -> np.ndarray:
 
 
 def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The numbers (..., k) of some points, from those of all (..., n).
+    """Select points from an array (..., n): (..., k).
 
-    Of arrays with gaps between their rows ``np.take`` makes a copy first, of all points.
+    ``np.take`` would first copy arrays with gaps between rows.
     """
     return np.ascontiguousarray(array[..., points])
 
 
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` points, (components, count), as it starts."""
+    """The field of `count` points, (components, count), with initial values."""
     array = rows_of_points((kind.shape(kin), count), real)
     array[:] = _start(kind, kin, real)[:, None]
     return kind(array)
 
 
 def _start(kind: type, kin: Any, real: type) -> np.ndarray:
-    """The number, or those of all components, that a field starts from."""
+    """The initial value, one number or one per component."""
     start = getattr(kind, "start", 0.0)
     return np.array(start(kin) if callable(start) else [start], real)
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
-    """(count, width) zeros of nodes; untouched pages cost no memory, no record is in two lines."""
+    """Zeros (count, width) for nodes; untouched pages use no memory, records do not cross lines."""
     room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
     first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
 
 
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` nodes, (count, components), as it starts."""
+    """The field of `count` nodes, (count, components), with initial values."""
     width = kind.shape(kin)
-    # Three numbers, wherever they begin, are loaded and stored as four, the width of a register.
+    # Three numbers are loaded and stored as four, the width of a register.
     array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
     if (start := _start(kind, kin, real)).any():
         array[:, :width] = start
@@ -199,7 +199,7 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def field(fields: tuple, kind: type) -> Any:
-    """The array of the field of this class, or None where the scene does not have it."""
+    """The array of the field of this class, or None if the scene does not have it."""
     for one in fields:
         if type(one) is kind:
             return one.array
@@ -210,7 +210,7 @@ def field(fields: tuple, kind: type) -> Any:
 
 
 def load(array, p, like):
-    """Components 0, 1, ... of point `p`, as `like` has them; none where there is no array."""
+    """Components 0, 1, ... of point `p`, as many as `like` has; () without an array."""
     if array is None:
         return ()
     if type(like) is tuple:
@@ -219,12 +219,12 @@ def load(array, p, like):
 
 
 def store(array, p, values):
-    """Components 0, 1, ... of point `p` become `values`; nothing where there is no array."""
+    """Set components 0, 1, ... of point `p` to `values`; nothing without an array."""
     store_from(array, p, 0, values)
 
 
 def store_from(array, p, first, values):
-    """Components from `first` on of point `p` become those of `values`; earlier ones stay."""
+    """Set components from `first` on of point `p` to those in `values`."""
     if array is not None:
         values = flat(values)
         for k in range(first, len(values)):
@@ -232,14 +232,14 @@ def store_from(array, p, first, values):
 
 
 def increase(array, p, values):
-    """Add `values` to components 0, 1, ... of point `p`; nothing where there is no array."""
+    """Add `values` to components 0, 1, ... of point `p`; nothing without an array."""
     if array is not None:
         for k, value in enumerate(values):
             array[k, p] += value
 
 
 def forget(array, p, which):
-    """Make the components of point `p` unknown (NaN) that are above 0 in `which`."""
+    """Set components of point `p` to NaN (unknown) where `which` is above 0."""
     if array is not None:
         for k, chosen in enumerate(which):
             value = array[k, p]
@@ -251,18 +251,18 @@ def load_vector(kin, array, p):
     return kin.Vector._make([array[k, p] for k in range(kin.dimension)])
 
 
-# --- rows by where they lie: what goes through them knows no number and types of arrays -----------
+# --- rows by address: code that does not depend on the number and types of arrays -----------------
 
 
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
-    """(m, 2) int64: the address of each row of some arrays (..., n), and the bytes of an item.
+    """(m, 2) int64: the address of each row of some arrays (..., n), and its item size in bytes.
 
-    Arrays of nothing have none. Addresses are good as long as the arrays live and are not resized.
+    Empty arrays are left out. Addresses are valid while the arrays live and are not resized.
 
     Raises
     ------
     ValueError
-        If items do not lie one after another, or do not have 4 or 8 bytes.
+        If items are not contiguous, or not of 4 or 8 bytes.
     """
     found: list[tuple[int, int]] = []
     for array in arrays:
@@ -280,7 +280,7 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def _row(address: int, like: Any, count: int) -> np.ndarray:
-    """The `count` items from an address on, whole numbers of the type of `like`."""
+    """View `count` items at an address as integers of the type of `like`."""
     memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
     return np.frombuffer(memory, like.dtype)
 
@@ -300,9 +300,9 @@ def _row_in_kernels(address, like, count):
 def pick_items(
     address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
-    """``room[c, p]`` becomes item ``order[p]`` of a row, from `begin` to `end`.
+    """Set ``room[c, p]`` to item ``order[p]`` of a row, for p from `begin` to `end`.
 
-    The row has whole numbers of the type of `like`.
+    The row has integers of the type of `like`.
     """
     row = _row(address, like, order.size)
     for p in range(begin, end):
@@ -310,7 +310,7 @@ def pick_items(
 
 
 def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
-    """Item p of such a row becomes ``room[c, p]``, from `begin` to `end`."""
+    """Set item p of such a row to ``room[c, p]``, for p from `begin` to `end`."""
     row = _row(address, like, end)
     for p in range(begin, end):
         row[index(p)] = room[c, p]

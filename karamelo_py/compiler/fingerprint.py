@@ -1,10 +1,9 @@
-"""Hash of all that a compiled kernel was made of: while it stays the same, so does the kernel.
+"""Hash of everything that a compiled kernel depends on.
 
-Everything that a kernel's code
-can depend on is followed from the living functions: what it calls through its globals and closure
-(helpers, choosers by type, other kernels), the constants and classes they name, and, for point
-functions, only the implementations that were chosen for the types at hand. Those are noted while
-a kernel is traced. An edited comment, or another basis, is in no hash of a kernel without it.
+Dependencies are followed from the live functions: what they call through globals and closures
+(helpers, functions selected by type, other kernels), the constants and classes they name, and for
+point functions only the implementations selected for the present types, recorded during tracing.
+Comments, and bases that a kernel does not use, do not affect its hash.
 """
 
 import functools
@@ -21,12 +20,12 @@ from numba import types
 from karamelo_py.compiler import choices
 from karamelo_py.compiler.values import Intrinsic
 
-_HERE = f"{__package__}."  # the text of all these modules is in every key
+_HERE = f"{__package__}."  # the text of these modules is in every key
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, type(Ellipsis), range, slice)
 
 
 def describe(numba_type: Any) -> str:
-    """Describe a type in words that mean the same in every process; tags with their fields."""
+    """Describe a type by words that mean the same in every process; tags with their fields."""
     how = type(numba_type).__name__  # held or a value
     if isinstance(numba_type, types.BaseTuple) and hasattr(numba_type, "instance_class"):
         items = zip(numba_type.fields, numba_type, strict=True)
@@ -53,10 +52,10 @@ def fingerprint(
     chosen: frozenset[choices.Choice],
     codes: frozenset[python.CodeType] = frozenset(),
 ) -> str:
-    """Hash all that code made of `roots` depends on, for types of arguments and what was chosen.
+    """Hash all that code of `roots` depends on, for argument types and recorded choices.
 
-    Raises `Unknown` where something cannot be followed, or is no longer there, and where one of
-    `codes` is not among what is followed.
+    Raises `Unknown` if something cannot be followed or no longer exists, or if one of `codes` is
+    not reached.
     """
     ahead = [*roots]
     for argument in arguments:
@@ -69,7 +68,7 @@ def fingerprint(
         ahead += [repr(choice), *(dispatch.find(classes) for dispatch in dispatches)]
     digest = hashlib.sha256()
     order: dict[int, int] = {}
-    alive = []  # so that no id is used twice
+    alive = []  # keeps ids unique
     ahead.reverse()
     while ahead:
         thing = ahead.pop()
@@ -92,7 +91,7 @@ def fingerprint(
 
 
 def _look(thing: Any) -> tuple[str, list]:
-    """Describe a thing in words, and list the other things that it consists of."""
+    """Describe a thing in words, and list the things that it consists of."""
     kind = type(thing).__name__
     if isinstance(thing, python.ModuleType):
         return f"module {thing.__name__}", []
@@ -132,7 +131,7 @@ _PARTS: dict[Any, Callable] = {
 
 def _function(function: Callable) -> tuple[str, list]:
     if hasattr(function, "find") and hasattr(function, "tags"):
-        # Its implementations are in the choices.
+        # Its implementations are among the choices.
         return (
             f"point function {choices.name_of(function)} {function.tags}",
             choices.of_numbers.get(function, []),
@@ -159,7 +158,7 @@ def _function(function: Callable) -> tuple[str, list]:
 
 
 def _from_module(value: Any, names: tuple[str, ...], above: tuple) -> list:
-    """List the things in a module, and in modules of it, that a function's code names."""
+    """List the things in a module and its submodules that a function's code names."""
     if not isinstance(value, python.ModuleType) or value in above or choices.is_opaque(value):
         return []
     found = [vars(value)[name] for name in names if name in vars(value)]
@@ -172,7 +171,7 @@ _NOWHERE = object()
 
 @functools.cache
 def _code(code: python.CodeType) -> tuple[str, tuple[str, ...]]:
-    """Hash of compiled Python without what only people read, and the names in it."""
+    """Hash Python bytecode without docstrings and the like; also return the names in it."""
     constants = list(code.co_consts)
     is_function = code.co_flags & inspect.CO_OPTIMIZED and not code.co_name.startswith("<")
     if is_function and isinstance(constants[0], str):

@@ -1,4 +1,4 @@
-"""Ways through a function that is written down: where they part, where they meet, and loops."""
+"""Control flow of a function that is written: branches, merges and loops."""
 
 import operator
 from collections.abc import Callable
@@ -20,13 +20,13 @@ from karamelo_py.compiler.values import (
 )
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
-_MERGED = (Value, HeldValue, *_PLAIN)  # what may differ from way to way
+_MERGED = (Value, HeldValue, *_PLAIN)  # may differ between branches
 _DROPPED = object()
 IN_A_LOOP = " from turn to turn of a loop"
 
 
 class Edge(NamedTuple):
-    """Say where a way ends: its last block, what names stand for, what was read."""
+    """End of a branch: its last block, the variables, and what was read."""
 
     block: Any
     names: dict[str, Any]
@@ -34,7 +34,7 @@ class Edge(NamedTuple):
 
 
 class Range:
-    """Keep a range whose bounds only a run knows."""
+    """A range with bounds known at run time."""
 
     def __init__(self, *bounds: Any):
         self.bounds = bounds
@@ -44,7 +44,7 @@ class Range:
 
 
 class Counter(NamedTuple):
-    """Count the turns of a loop over a range."""
+    """Counter of a loop over a range."""
 
     start: Value
     goes_on: Callable[[Value], Value]
@@ -52,28 +52,28 @@ class Counter(NamedTuple):
 
 
 class Phi(NamedTuple):
-    """Merge a number or pointer that depends on the way from what it is on each."""
+    """A number or pointer that depends on the branch taken."""
 
     made: Value | HeldValue
     on: list
 
 
 class LoopHeader(NamedTuple):
-    """Begin a loop: its block, and what changes from turn to turn."""
+    """Start of a loop: its block, and the variables that change."""
 
     block: Any
     phis: list[Phi]
     names: dict[str, Any]
-    paths: list[tuple]  # of what the phis stand for: a name, places in tuples
+    paths: list[tuple]  # of the phis: a name, and indices in tuples
 
 
 def is_value(thing: Any) -> bool:
-    """Tell whether only a run knows a thing."""
+    """Tell whether a thing is known only at run time."""
     return isinstance(thing, Value)
 
 
 def is_real(thing: Any) -> bool:
-    """Tell whether a thing is a real number that only a run knows."""
+    """Tell whether a thing is a real number known only at run time."""
     return isinstance(thing, Value) and isinstance(thing._kind, types.Float)
 
 
@@ -82,9 +82,9 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """Tell what numbers become from turn to turn of a loop, where that is of another type.
+    """Numbers change their type during a loop.
 
-    `grown` has, by the name and the places in tuples, a type or a number of the type.
+    `grown` maps name and indices in tuples to the new type, or a number of it.
     """
 
     def __init__(self, grown: dict[tuple, Any]):
@@ -106,25 +106,25 @@ def _counter(kinds: tuple) -> types.Integer:
 
 
 class Flow:
-    """Write the ways of one call of a function.
+    """Writes the control flow of one call of a function.
 
-    Without a builder nothing is written, and only types are found.
+    Without a builder, only types are determined.
     """
 
     def __init__(self, lowering: Any):
         self.lowering, self.builder = lowering, lowering.builder
 
-    # --- ways
+    # --- branches
 
     def _block(self) -> Any:
         return self.builder and self.builder.append_basic_block("way")
 
     def edge(self, names: dict[str, Any]) -> Edge:
-        """End a way here."""
+        """End a branch here."""
         return Edge(self.builder and self.builder.block, names, self.lowering.read)
 
     def part(self, condition: Value) -> tuple[Edge, Edge]:
-        """Begin two ways: of a condition that holds, and of one that does not."""
+        """Start two branches, for a condition that is true or false."""
         truth = emit(bool, condition)
         blocks = self._block(), self._block()
         if self.builder:
@@ -132,13 +132,13 @@ class Flow:
         return tuple(Edge(block, {}, dict(self.lowering.read)) for block in blocks)
 
     def start(self, edge: Edge) -> None:
-        """Go on at the beginning of an edge."""
+        """Continue at an edge."""
         if self.builder:
             self.builder.position_at_end(edge.block)
         self.lowering.read = edge.read
 
     def meet(self, edges: list[Edge]) -> dict[str, Any]:
-        """Go on where ways meet; what names stand for there. Some stand for nothing any more."""
+        """Continue where branches merge; return the variables. Some are undefined afterwards."""
         first = edges[0]
         if len(edges) == 1:
             self.start(first)
@@ -163,7 +163,7 @@ class Flow:
         return names
 
     def _enter(self, block: Any, phis: list[Phi], values: list) -> None:
-        """Go from here into a block where `phis` get `values`."""
+        """Jump to a block whose `phis` get `values`."""
         if not self.builder:
             return
         lowered = [
@@ -196,7 +196,7 @@ class Flow:
         kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
         real = {k for t, k in zip(things, kinds, strict=True) if is_real(t)}
         if len(real) == 1 and all(is_real(t) or is_literal(t) for t in things):
-            (kind,) = real  # literals have no precision of their own
+            (kind,) = real  # literals adapt to the precision of others
         else:
             kind = self.lowering.unify(*kinds)
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):
@@ -209,7 +209,7 @@ class Flow:
         return made
 
     def fail(self, kind: type, arguments: tuple) -> None:
-        """Let the kernel raise an exception."""
+        """Write code by which the kernel raises an exception."""
         if self.builder:
             failing.fail(self.builder, kind, arguments)
 
@@ -218,9 +218,9 @@ class Flow:
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
-        """Begin a loop; find what names stand for that change from turn to turn.
+        """Start a loop; return the variables, with phis for those that change.
 
-        `grown` is what numbers among these become, as `Grows` tells it.
+        `grown` are their new types, from `Grows`.
         """
         phis: list[Phi] = []
         paths: list[tuple] = []
@@ -244,7 +244,7 @@ class Flow:
         return LoopHeader(block, phis, carried, paths), names | carried
 
     def close(self, head: LoopHeader, names: dict[str, Any]) -> None:
-        """Go back to where a loop begins."""
+        """Jump back to the start of a loop."""
         values: list = []
         grown: dict[tuple, Any] = {}
         for name, before in head.names.items():
@@ -258,7 +258,7 @@ class Flow:
     def _close_phis(
         self, head: LoopHeader, before: Any, after: Any, values: list, grown: dict
     ) -> None:
-        """Collect what the phis of `before` become, in their order."""
+        """Collect the new values of the phis of `before`, in order."""
         if isinstance(before, Value | HeldValue):
             path = head.paths[len(values)]
             if is_number_type(after):
@@ -283,7 +283,7 @@ class Flow:
             raise Untraceable(f"{before!r} becomes something else{IN_A_LOOP}")
 
     def counted(self, bounds: tuple) -> Counter:
-        """Count the turns of a loop over a range."""
+        """Count the iterations of a loop over a range."""
         lowering, builder = self.lowering, self.builder
         kind = _counter(tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds))
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
@@ -307,14 +307,14 @@ class Flow:
 
         return Counter(start, goes_on, after)
 
-    # --- what Python does otherwise where a value is met
+    # --- operations that differ from Python's for values
 
     def negate(self, thing: Any) -> Any:
         """Compile `not`."""
         return emit(operator.not_, thing) if is_value(thing) else not thing
 
     def both(self, a: Any, b: Any) -> Any:
-        """Compile the question whether two comparisons hold."""
+        """Compile the conjunction of two comparisons."""
         return emit(operator.and_, a, b) if is_value(a) and is_value(b) else a and b
 
     def item(self, things: Any, place: Any) -> Any:

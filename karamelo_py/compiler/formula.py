@@ -1,10 +1,10 @@
-"""Formulas as stack programs, and the one compiled evaluator that runs them over blocks of points.
+"""Formulas as stack programs, and the compiled evaluator that runs them over blocks of points.
 
-A formula costs no compilation of its own. The evaluator goes through the program once per block and
-does each operation for all points of the block in a simple loop. What is the same at all points
-(time, constants, and whatever is made of them alone) is computed once per block: such instructions
-carry the mark `UNIFORM`, and a `SPREAD` makes a row of the result where points come in. What a
-formula needs more than once is computed once and kept in a row behind the stack.
+No formula is compiled itself. The evaluator runs the program once per block; each operation is a
+simple loop over the points of the block. Values common to all points (time, constants, and their
+combinations) are computed once per block: such instructions have the flag `UNIFORM`, and `SPREAD`
+expands the result to a row where points come in. Shared subexpressions are stored in rows after the
+stack.
 """
 
 from typing import NamedTuple
@@ -18,23 +18,23 @@ from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, numbered, of_o
 BLOCK = 128
 MAX_DEPTH = 32
 MAX_KEPT = 32
-ROWS = MAX_DEPTH + MAX_KEPT  # of the scratch that a program works in: the stack, then what is kept
-# Added to an operation that is done once for the whole block.
+ROWS = MAX_DEPTH + MAX_KEPT  # of the scratch array: the stack, then stored rows
+# Flag of an operation done once for the whole block.
 UNIFORM = 1 << 16
 
-# What is pushed on the stack: a constant, a published value, a row of `points` (x y z x0 y0 z0).
+# Pushed operands: a constant, a published value, a row of `points` (x y z x0 y0 z0).
 CONSTANT, GLOBAL, POINT = 0, 1, 2
-# Make a row of the number that lies `operand` below the top.
+# Expand the number at `operand` below the top to a row.
 SPREAD = 3
-# Take the top off into the row `operand` of what is kept; push that row.
+# Pop the top into stored row `operand`; push that row.
 KEEP, KEPT = 150, 151
 
 
 class Program(NamedTuple):
-    """A formula, ready to be evaluated."""
+    """A compiled formula."""
 
     code: np.ndarray  # (n, 2) int64: operation and operand of each instruction
-    constants: np.ndarray  # (m,) float64, which CONSTANT instructions push
+    constants: np.ndarray  # for CONSTANT instructions
 
 
 @noinline
@@ -45,17 +45,17 @@ def _copy(n, a, b):
 
 @noinline
 def _fill(n, a, value):
-    """Give the first `n` numbers of `a` a value."""
+    """Set the first `n` numbers of `a` to a value."""
     a[:n] = value
 
 
 def _select(n, a, b, c):
-    """Replace the first `n` numbers of `a` by those of `b`, or of `c` where they are 0."""
+    """Replace the first `n` numbers of `a` by `b`, or by `c` where they are 0."""
     for i in range(n):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# What has a loop of its own; others share one, which chooses for each number.
+# Functions with separate loops; others share a loop that selects for each number.
 _UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 ((_POWER, _power),) = numbered("^")
@@ -75,7 +75,7 @@ def _unary(op, n, a):
 
 @noinline
 def _binary(op, n, a, b):
-    """Replace the first `n` numbers of `a` by what `op` makes of them and those of `b`."""
+    """Replace the first `n` numbers of `a` by `op` of `a` and `b`."""
     for number, do in _BINARY_LOOPS:
         if op == number:
             for i in range(n):
@@ -89,9 +89,9 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise the first `n` numbers of `a` to powers, in loops without a choice where all are alike.
+    """Raise the first `n` numbers of `a` to powers, in branch-free loops if all exponents agree.
 
-    Each result is that of `_power`, whatever the powers of the other numbers.
+    Each result equals `_power`, whatever the other exponents.
     """
     power = b[0]
     same = True
@@ -157,8 +157,8 @@ def evaluate(program, globals_, points, count, out, stack):
         _copy(count, out, stack[0])
 
 
-# How kernels of hooks call the evaluator: by address, so that none of them has to contain it, and
-# with whole tables, since every slice in a kernel is dear to compile.
+# Kernels of hooks call the evaluator by address, so that they do not contain it, and with whole
+# tables, because slices in a kernel are slow to compile.
 _TABLE = types.float64[:, ::1]
 _ROW = types.float64[::1]
 EVALUATE = types.void(
@@ -171,8 +171,7 @@ STACK = 8  # rows of the scratch table: x y z x0 y0 z0, two results, stack
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
     """`evaluate` the program code[begin:end] with constants[first:last].
 
-    The points are the first rows of `scratch`, the stack its last ones; row `result` takes the
-    results.
+    Points are the first rows of `scratch`, the stack its last ones; results go to row `result`.
     """
     program = Program(code[begin:end], constants[first:last])
     evaluate(program, globals_, scratch[:6], count, scratch[result], scratch[STACK:])
@@ -180,7 +179,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """Evaluate `program` at any number of positions (n, 3), now and in the beginning.
+    """Evaluate `program` at any number of present and initial positions (n, 3).
 
     `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """

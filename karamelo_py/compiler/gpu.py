@@ -1,8 +1,8 @@
-"""Functions of one thread, for the thousands of a GPU: their code, its memory, and launches.
+"""GPU code: functions of one thread, device memory, and launches.
 
-A function ``f(i, ...)`` says what thread `i` does. It is traced as all kernels are, and written as
-PTX, which the driver of a card assembles. :class:`Emulator` runs the same code on the processor,
-one thread after another: what is written for a card is tested without one.
+A function ``f(i, ...)`` defines the work of thread `i`. It is traced like a kernel and written as
+PTX, which the driver assembles. :class:`Emulator` runs the same code on the processor, thread
+after thread, for tests without a GPU.
 """
 
 import ctypes
@@ -30,24 +30,24 @@ from karamelo_py.compiler.loops import ENTRY, NAME, compilation, items_at, writt
 from karamelo_py.compiler.trace import formula
 from karamelo_py.compiler.values import in_one, intrinsic
 
-THREADS = 128  # of a block
-USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # of NVIDIA's own installer
+THREADS = 128  # per block
+USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # NVIDIA's default
 TRIPLE = "nvptx64-nvidia-cuda"
 
 
 class NoCard(Exception):
-    """Tell why no GPU can be used, and what helps."""
+    """No GPU can be used; the text says why and what helps."""
 
     def __init__(self, reason: str, hint: str):
         super().__init__(reason)
         self.hint = hint
 
 
-# --- memory that threads share ----------------------------------------------------------------
+# --- shared memory ----------------------------------------------------------------------------
 
 
 def counted(array: np.ndarray, i: int, step: int) -> int:
-    """Add a step to a whole number of an array, which others may do, too; what it was before."""
+    """Add to an integer of an array atomically; return the old value."""
     array[i] += step
     return array[i] - step
 
@@ -66,7 +66,7 @@ def _counted(array, i, step):
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
         at = code.item_pointer(builder, array, table, (i,))
-        # The bits of numbers that are not negative are in the order of the numbers.
+        # Bits of non-negative floats are ordered like the numbers.
         bits = builder.bitcast(number, I64)
         builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
 
@@ -74,7 +74,7 @@ def _largest(array, i, value):
 
 
 def raise_to(array: np.ndarray, i: int, value: float) -> None:
-    """Make a double of an array, not below 0, the larger of it and `value`; others may, too."""
+    """Set a non-negative double of an array to the maximum of it and `value`, atomically."""
     array[i] = max(array[i], value)
 
 
@@ -86,9 +86,9 @@ def _raise_to(array, i, value):
 
 @intrinsic
 def aligned_record(array, i, count):
-    """Read the first `count` numbers of record `i`, which begins at an address divisible by 16.
+    """Read the first `count` numbers of record `i`, aligned to 16 bytes.
 
-    Where that is less than 16 bytes, at one divisible by its size.
+    Records of less than 16 bytes are aligned to their size.
     """
     if not isinstance(count, types.IntegerLiteral):
         return None
@@ -118,7 +118,7 @@ def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
 
 
 def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
-    """Write what does the work of all threads, one after another."""
+    """Write a loop over the work of all threads."""
     entry, builder = _entry(module)
     items = items_at(builder, kinds[1:], entry.args[0])
     with code.counted(builder, entry.args[1]) as i:
@@ -127,7 +127,7 @@ def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) ->
 
 
 def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
-    """Write what each thread of a card calls."""
+    """Write the entry point of each GPU thread."""
     entry, builder = _entry(module)
     entry.calling_convention = "ptx_kernel"
 
@@ -144,7 +144,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     main.attributes.add("alwaysinline")
 
 
-# What LLVM leaves to a library of C, and NVIDIA has in one of its own.
+# Functions that LLVM takes from a C library, and NVIDIA's counterparts.
 _MATHEMATICS = {
     "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
     "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
@@ -153,7 +153,7 @@ _MATHEMATICS = {
 
 
 def _of_nvidia(name: str) -> str | None:
-    """Name the function of NVIDIA's library that does what one of LLVM's or C's does."""
+    """Return NVIDIA's counterpart of a function of LLVM or C."""
     if name == "karamelo_gamma":
         return "__nv_tgamma"
     plain = name.removeprefix("llvm.").removesuffix(".f64")
@@ -164,7 +164,7 @@ def _of_nvidia(name: str) -> str | None:
 
 
 def library() -> bytes:
-    """Read NVIDIA's library of mathematics."""
+    """Read NVIDIA's mathematics library."""
     from cuda import pathfinder
 
     try:
@@ -181,7 +181,7 @@ def library() -> bytes:
 def text_of(
     function: Callable, kinds: tuple, on_card: bool, called: dict | None = None
 ) -> tuple[str, str]:
-    """Write a function of a thread for the rest of its arguments; name and text of the module.
+    """Compile a thread function for its further arguments to module text; return name and text.
 
     `called` as in `values.in_one`.
     """
@@ -200,7 +200,7 @@ def text_of(
 
 
 def numbers_of(function: Callable, arguments: tuple) -> int:
-    """Count the numbers that a function of a thread gives for the rest of its arguments."""
+    """Count the numbers that a thread function returns for its further arguments."""
     kinds = plan_for(arguments).types
     with in_one({}):
         found = formula(function, (*kinds, types.int64))
@@ -208,15 +208,15 @@ def numbers_of(function: Callable, arguments: tuple) -> int:
 
 
 def assembled(text: str, processor: str) -> str:
-    """Make PTX of the text of a module."""
+    """Compile module text to PTX."""
     return machine.assembly(text, TRIPLE, processor, library() if '@"__nv_' in text else None)
 
 
-# --- what runs it -----------------------------------------------------------------------------
+# --- execution --------------------------------------------------------------------------------
 
 
 def bandwidth(card: Any, size: int = 1 << 30) -> float:
-    """Measure how fast a card copies memory: bytes read and written a second."""
+    """Measure the copy bandwidth of a GPU: bytes read and written per second."""
     here, there = card.allocate(size), card.allocate(size)
     fastest = min(card.seconds_of([lambda: card.copy(there, here, size)] * 5))
     card.free(here)
@@ -225,7 +225,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 
 class Code(NamedTuple):
-    """Keep the code of a function of threads, as :class:`~karamelo_py.compiler.loops.Unit` does."""
+    """Code of a thread function, like :class:`~karamelo_py.compiler.loops.Unit`."""
 
     name: str
     content: bytes
@@ -233,11 +233,11 @@ class Code(NamedTuple):
 
 
 class _Coded:
-    """Keep the code of functions of threads, here and on disk."""
+    """Caches the code of thread functions in memory and on disk."""
 
     on_card: bool
     processor: str
-    made: Callable[[str], bytes]  # code of the text of a module
+    made: Callable[[str], bytes]  # compiles module text
     loaded: Callable[[Code], Any]
 
     def __init__(self) -> None:
@@ -245,22 +245,22 @@ class _Coded:
         self._known: dict[tuple, Any] = {}
 
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
-        """Make the function ready to be launched for arguments of these types."""
+        """Prepare the function for launches with arguments of these types."""
         called = called or {}
         key = function, kinds, trace.changes, *called.values()
         if key not in self._known:
             code = self._found(function, kinds, called)
             if code.name not in self._entries:
                 self._entries[code.name] = self.loaded(code)
-            if "<locals>" in function.__qualname__:  # made anew for each scene
+            if "<locals>" in function.__qualname__:  # created for each scene
                 return self._entries[code.name]
             self._known[key] = self._entries[code.name]
         return self._known[key]
 
     def _found(self, function: Callable, kinds: tuple, called: dict) -> Code:
-        """Read code from the disk, or make it and write it there."""
+        """Read code from disk, or make it and write it there."""
         beside = tuple(called.values())
-        try:  # what it is made of, but for choices by type
+        try:  # dependencies without choices by type
             own = fingerprint([function, *beside], kinds, frozenset())
         except Unknown:
             return self._compiled(function, kinds, called)[0]
@@ -270,7 +270,7 @@ class _Coded:
     def _compiled(
         self, function: Callable, kinds: tuple, called: dict
     ) -> tuple[Code, frozenset | Unknown]:
-        """Make code; also the Python functions that it was made of."""
+        """Make code; also return the Python functions compiled."""
         with compilation(function.__name__), parts_noted() as parts:
             name, text = text_of(function, kinds, self.on_card, called)
             code = Code(f"{name}_entry", self.made(text), frozenset())
@@ -282,7 +282,7 @@ class _Coded:
 
 
 class Emulator(_Coded):
-    """Run functions of threads on the processor, in memory of its own."""
+    """Runs thread functions on the processor, in separate memory."""
 
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
@@ -293,14 +293,14 @@ class Emulator(_Coded):
         self._rooms: dict[int, Any] = {}
 
     def allocate(self, size: int) -> int:
-        """Give memory of so many bytes; its address."""
+        """Allocate memory; return its address."""
         room = ctypes.create_string_buffer(size + 64)
         at = -(-ctypes.addressof(room) // 64) * 64
         self._rooms[at] = room
         return at
 
     def memory(self) -> tuple[int, int]:
-        """Bytes of memory that are free, and all: more than any scene takes."""
+        """Bytes of free and total memory, larger than any scene."""
         return 1 << 60, 1 << 60
 
     def free(self, address: int) -> None:
@@ -308,18 +308,18 @@ class Emulator(_Coded):
         del self._rooms[address]
 
     def copy_to(self, address: int, there: int, size: int) -> None:
-        """Copy memory of the program to that of the card."""
+        """Copy from program memory to device memory."""
         ctypes.memmove(address, there, size)
 
-    copy = copy_from = copy_to  # the first argument is where it goes to
+    copy = copy_from = copy_to  # the first argument is the destination
 
     def loaded(self, code: Code) -> Callable:
-        """Make code one that can be launched."""
+        """Make code launchable."""
         (address,) = machine.load(code.content, code.name)
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
-        """Do the work of `count` threads; of a function of Python where nothing is compiled."""
+        """Run `count` threads; without compilation, of a Python function."""
         if not INTERPRETED:
             entry(arguments, count)
             return
@@ -327,7 +327,7 @@ class Emulator(_Coded):
             entry(i, *arguments)
 
     def together(self, launches: Sequence[Callable]) -> Callable:
-        """Make one of several launches."""
+        """Combine several launches."""
 
         def do() -> None:
             for launch in launches:
@@ -339,7 +339,7 @@ class Emulator(_Coded):
         """Wait for all launches."""
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
-        """Do launches, one after another, and time each."""
+        """Run launches one after another, and time each."""
         found = []
         for launch in launches:
             begun = perf_counter()
@@ -349,17 +349,17 @@ class Emulator(_Coded):
 
 
 class Counted(Emulator):
-    """Count the bytes that are asked for; nothing runs."""
+    """Counts allocated bytes; runs nothing."""
 
     name, taken, copies = "counted", 0, 64
 
     def allocate(self, size: int) -> int:
-        """Count so many bytes; where none are."""
+        """Count bytes; return an address."""
         self.taken += size
         return 1 << 40
 
     def free(self, address: int) -> None:
-        """Give nothing back: what is counted is what a scene takes in all."""
+        """Do nothing: the count is the total use."""
 
     def copy_to(self, address: int, there: int, size: int) -> None:
         """Copy nothing."""
@@ -374,7 +374,7 @@ class Card(_Coded):
     """An NVIDIA GPU, through its driver."""
 
     on_card = True
-    copies = 64  # of totals: threads side by side add to different ones
+    copies = 64  # of totals: neighbouring threads add to different copies
 
     def __init__(self) -> None:
         try:
@@ -413,12 +413,12 @@ class Card(_Coded):
         return found[0] if found else None
 
     def memory(self) -> tuple[int, int]:
-        """Bytes of memory that are free, and all."""
+        """Bytes of free and total memory."""
         _, free, whole = self._driver.cuMemGetInfo()
         return int(free), int(whole)
 
     def allocate(self, size: int) -> int:
-        """Give memory of so many bytes; its address."""
+        """Allocate memory; return its address."""
         try:
             return int(self._do("cuMemAlloc", max(size, 1)))
         except RuntimeError:
@@ -428,39 +428,39 @@ class Card(_Coded):
             ) from None
 
     def free(self, address: int) -> None:
-        """Give memory back."""
+        """Free memory."""
         self._do("cuMemFree", address)
 
     def copy_to(self, address: int, there: int, size: int) -> None:
-        """Copy memory of the program to that of the card."""
+        """Copy from program memory to device memory."""
         self._do("cuMemcpyHtoD", address, there, size)
 
     def copy(self, address: int, there: int, size: int) -> None:
-        """Copy memory of the card to another place there, the first address."""
+        """Copy within device memory; the first address is the destination."""
         self._do("cuMemcpyDtoD", address, there, size)
 
     def copy_from(self, address: int, there: int, size: int) -> None:
-        """Copy memory of the card to that of the program, at the first address."""
+        """Copy from device memory to program memory, the first address."""
         self._do("cuMemcpyDtoH", address, there, size)
 
     def made(self, text: str) -> bytes:
-        """Make PTX of the text of a module."""
+        """Compile module text to PTX."""
         return assembled(text, self.processor).encode() + b"\0"
 
     def loaded(self, code: Code) -> Any:
-        """Make code one that can be launched."""
+        """Make code launchable."""
         room = ctypes.create_string_buffer(code.content)
         module = self._do("cuModuleLoadData", ctypes.addressof(room))
         return self._do("cuModuleGetFunction", module, code.name.encode())
 
     def launch(self, entry: Any, arguments: int, count: int) -> None:
-        """Let `count` threads work, in blocks of some."""
+        """Run `count` threads, in blocks."""
         given = (arguments, count), (ctypes.c_int64, ctypes.c_int64)
         blocks = -(-count // THREADS)
         self._do("cuLaunchKernel", entry, blocks, 1, 1, THREADS, 1, 1, 0, self._stream, given, 0)
 
     def together(self, launches: Sequence[Callable]) -> Callable:
-        """Make one of several launches: a graph, which the card goes through by itself."""
+        """Combine several launches to a graph, which the GPU executes by itself."""
         mode = self._driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_RELAXED
         self._do("cuStreamBeginCapture", self._stream, mode)
         for launch in launches:
@@ -480,7 +480,7 @@ class Card(_Coded):
         self._do("cuCtxSynchronize")
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
-        """Do launches, one after another, and time each."""
+        """Run launches one after another, and time each."""
         launches = list(launches)
         events = [self._do("cuEventCreate", 0) for _ in range(len(launches) + 1)]
         self._do("cuEventRecord", events[0], self._stream)
@@ -495,7 +495,7 @@ class Card(_Coded):
 
 
 def card() -> Card | Emulator:
-    """Give the GPU of this machine, or what KARAMELO_PY_GPU=emulated puts in its place."""
+    """Return the GPU of this machine, or its replacement KARAMELO_PY_GPU=emulated."""
     return Emulator() if os.environ.get("KARAMELO_PY_GPU") == "emulated" else Card()
 
 
@@ -505,12 +505,12 @@ def card() -> Card | Emulator:
 class _There(NamedTuple):
     address: int
     size: int
-    array: np.ndarray  # of the program
-    image: np.ndarray  # the same shape and steps, at the address on the card
+    array: np.ndarray  # in program memory
+    image: np.ndarray  # same shape and strides, at a device address
 
 
 def _extent(array: np.ndarray) -> int:
-    """Bytes from the first item to behind the last."""
+    """Bytes from the first item to the end of the last."""
     if not array.size:
         return 0
     steps = zip(array.shape, array.strides, strict=True)
@@ -524,20 +524,20 @@ def _free_all(card: Any, rooms: dict[int, int]) -> None:
 
 
 class Images:
-    """Arrays of the program that a card has copies of.
+    """Arrays of the program with copies in device memory.
 
-    An image is an array of NumPy's at an address on the card: kernels are told all of it, and
-    nothing in the program reads or writes its items.
+    An image is a NumPy array at a device address: kernels get its description, and the program
+    never reads or writes its items.
     """
 
     def __init__(self, card: Any):
         self.card = card
         self._known: dict[int, _There] = {}
-        self._rooms: dict[int, int] = {}  # addresses, and bytes there
+        self._rooms: dict[int, int] = {}  # addresses, and sizes
         weakref.finalize(self, _free_all, card, self._rooms).atexit = False
 
     def of(self, thing: Any) -> Any:
-        """`thing`, nested tuples of arrays and numbers, with images in the place of arrays."""
+        """Replace the arrays in `thing` (nested tuples of arrays and numbers) by images."""
         if isinstance(thing, np.ndarray):
             return self._image(thing)
         if isinstance(thing, tuple):
@@ -550,7 +550,7 @@ class Images:
         if known is None:
             size, at = _extent(array), array.ctypes.data
             if not size or any(room <= at < room + n for room, n in self._rooms.items()):
-                return array  # on the card already, or nothing
+                return array  # already on the device, or empty
             address = self._room(size)
             memory = (ctypes.c_char * size).from_address(address)
             made = np.ndarray(array.shape, array.dtype, memory, 0, array.strides)
@@ -570,17 +570,17 @@ class Images:
         return sum(self._rooms.values())
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
-        """Give an array that is on the card alone."""
+        """Make an array in device memory only."""
         size = max(int(np.prod(shape)) * np.dtype(dtype).itemsize, 1)
         return np.ndarray(shape, dtype, (ctypes.c_char * size).from_address(self._room(size)))
 
     def send(self, arrays: Iterable[np.ndarray]) -> None:
-        """Copy what arrays hold to their images."""
+        """Copy arrays to their images."""
         for one in self._of(arrays):
             self.card.copy_to(one.address, one.array.ctypes.data, one.size)
 
     def fetch(self, arrays: Iterable[np.ndarray]) -> None:
-        """Copy what images hold back."""
+        """Copy images back to their arrays."""
         for one in self._of(arrays):
             self.card.copy_from(one.array.ctypes.data, one.address, one.size)
 
@@ -588,18 +588,18 @@ class Images:
         return [self._known[id(array)] for array in arrays if id(array) in self._known]
 
     def put_at(self, at: int, content: bytes | bytearray) -> None:
-        """Put bytes where there is room."""
+        """Write bytes to free device memory."""
         room = (ctypes.c_char * len(content)).from_buffer_copy(content)
         self.card.copy_to(at, ctypes.addressof(room), len(content))
 
     def close(self) -> None:
-        """Give all memory back."""
+        """Free all memory."""
         _free_all(self.card, self._rooms)
         self._known.clear()
 
 
 class KernelLaunch:
-    """A function of a thread with its arguments, on a card; `count` threads do it."""
+    """A thread function with its arguments on a GPU, run by `count` threads."""
 
     def __init__(
         self, images: Images, function: Callable, count: int, *arguments: Any,

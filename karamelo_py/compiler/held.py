@@ -1,10 +1,10 @@
-"""Tuples of arrays held in memory, and passed as one pointer.
+"""Tuples of arrays stored in memory and passed as one pointer.
 
-A setup has some forty arrays of seven to nine numbers each. Passed one by one, they would be three
-hundred arguments of each call, and half of what there is to compile. Where a kernel starts it
-therefore holds its setup: a tuple with arrays in it becomes a pointer to its items, and what such
-an item is itself is a pointer, too. The type of a held tuple is a tuple's (its items can be read by
-name and number, point functions are chosen by its class); tuples without arrays stay values.
+A setup has about forty arrays of seven to nine numbers. Passed separately, they would be three
+hundred arguments of each call, and half of the code to compile. Therefore a kernel holds its setup
+when it starts: a tuple with arrays becomes a pointer to its items, and so do nested tuples. The
+type of a held tuple is still a tuple type (items by name and index, selection by class); tuples
+without arrays remain values.
 """
 
 import hashlib
@@ -19,7 +19,7 @@ from karamelo_py.compiler.values import HeldValue, builtin
 
 
 def _words(numba_type: Any) -> str:
-    """Name a type, with the modules of the classes in it; Numba's names leave them out."""
+    """Name a type, with the modules of its classes, which Numba's names omit."""
     if isinstance(numba_type, types.BaseTuple) and not isinstance(numba_type, HeldTuple):
         kind = getattr(numba_type, "instance_class", tuple)
         inner = ", ".join(_words(item) for item in numba_type)
@@ -28,7 +28,7 @@ def _words(numba_type: Any) -> str:
 
 
 class HeldTuple(types.BaseTuple):
-    """Type of a pointer to the items of a tuple, perhaps of a class of NamedTuples."""
+    """Type of a pointer to the items of a tuple or NamedTuple."""
 
     def __init__(self, items: tuple, instance_class: type | None = None):
         self.types = items
@@ -38,7 +38,7 @@ class HeldTuple(types.BaseTuple):
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(_words(item) for item in items)})"
-        # Short, for it is part of the names of functions.
+        # Short, because it is part of function names.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
@@ -46,7 +46,7 @@ class HeldTuple(types.BaseTuple):
         return getattr(self, "instance_class", None), self.types
 
     def register_type(self) -> ir.Type:
-        """LLVM's type: a pointer to a structure of the items."""
+        """LLVM type: a pointer to a structure of the items."""
         return ir.LiteralStructType(map(code.memory_type, self.types)).as_pointer()
 
     def __getitem__(self, k: int) -> types.Type:
@@ -66,7 +66,7 @@ def _has_arrays(numba_type: Any) -> bool:
 
 
 def held_type(numba_type: Any) -> Any:
-    """Give the type of a value when it is held; its own where no tuple with arrays is in it."""
+    """Return the type of a value when held; unchanged without tuples that contain arrays."""
     if (
         not isinstance(numba_type, types.BaseTuple)
         or isinstance(numba_type, HeldTuple)
@@ -78,9 +78,9 @@ def held_type(numba_type: Any) -> Any:
 
 
 def hold(value: Any) -> Any:
-    """`value`, in a kernel as a held tuple; what is not a tuple with arrays stays as it is.
+    """Hold `value`: in kernels, tuples with arrays become held tuples.
 
-    A held tuple lives until the function returns that calls this: pass it on, but not back.
+    A held tuple lives until the calling function returns: pass it on, but do not return it.
     """
     return value
 
@@ -93,7 +93,7 @@ def _hold(lowering: Any, thing: Any) -> Any:
 
 
 def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
-    """Put things into memory as a held tuple of this type."""
+    """Store things in memory as a held tuple of this type."""
     builder = lowering.builder
     items = [_hold(lowering, thing) for thing in things]
     place = builder and code.room(builder, held.register_type().pointee)
@@ -104,14 +104,14 @@ def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
 
 
 def item_of(builder: Any, held: HeldTuple, place: Any, k: int) -> Any:
-    """Write what reads item `k` of a held tuple."""
+    """Write code that reads item `k` of a held tuple."""
     return code.get(builder, held[k], code.at(builder, place, 0, k))
 
 
 def at_hand(held: Any) -> Any:
-    """Copy a held tuple, so that nobody else knows it: what is read of it stays in registers.
+    """Copy a held tuple to private memory, so that its items stay in registers.
 
-    For kernels with loops, before them; inside, LLVM cannot know that a pointer's items stay.
+    For kernels with loops, before the loops; inside, LLVM cannot know that the items do not change.
     """
     return held
 
@@ -124,7 +124,7 @@ def _at_hand(lowering: Any, held: Any) -> Any:
 
 
 def _copy(builder: Any, held: HeldTuple, there: Any) -> Any:
-    """Write what copies a held tuple, and those in it."""
+    """Write code that copies a held tuple and the held tuples in it."""
     place = code.room(builder, there.type.pointee)
     builder.store(builder.load(there), place)
     for k, item in enumerate(held):
@@ -135,5 +135,5 @@ def _copy(builder: Any, held: HeldTuple, there: Any) -> Any:
 
 
 def is_held(numba_type: Any) -> bool:
-    """Tell whether a type is that of a held tuple."""
+    """Tell whether a type is a held tuple."""
     return isinstance(numba_type, HeldTuple)

@@ -1,4 +1,4 @@
-"""Items of arrays, parts of arrays, fields of records."""
+"""Items and slices of arrays, and fields of records."""
 
 import math
 from typing import Any
@@ -17,13 +17,13 @@ def _places(place: Any) -> tuple:
 
 
 def is_part(kind: types.Array, place: Any) -> bool:
-    """Tell whether indices name a part of an array, and no item of it."""
+    """Tell whether indices select a slice of an array instead of an item."""
     places = _places(place)
     return len(places) < kind.ndim or any(isinstance(one, slice) for one in places)
 
 
 def part_type(kind: types.Array, place: Any) -> types.Array:
-    """Give the type of a part of an array."""
+    """Return the type of a slice of an array."""
     places = _places(place)
     if len(places) > kind.ndim:
         raise Untraceable(f"an array of {kind.ndim} dimensions has no {len(places)} indices")
@@ -41,7 +41,7 @@ def _index_type(lowering: Any, thing: Any) -> types.Type:
 
 
 def _index(lowering: Any, thing: Any, count: Any) -> Any:
-    """Give the code of an index; those that may be negative count from the end."""
+    """Compute an index; negative ones count from the end."""
     kind = _index_type(lowering, thing)
     value = lowering.lowered(thing, types.intp)
     known = isinstance(thing, int) and thing >= 0
@@ -56,7 +56,7 @@ def _from_the_end(builder: Any, value: Any, count: Any) -> Any:
 
 
 def item_place(lowering: Any, array: Value, place: Any) -> Any:
-    """Give the address of an item."""
+    """Compute the address of an item."""
     parts = code.ArrayParts(lowering.builder, array._kind, array._value)
     pairs = zip(_places(place), parts.shape, strict=True)
     indices = [_index(lowering, one, count) for one, count in pairs]
@@ -68,7 +68,7 @@ def _align(kind: types.Array) -> int | None:
 
 
 def get(lowering: Any, array: Value, place: Any) -> Any:
-    """Read an item, or see a part."""
+    """Read an item, or make a slice."""
     kind, builder = array._kind, lowering.builder
     if is_part(kind, place):
         made = part_type(kind, place)
@@ -84,7 +84,7 @@ def get(lowering: Any, array: Value, place: Any) -> Any:
 
 
 def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
-    """Write an item, or all items of a part."""
+    """Write an item, or all items of a slice."""
     kind, builder = array._kind, lowering.builder
     given = types.unliteral(lowering.kind_of(value))
     if not isinstance(given, types.Number | types.Boolean | types.Array):
@@ -102,7 +102,7 @@ def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
 
 
 def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
-    """Give each item of an array a number, or that of another array."""
+    """Set each item of an array to a number, or to the item of another array."""
     builder, kind = lowering.builder, array._kind
     parts = code.ArrayParts(builder, kind, array._value)
     if len(outer) < kind.ndim:
@@ -120,7 +120,7 @@ def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
 
 
 def _bounds(lowering: Any, one: slice, count: Any) -> tuple[Any, Any, Any]:
-    """Give where a slice begins, how many items it has, and the step."""
+    """Compute start, number of items and step of a slice."""
     builder = lowering.builder
     zero = code.I64(0)
     step = 1 if one.step is None else one.step
@@ -161,7 +161,7 @@ def _part(lowering: Any, array: Value, place: Any, made: types.Array) -> Any:
 
 
 def attribute(lowering: Any, thing: Value, name: str) -> Any:
-    """Give an attribute of an array, a record or a number."""
+    """Return an attribute of an array, a record or a number."""
     kind = thing._kind
     if isinstance(kind, types.Array):
         return _of_array(lowering, thing, name)
@@ -225,7 +225,7 @@ def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
 
 
 def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
-    """See the bits of a number as another number."""
+    """Reinterpret the bits of a number as another type."""
     wanted = OPERATIONS[getattr(number, "seen", number)](types.int64).result
     if wanted.bitwidth != thing._kind.bitwidth:
         raise Untraceable("numbers of other widths have other bits")
@@ -234,7 +234,7 @@ def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
 
 
 def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
-    """Give the item of a tuple whose place only a run knows."""
+    """Return an item of a tuple at an index known at run time."""
     kinds = [types.unliteral(lowering.kind_of(thing)) for thing in things]
     kind, builder = lowering.unify(*kinds), lowering.builder
     if kind is None:

@@ -1,8 +1,8 @@
-"""Kernels: loops that Python and other kernels call, traced as a whole and kept on disk.
+"""Kernels: loops called by Python and other kernels, traced as a whole and cached on disk.
 
-A kernel is one function of LLVM for arguments of some types, with a name that nothing else has: the
-hash of its text is in it. Python writes the arguments into memory (`argument_buffer`) and calls its
-entry with their address; kernels that call it refer to its name, and do not contain it.
+A kernel is one LLVM function for arguments of some types, with a unique name that contains the hash
+of its text. Python writes the arguments to memory (`argument_buffer`) and calls its entry with
+their address; kernels that call it refer to its name and do not contain it.
 """
 
 import contextvars
@@ -37,26 +37,26 @@ from karamelo_py.compiler.values import (
     intrinsic,
 )
 
-_CALL = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)  # free of the interpreter lock
-NAME, ENTRY = "$kernel", ".entry"  # what functions of a module are called until it has a name
+_CALL = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)  # releases the interpreter lock
+NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 
 
 class Unit(NamedTuple):
-    """Hold the machine code of a function for arguments of some types."""
+    """Machine code of a function for arguments of some types."""
 
-    name: str  # that of its entry for Python has an ending more
+    name: str  # its entry for Python has this name plus ENTRY
     result: types.Type
     code: bytes  # an object file
-    needs: tuple  # the units that it calls
-    choices: frozenset[Choice]  # what point functions were asked for, also those of its needs
-    raises: bool  # whether something in it raises exceptions
+    needs: tuple  # units that it calls
+    choices: frozenset[Choice]  # selections of point functions, including its needs
+    raises: bool  # whether it may raise exceptions
 
 
 _loaded: dict[str, list[int]] = {}
 
 
 def load(unit: Unit) -> list[int]:
-    """Give the addresses of a unit's function and of its entry, in memory from then on."""
+    """Load a unit; return the addresses of its function and its entry."""
     with one_at_a_time:
         if unit.name not in _loaded:
             for needed in unit.needs:
@@ -68,14 +68,14 @@ def load(unit: Unit) -> list[int]:
 
 
 class Compilation:
-    """Tell of compilation by this thread of Python, or that it waits for another process."""
+    """Reports compilation in this Python thread, or waiting for another process."""
 
     def __init__(self) -> None:
         self._listeners = contextvars.ContextVar[tuple]("listeners", default=())
 
     @contextmanager
     def told_to(self, listener: Any) -> Iterator[None]:
-        """Call ``on_start(name)`` and ``on_end()`` of a listener meanwhile."""
+        """Call ``on_start(name)`` and ``on_end()`` of a listener within this context."""
         before = self._listeners.get()
         self._listeners.set((*before, listener))
         try:
@@ -85,7 +85,7 @@ class Compilation:
 
     @contextmanager
     def __call__(self, name: str = "") -> Iterator[None]:
-        """Tell that a kernel is compiled meanwhile, or that another process does it."""
+        """Report that a kernel is being compiled here or by another process."""
         listeners = self._listeners.get()
         for listener in listeners:
             listener.on_start(name)
@@ -102,7 +102,7 @@ compile_lock.waiting = compilation
 
 @contextmanager
 def _no_collections() -> Iterator[None]:
-    """Python's collector of cycles would walk the many objects of a trace in vain."""
+    """Disable Python's garbage collector, which would traverse a trace in vain."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -113,7 +113,7 @@ def _no_collections() -> Iterator[None]:
 
 
 def many_threads() -> bool:
-    """Tell whether thousands of others may write to one number meanwhile: see `values.in_one`."""
+    """Tell whether many threads may write to one number at a time: see `values.in_one`."""
     return False
 
 
@@ -128,10 +128,10 @@ def written(
     result: types.Type | None = None,
     entry: Callable | None = None,
 ) -> tuple[ir.Module, types.Type]:
-    """Write a function down for arguments of these types; the module, and the type of its result.
+    """Compile a function for arguments of these types; return module and result type.
 
-    Attributes of the module are `needs`, the units that it calls, and `raises`, as in `Unit`.
-    ``entry(module, main, kinds, result)`` writes what it is called by, if not by Python.
+    The module has attributes `needs`, the units that it calls, and `raises`, as in `Unit`.
+    ``entry(module, main, kinds, result)`` writes an entry other than Python's.
     """
     with one_at_a_time:
         found = formula(function, kinds)
@@ -152,7 +152,7 @@ def written(
 
 
 def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tuple[Unit, Any]:
-    """Compile a function; the unit, and the Python functions that it was made of."""
+    """Compile a function; return the unit, and the Python functions compiled."""
     with compilation(function.__name__), _no_collections(), choices.parts_noted() as parts:
         module, result = written(function, kinds, result)
         text = str(module)
@@ -168,7 +168,7 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tu
 
 
 def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
-    """Write what reads arguments of these types from memory."""
+    """Write code that reads arguments of these types from memory."""
     held = HeldTuple(kinds)
     place = builder.inttoptr(address, held.register_type())
     full = (k for k, kind in enumerate(kinds) if not code.is_empty(kind))
@@ -176,7 +176,7 @@ def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
 
 
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
-    """Write what calls a function with arguments in memory, and puts there what it gives.
+    """Write the entry: it calls the function with arguments in memory, and stores the result there.
 
     It is called with the addresses of these, and of a `Failure`.
     """
@@ -190,9 +190,9 @@ def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: typ
 
 
 class Kernel:
-    """Call a function from Python and from other kernels, compiled for types and kept on disk.
+    """A function called from Python and other kernels, compiled by types and cached on disk.
 
-    It takes its tuples by reference.
+    Tuples are passed by reference.
     """
 
     def __init__(self, function: Callable):
@@ -206,11 +206,11 @@ class Kernel:
 
     @property
     def made_of(self) -> tuple:
-        """Name what code that calls it depends on (:mod:`karamelo_py.compiler.fingerprint`)."""
+        """Dependencies of code that calls it (:mod:`karamelo_py.compiler.fingerprint`)."""
         return (self.function,)
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
-        """Give the machine code for arguments of these types."""
+        """Return the machine code for arguments of these types."""
         with one_at_a_time:
             if self._changes != trace.changes:
                 self._find_anew()
@@ -221,7 +221,7 @@ class Kernel:
             return self.units[kinds]
 
     def _find_anew(self) -> None:
-        """Forget what was compiled: implementations have changed."""
+        """Drop compiled code, because implementations have changed."""
         with one_at_a_time:
             self._changes = trace.changes
             self.units, self._plans = {}, {}
@@ -234,16 +234,16 @@ class Kernel:
         at = ctypes.addressof(ctypes.c_char.from_buffer(result))
         try:
             entry(address, at, ctypes.addressof(failure))
-        finally:  # also where Ctrl-C comes at the end of what has failed
+        finally:  # even if Ctrl-C comes at the end of a failure
             failure.raise_first()
         return read(result)
 
     def compile(self, *arguments: Any) -> None:
-        """Have it compiled for arguments of these types, and all ready for a call with them."""
+        """Compile it and prepare a call with these arguments."""
         self._planned(ArgumentBuffer(arguments), arguments)
 
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
-        """Say how arguments are passed, the entry, and the size and the reader of the result."""
+        """Return how arguments are passed, the entry, and size and reader of the result."""
         kinds = tuple(written.kinds)
         if self._changes != trace.changes:
             self._find_anew()
@@ -276,35 +276,34 @@ class Kernel:
 
 
 def kernel(function: Callable) -> Callable:
-    """Make a kernel; interpreted, the function itself is one.
+    """Make a kernel; interpreted, it is the function itself.
 
-    No fast mathematics: where products and sums contract would depend on what a loop is inlined
-    into. `fma` says where.
+    Without fast math: contraction of products and sums would depend on inlining. Use `fma`.
     """
     return function if choices.INTERPRETED else Kernel(function)
 
 
 def noinline(function: Callable) -> Callable:
-    """Mark a function that kernels call, too large to be written into each place that calls it."""
+    """Mark a function that is too large to be inlined in kernels."""
     if not choices.INTERPRETED:
         alone(function)
         shared(function)
     return function
 
 
-# --- functions that kernels call by their address, and do not contain -----------------------------
+# --- functions called by address ------------------------------------------------------------------
 
-# Interpreted; an `Address` keeps the function.
+# Interpreted; an `Address` keeps the function alive.
 _interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
 _numbers = itertools.count()  # of these
 _addresses: dict[tuple[Callable, types.Type, int], int] = {}
 
 
 def address_of(function: Callable, signature: types.Type) -> int:
-    """Compile `function` (cached on disk) and return the address that kernels call it by.
+    """Compile `function` (cached on disk) and return its address for kernels.
 
-    Whoever calls by address does not contain the function: it need not be compiled anew for
-    another one, and the function is compiled once for all its callers.
+    Callers do not contain it: they need not be compiled again for another function, and it is
+    compiled once for all of them.
     """
     key = function, signature, trace.changes
     if key not in _addresses:
@@ -316,17 +315,17 @@ def address_of(function: Callable, signature: types.Type) -> int:
 
 
 def address_of_python(function: Callable, signature: types.Type) -> Address:
-    """Give the address by which kernels call a function of Python, of whole numbers.
+    """Return the address by which kernels call a Python function of integers.
 
-    What is raised in it is raised again behind the kernel. Keep the `Address`, rather than an int
-    made of it, as long as kernels may call it.
+    Its exceptions are raised again after the kernel. Keep the `Address`, not an int made from it,
+    as long as kernels may call it.
     """
     if choices.INTERPRETED:
-        callback: Any = functools.partial(function)  # a bound method would be gone at once
+        callback: Any = functools.partial(function)  # a bound method would be freed at once
         address = Address(next(_numbers))
         _interpreted[int(address)] = callback
     else:
-        count = len(signature.args) + 1  # the last one is for what it raises
+        count = len(signature.args) + 1  # the last one is for exceptions
         callback = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
         address = Address(ctypes.cast(callback, ctypes.c_void_p).value or 0)
     address.callback = callback
@@ -334,7 +333,7 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
 
 
 def caller_of(signature: Any) -> Callable:
-    """Make ``call(address, ...)``, which calls a function of this signature by its address."""
+    """Make ``call(address, ...)``, which calls a function of this signature by address."""
     result, parameters = signature.return_type, signature.args
 
     if choices.INTERPRETED:

@@ -1,4 +1,4 @@
-"""Code of what meets a value, by the table of operations and by intrinsics."""
+"""Code for operations on values, by the table of operations and by intrinsics."""
 
 import operator
 from collections.abc import Callable
@@ -12,11 +12,11 @@ from karamelo_py.compiler import arithmetic, code, failing, indexing
 from karamelo_py.compiler import values as traced
 from karamelo_py.compiler.held import HeldTuple, item_of
 
-MOST_OPERATIONS = 10_000  # of one formula; beyond, a loop is better left to the compiler
+MOST_OPERATIONS = 10_000  # of one formula; above it, a loop is better left to LLVM
 
 
 class FunctionType(types.Opaque):
-    """Stand for a function, or a class, that is known."""
+    """Type of a known function or class."""
 
     def __init__(self, function: Callable):
         self.function = function
@@ -24,25 +24,25 @@ class FunctionType(types.Opaque):
 
 
 class Lowering:
-    """Write code with a builder, or none while only types are asked for.
+    """Writes code with a builder, or only determines types without one.
 
-    ``seen(function)`` takes the place of a function in functions that are run.
+    ``seen(function)`` replaces functions used in the functions that are run.
     """
 
-    dispatch: Callable  # what calls functions that are chosen by type
-    key: tuple | None = None  # of the formula whose types are asked for
+    dispatch: Callable  # calls functions selected by type
+    key: tuple | None = None  # of the formula whose types are being determined
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
-        self.classes: set[type] = set()  # of the tuples that were met
+        self.classes: set[type] = set()  # of the tuples encountered
         self.operations = 0
-        self.regardless = False  # whether it goes on where what it calls raises an exception
-        self.read: dict[tuple, Any] = {}  # what was read of held tuples on the way to here
+        self.regardless = False  # whether it continues when a called function raises
+        self.read: dict[tuple, Any] = {}  # items already read from held tuples in this branch
 
-    # --- what point functions see, and its types
+    # --- values in point functions, and their types
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
-        """Give what point functions see of a value."""
+        """Wrap a value for point functions."""
         if isinstance(kind, types.Literal):
             return kind.literal_value
         if isinstance(kind, types.NoneType):
@@ -65,7 +65,7 @@ class Lowering:
         return traced.Value(kind, value)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """Give the type of what point functions see; whole numbers keep their value in it."""
+        """Return the type of a wrapped thing; integers keep their value in it."""
         if isinstance(thing, traced.Value | traced.HeldValue):
             return thing._kind
         if isinstance(thing, int):
@@ -85,7 +85,7 @@ class Lowering:
         raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Give code of what point functions see, in the type `wanted`."""
+        """Return the code of a wrapped thing in the type `wanted`."""
         if isinstance(thing, traced.Value | traced.HeldValue):
             return code.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
@@ -99,12 +99,12 @@ class Lowering:
         return code.nothing()
 
     def constant(self, array: np.ndarray) -> traced.Value:
-        """Give an array that is part of the code."""
+        """Return a constant array."""
         kind = typeof(array)
         return traced.Value(kind, self.builder and code.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
-        """Give the type of what is of one of several types; None where there is none."""
+        """Return the common type of several types, or None."""
         first = kinds[0]
         if all(kind == first for kind in kinds):
             return first
@@ -118,7 +118,7 @@ class Lowering:
     # --- operations
 
     def call(self, function: Callable, arguments: tuple) -> Any:
-        """Give what `function` gives for these arguments."""
+        """Return the result of `function` for these arguments."""
         if function in traced.BUILTINS:
             return traced.BUILTINS[function](self, *arguments)
         if function in _OF_ITEMS and _has_slice(arguments[1]):
@@ -141,7 +141,7 @@ class Lowering:
         return self.wrapped(operation.result, operation.code(self.builder, values))
 
     def operation(self, function: Callable, kinds: tuple) -> arithmetic.Operation | None:
-        """Give the operation that a function is for arguments of these types."""
+        """Return the operation of a function for arguments of these types."""
         key = function, numbers_of(kinds)
         if key not in _operations:
             if isinstance(function, traced.Intrinsic):
@@ -151,7 +151,7 @@ class Lowering:
         return _operations[key]
 
     def other(self, function: Callable, arguments: tuple, kinds: tuple) -> Any:
-        """Give what a function gives that is no operation on numbers."""
+        """Return the result of a function that is not an operation on numbers."""
         if function is len and isinstance(kinds[0], types.Array):
             return self.attribute(arguments[0], "shape")[0]
         if function is bool and isinstance(kinds[0], types.BaseTuple | types.NoneType):
@@ -161,7 +161,7 @@ class Lowering:
         )
 
     def of_item(self, things: Any, place: Any, *value: Any) -> Any:
-        """Read or write an item of an array or of a tuple."""
+        """Read or write an item of an array or tuple."""
         if isinstance(things, traced.Value) and isinstance(things._kind, types.Array):
             do = indexing.put if value else indexing.get
             return do(self, things, place, *value)
@@ -170,7 +170,7 @@ class Lowering:
         raise traced.Untraceable(f"{self.kind_of(things)} has no items")
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
-        """Give a whole number as a real one of the type of `like`."""
+        """Convert an integer to the real type of `like`."""
         kind = code.scalar_of(like._kind)
         if isinstance(thing._kind, code.Lanes):
             kind = code.Lanes(kind, thing._kind.width)
@@ -178,23 +178,23 @@ class Lowering:
         return traced.Value(kind, value)
 
     def cast(self, thing: Any, kind: types.Type) -> Any:
-        """Give what point functions see in the type `kind`."""
+        """Cast a wrapped thing to the type `kind`."""
         return self.wrapped(kind, self.builder and self.lowered(thing, kind))
 
     attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
     def item(self, held: traced.HeldValue, k: int) -> Any:
-        """Give an item of a held tuple."""
+        """Return an item of a held tuple."""
         key = id(held), k
         if key not in self.read:
             value = self.builder and item_of(self.builder, held._kind, held._value, k)
-            self.read[key] = self.wrapped(held._kind[k], value), held  # so that its id stays its
+            self.read[key] = self.wrapped(held._kind[k], value), held  # keeps its id unique
         return self.read[key][0]
 
-    # --- functions of their own
+    # --- separate functions
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """Give the function of the module that is written that does what `run` does."""
+        """Return the function of the present module that does what `run` does."""
         module = self.builder.module
         own = vars(module).setdefault("own", {})
         if (run, kinds) not in own:
@@ -208,7 +208,7 @@ class Lowering:
         return own[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
-        """Return what `run` gives from the function that is written."""
+        """Return the result of `run` from the present function."""
         given = iter(values)
         with traced.writing(self):
             found = run(
@@ -222,7 +222,7 @@ class Lowering:
     def call_own(
         self, name: str, run: Callable, kinds: tuple, result: types.Type, arguments: tuple
     ) -> Any:
-        """Call the function of its own that does what `run` does."""
+        """Call the separate function that does what `run` does."""
         if self.builder is None:
             return self.wrapped(result, None)
         return self.call_function(self.function(name, run, kinds, result), kinds, result, arguments)
@@ -230,7 +230,7 @@ class Lowering:
     def call_function(
         self, function: Any, kinds: tuple, result: types.Type, arguments: tuple
     ) -> Any:
-        """Call a function of LLVM's."""
+        """Call an LLVM function."""
         pairs = zip(arguments, kinds, strict=True)
         values = [self.lowered(a, k) for a, k in pairs if not code.is_empty(k)]
         made = self.builder.call(function, values + failing.passed_to(self.builder, function))
@@ -239,14 +239,14 @@ class Lowering:
 
 
 def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
-    """Give LLVM's type of a function of values of these types; empty ones are not passed."""
+    """LLVM type of a function of values of these types; empty ones are not passed."""
     gives = ir.VoidType() if code.is_empty(result) else code.register_type(result)
     given = [code.register_type(k) for k in kinds if not code.is_empty(k)]
     return ir.FunctionType(gives, [*given, *more])
 
 
 def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str) -> ir.Function:
-    """Begin a function of LLVM's in a module; but on a card it is told where it may fail."""
+    """Start an LLVM function; except on GPUs it gets the address of a `Failure`."""
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
     return failing.told(ir.Function(module, function_type(kinds, result, code.I64), name))
@@ -272,10 +272,10 @@ def _of_intrinsic(function: traced.Intrinsic, kinds: tuple) -> arithmetic.Operat
 
 
 def name_of(function: Callable) -> str:
-    """Name a function in a text."""
+    """Name a function in messages."""
     return getattr(function, "__name__", str(function))
 
 
 def numbers_of(kinds: tuple) -> tuple[int, ...]:
-    """Give Numba's numbers of types, which are faster to compare."""
+    """Numba's numbers of types, which compare faster."""
     return tuple([kind._code for kind in kinds])

@@ -1,7 +1,7 @@
-"""LLVM: the processor that code is made for, its optimisation, and code in memory.
+"""LLVM: target processor, optimisation, and loading of code.
 
-No fast mathematics: where products and sums contract would depend on what a loop is inlined into,
-so that results would differ between one thread and two, or a run in pieces and a whole.
+No fast math: contraction of products and sums would depend on inlining, so that results would
+differ between one and two threads, or between a run in pieces and a whole one.
 """
 
 import contextlib
@@ -13,24 +13,24 @@ from collections.abc import Callable
 
 from llvmlite import binding as llvm
 
-# The loop over the nodes of a stencil must be unrolled, 27 of them too: weights are then in
-# registers and not in tuples on the stack. Quadratic splines in space are 1.7 times as fast for it.
-# In loops of hundreds of instructions a counter for each array takes registers from the numbers.
+# The loop over the nodes of a stencil must be unrolled, even for 27: weights are then in registers,
+# not on the stack. Quadratic splines in 3D are 1.7 times as fast. In loops of hundreds of
+# instructions, a counter for each array takes registers from the numbers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
-# Without passes (0) LLVM takes a third of the time, steps up to twice theirs; bits stay equal.
+# Without passes (0) LLVM takes a third of the time and steps up to twice; bits stay equal.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 
 @functools.cache
 def features() -> str:
-    """List the instruction sets of the processor; empty where LLVM does not know it."""
+    """List the instruction sets of the processor; empty if LLVM does not know it."""
     with contextlib.suppress(RuntimeError):
         return llvm.get_host_cpu_features().flatten()
     return ""
 
 
 def describe() -> tuple:
-    """Name all that decides what code looks like, but the code."""
+    """Everything that determines the code besides the source."""
     version = llvm.llvm_version_info
     return version, llvm.get_process_triple(), llvm.get_host_cpu_name(), features(), OPTIONS, LEVEL
 
@@ -47,7 +47,7 @@ def _target() -> llvm.TargetMachine:
     llvm.initialize_native_asmprinter()
     _set_options()
     triple = llvm.get_process_triple()
-    # Code is loaded where it stays: x86 needs no tables for that.
+    # Code stays where it is loaded, so x86 needs no tables.
     where = "static" if triple.startswith(("x86", "i386", "i686")) else "default"
     return llvm.Target.from_triple(triple).create_target_machine(
         opt=max(LEVEL, 1), cpu=llvm.get_host_cpu_name(), features=features(), reloc=where,
@@ -82,14 +82,14 @@ def _optimised(
 
 
 def compile_text(text: str) -> bytes:
-    """Make machine code of the text of a module."""
+    """Compile module text to machine code."""
     return _target().emit_object(_optimised(text, _target(), level=LEVEL))
 
 
 def assembly(text: str, triple: str, processor: str, library: bytes | None = None) -> str:
-    """Make assembly of the text of a module for another processor, such as a GPU.
+    """Compile module text to assembly for another processor, such as a GPU.
 
-    What it calls may be in a `library`, bitcode of LLVM's.
+    Called functions may come from a `library`, LLVM bitcode.
     """
     _set_options()
     llvm.initialize_all_targets()
@@ -99,7 +99,7 @@ def assembly(text: str, triple: str, processor: str, library: bytes | None = Non
 
 
 def load(code: bytes, *names: str) -> list[int]:
-    """Bring machine code into memory; return the addresses of functions in it."""
+    """Load machine code; return the addresses of functions in it."""
     engine = _engine()
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -110,19 +110,19 @@ def load(code: bytes, *names: str) -> list[int]:
 
 
 def publish(name: str, address: int) -> None:
-    """Let code that is loaded from now on call a function by its name."""
+    """Make a function available by name to code loaded later."""
     llvm.add_symbol(name, address)
 
 
 def is_known(name: str) -> bool:
-    """Tell whether code that is loaded can call a function by its name."""
+    """Tell whether loaded code can call a function by name."""
     return sys.platform == "win32" or hasattr(ctypes.CDLL(None), name)
 
 
-_callbacks: list = []  # code may call them as long as the process lives
+_callbacks: list = []  # may be called until the process ends
 
 
 def publish_python(name: str, kind: type, function: Callable) -> None:
-    """Let code call a function of Python, in which nothing may be raised."""
+    """Make a Python function callable by code; it must not raise."""
     _callbacks.append(kind(function))
     publish(name, ctypes.cast(_callbacks[-1], ctypes.c_void_p).value)

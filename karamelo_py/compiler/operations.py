@@ -12,16 +12,16 @@ from karamelo_py.compiler.loops import noinline
 
 @noinline
 def _whole(a, down, up):
-    """A number rounded to a whole one; by sums, which every processor has."""
+    """Round to an integer, by sums, which every processor has."""
     if not abs(a) < 2.0**52:
-        return a  # whole, or no number
+        return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
     near = (a + far) - far
     if near > a and down:
         near -= 1.0
     elif near < a and up:
         near += 1.0
-    return math.copysign(near, a)  # -0.0 too
+    return math.copysign(near, a)  # preserves -0.0
 
 
 def _not(a):
@@ -53,14 +53,14 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Powers; small whole ones are the common case, and pow costs ten multiplications."""
+    """Power; small integer exponents are frequent, and pow costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)
 
 
 def _truth(compare: Callable) -> Callable:
-    """A comparison that gives 1.0 or 0.0."""
+    """Make a comparison that returns 1.0 or 0.0."""
 
     def truth(a, b):
         return 1.0 if compare(a, b) else 0.0
@@ -91,7 +91,7 @@ BINARY = {
     "*": operator.mul,
     "/": operator.truediv,
     "^": _power,
-    "%": operator.mod,  # the sign of the divisor, as in Python
+    "%": operator.mod,  # sign of the divisor, as in Python
     **{sign: _truth(compare) for sign, compare in {
         "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
         "==": operator.eq, "!=": operator.ne,
@@ -111,7 +111,7 @@ OPERATIONS = (
     | {"if": SELECT}
 )
 
-# Where functions are infinite: Python raises an exception there.
+# Poles of functions, where Python raises an exception.
 _POLES = {
     "log": (0, -math.inf), "log2": (0, -math.inf), "log10": (0, -math.inf),
     "log1p": (-1, -math.inf), "^": (0, math.inf), "gamma": (0, math.inf),
@@ -119,7 +119,7 @@ _POLES = {
 
 
 def quietly(name: str, *numbers: float) -> float:
-    """Do an operation as floating-point hardware does: inf or NaN where there is no result."""
+    """Apply an operation as floating-point hardware does: inf or NaN instead of exceptions."""
     a, *rest = numbers = tuple(map(float, numbers))
     try:
         return float((UNARY.get(name) or BINARY[name])(*numbers))
@@ -138,7 +138,7 @@ def quietly(name: str, *numbers: float) -> float:
 
 
 def numbered(*names: str) -> tuple[tuple[int, Callable], ...]:
-    """The numbers of some operations, and their functions; interpreted, none of these raises."""
+    """Numbers and functions of some operations; interpreted, none of them raises."""
     every = UNARY | BINARY
     return tuple(
         (OPERATIONS[name], functools.partial(quietly, name) if INTERPRETED else every[name])
@@ -158,7 +158,7 @@ def of_one(op, a):
 @implements(of_one)
 @noinline
 def _function_of(op, a):
-    """Any function of one number: one chain of choices, where a loop for each would be too much."""
+    """Any function of one number, in one chain of branches to save code."""
     for number, do in _NUMBERED_UNARY:
         if op == number:
             return do(a)
@@ -166,7 +166,7 @@ def _function_of(op, a):
 
 
 def of_two(op, a, b):
-    """The operation `op` on two numbers: comparisons and logical ones give 1.0 or 0.0."""
+    """The operation `op` on two numbers; comparisons and logical ones give 1.0 or 0.0."""
     return quietly(_NAMES[int(op)], a, b)
 
 

@@ -1,9 +1,8 @@
-"""Logarithms, exponentials and powers for numbers and for lanes: the same operations, so same bits.
+"""Logarithm, exponential and power with equal bits for numbers and lanes.
 
-The functions of the C library are called for one number after another. These are series after a
-reduction to a small range (Muller 2016, "Elementary Functions", chapter 11). Their relative error
-is about that of two operations; of powers, |y ln x| times as much where that is above 1.
-Interpreted, they are Python's.
+C library functions would be called number by number. These are series after range reduction (Muller
+2016, "Elementary Functions", chapter 11). Their relative error is about that of two operations; for
+powers, times |y ln x| if that is above 1. Interpreted, they are Python's.
 """
 
 import math
@@ -20,12 +19,12 @@ from karamelo_py.compiler.values import OF_REALS, intrinsic
 
 
 def logarithm(x: float) -> float:
-    """The natural logarithm of a number above 0; no number below."""
+    """Natural logarithm of a positive number; NaN for negative ones."""
     return math.log(x) if x > 0 else (-inf if x == 0 else nan)
 
 
 def logarithm_near_one(x: float) -> float:
-    """The same, in half the time where all numbers lie within 1/16 of 1."""
+    """The same, in half the time if all numbers are within 1/16 of 1."""
     return logarithm(x)
 
 
@@ -35,7 +34,7 @@ def exponential(x: float) -> float:
 
 
 def power(x: float, y: float) -> float:
-    """x to the power of y, for x not below 0; infinite for 0 to a negative one."""
+    """x to the power of y, for x >= 0; infinite for 0 to a negative power."""
     return x**y if x != 0 or y >= 0 else inf
 
 
@@ -43,11 +42,11 @@ OF_REALS |= {power}
 
 
 class _Bits(NamedTuple):
-    """Describe the bits of a number, or of each number in lanes."""
+    """Layout of the bits of a number, or of each number in lanes."""
 
     number: ir.Type
     whole: ir.Type  # the same bits
-    short: ir.Type  # whole numbers of 32 bits, from which every processor makes real ones
+    short: ir.Type  # 32-bit integers, which every processor converts to reals
     mantissa: int
     bias: int
 
@@ -67,7 +66,7 @@ def _constant(whole: ir.Type, value: int) -> ir.Constant:
 
 @intrinsic
 def _taken_apart(x):
-    """m between the roots of 1/2 and of 2, and e as a real number, with x = m 2^e."""
+    """Split x = m 2^e, with m between sqrt(1/2) and sqrt(2), and e as a real number."""
     made = types.UniTuple(x, 2)
     number, whole, short, mantissa, _ = _bits(x)
     root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # of 1/2
@@ -86,14 +85,14 @@ def _taken_apart(x):
 
 @intrinsic
 def _scaled(x, n):
-    """x 2^n, n a whole number in the type of x, up to 2000 in size."""
+    """x 2^n, with an integer n in the type of x, up to 2000 in size."""
     number, whole, short, mantissa, bias = _bits(x)
 
     def codegen(builder, value, n):
         n = builder.fptosi(n, short)
         half = builder.ashr(n, _constant(short, 1))
         for part in (half, builder.sub(n, half)):
-            # Twice half of the way: results go on to infinity and to the smallest numbers.
+            # In two steps: results reach infinity and denormal numbers.
             e = builder.add(part, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)
@@ -105,7 +104,7 @@ def _scaled(x, n):
 
 
 def _series(x, square, coefficients):
-    """Sum up a polynomial of `x`, whose `square` is known, in two chains."""
+    """Evaluate a polynomial of `x` with known `square`, in two chains."""
     chains = []
     for chain in (coefficients[::2], coefficients[1::2]):
         total = real(chain[-1], x)
@@ -115,7 +114,7 @@ def _series(x, square, coefficients):
     return fma(chains[1], x, chains[0])
 
 
-_LN_2, _REST = math.log(2), 2.3190468138462996e-17  # what the first leaves of ln 2
+_LN_2, _REST = math.log(2), 2.3190468138462996e-17  # remainder of ln 2
 _ARTANH = tuple(2 / (2 * k + 3) for k in range(10))
 _EXPONENTIAL = tuple(1 / factorial(k) for k in range(14))
 _NEAR_ONE = tuple((-1) ** k / (k + 3) for k in range(11))
@@ -134,7 +133,7 @@ def _logarithm(x):
 
 @implements(logarithm_near_one)
 def _logarithm_near_one(x):
-    """ln (1 + r) = r + r^2 (-1/2 + r / 3 - ...): no division, and no step that waits for one."""
+    """ln (1 + r) = r + r^2 (-1/2 + r / 3 - ...): no division, short dependency chains."""
     r = x - 1
     near = abs(r) <= 1 / 16
     square = r * r
@@ -146,13 +145,13 @@ def _logarithm_near_one(x):
 
 @implements(exponential, by_type=True)
 def _exponential(x):
-    # So far from 0 that the next number is 1 away; all targets know how to add, but not to round.
+    # Adding a number so large that its spacing is 1 rounds; not all targets have rounding.
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):
         """e^x = 2^n e^r with |r| up to ln 2 / 2; beyond `most` it is 0 or infinite."""
         x = min(max(x, -most), most)
-        n = (x * (1 / _LN_2) + far) - far  # the whole number next to it
+        n = (x * (1 / _LN_2) + far) - far  # nearest integer
         r = fma(-n, _REST, fma(-n, _LN_2, x))
         return _scaled(_series(r, r * r, _EXPONENTIAL), n)
 

@@ -1,9 +1,9 @@
-"""Numbers with slopes: a value and its derivatives by some others, in forward mode.
+"""Dual numbers: a value and its derivatives with respect to some others, in forward mode.
 
-A point function that runs on them gives its derivatives with its result, exact to round-off: of a
-law's stress the consistent tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3).
-The values have the bits that numbers without slopes have. A slope that is the literal 0 is known
-to be 0, and no code is written for it.
+A point function evaluated with them returns exact derivatives: for the stress of a law, its
+consistent tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3). Values have the
+same bits as without derivatives. A slope that is the literal 0 is known to vanish, and no code is
+written for it.
 """
 
 import math
@@ -30,14 +30,14 @@ class Dual(namedtuple("Dual", "value slopes")):
     """
 
     __slots__ = ()
-    __array_ufunc__ = None  # NumPy's numbers leave operations to these
+    __array_ufunc__ = None  # NumPy leaves operations to these
 
     def constant(self, value: Any) -> "Dual":
-        """Make a number with as many slopes, which vanish."""
+        """Make a number with as many slopes, all zero."""
         return Dual(value, (0,) * len(self.slopes))
 
     def chain(self, value: Any, slope: Any) -> "Dual":
-        """Make a function of this number, from its value and its derivative here."""
+        """Make a function of this number from its value and derivative."""
         return Dual(value, tuple([times(slope, s) for s in self.slopes]))
 
     def __add__(self, other):
@@ -78,7 +78,7 @@ class Dual(namedtuple("Dual", "value slopes")):
         return self.chain(quotient, -quotient / self.value)
 
     def __pow__(self, other):
-        if type(other) is int and 1 <= other <= 4:  # of numbers below 0, too
+        if type(other) is int and 1 <= other <= 4:  # for negative numbers too
             square = self * self
             return (self, square, square * self, square * square)[other - 1]
         return _raised(self, other, self.value ** value_of(other))
@@ -111,12 +111,12 @@ class Dual(namedtuple("Dual", "value slopes")):
 
 
 def is_tensor(thing: Any) -> bool:
-    """Tell whether a thing is a vector or tensor, which multiplies by itself."""
+    """Tell whether a thing is a vector or tensor, with products of its own class."""
     return isinstance(thing, tuple) and not isinstance(thing, Dual)
 
 
 def value_of(x: Any) -> Any:
-    """Give a number without its slopes; of tuples and tensors, all numbers in them."""
+    """Return a number without slopes; for tuples and tensors, all their numbers."""
     if isinstance(x, Dual):
         return x.value
     if isinstance(x, tuple):
@@ -125,12 +125,12 @@ def value_of(x: Any) -> Any:
 
 
 def slopes_of(x: Any, n: int) -> tuple:
-    """Give the `n` slopes of a number, zeros of one that is constant."""
+    """Return the `n` slopes of a number, zeros for a constant."""
     return x.slopes if isinstance(x, Dual) else (0,) * n
 
 
 def seeded(numbers: tuple) -> Any:
-    """Make of numbers the variables by which all is derived; of a tensor one of its class."""
+    """Make numbers the independent variables; for a tensor, one of its class."""
     n = range(len(numbers))
     made = [
         Dual(x, tuple([1 if i == k else 0 for i in n])) for k, x in zip(n, numbers, strict=True)
@@ -144,7 +144,7 @@ def is_zero(slope: Any) -> bool:
 
 
 def times(factor: Any, slope: Any) -> Any:
-    """Give factor slope; of literals 1 and -1 no product is written."""
+    """Multiply a slope; nothing is written for factors 1 and -1."""
     if is_zero(slope):
         return 0
     if is_literal(factor) and abs(factor) == 1:
@@ -178,12 +178,12 @@ def size_of(*things: Any) -> int:
 def _sqrt(x):
     root = math.sqrt(x.value)
     some = root > 0
-    # At 0 the slope is infinite. That of norms, which square roots are taken for, is 0 there.
+    # At 0 the slope is infinite; 0 is right for norms, the use of square roots.
     return x.chain(root, where(some, 0.5 / where(some, root, 1), 0))
 
 
 def elementary(function: Callable, slope: Callable, *others: Callable) -> Callable:
-    """Let a function, and `others` that are the same, know slopes: ``slope(x, f)`` at f(x)."""
+    """Define derivatives of a function, and of equal `others`: ``slope(x, f)`` at f(x)."""
 
     def of_dual(x: Dual) -> Dual:
         value = function(x.value)
@@ -195,7 +195,7 @@ def elementary(function: Callable, slope: Callable, *others: Callable) -> Callab
 
 
 def _inverse(x):
-    """Give 1/x, 0 of 0: the slopes there, which are infinite."""
+    """Return 1/x, and 0 for 0, where slopes are infinite."""
     return where(x > 0, 1 / where(x > 0, x, 1), 0)
 
 
@@ -239,7 +239,7 @@ def _atan2(y, x):
 def _hypot(x, y):
     a, b = value_of(x), value_of(y)
     made = math.hypot(a, b)
-    over = where(made > 0, made, 1)  # at 0 the slope is 0, as that of norms
+    over = where(made > 0, made, 1)  # at 0 the slope is 0, as for norms
     return combined(made, a / over, x, b / over, y)
 
 
@@ -264,13 +264,13 @@ def _pow(x, y):
     return _raised(x, y, math.pow(value_of(x), value_of(y)))
 
 
-# Their slopes vanish, or their results are no real numbers.
+# Functions with zero slopes, or whose results are not real numbers.
 for _one in (math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite):
     implements(_one, Dual)(lambda x, do=_one: do(x.value))
 
 
 class NoSlope(TypeError):
-    """A function has no derivative here; the message names it."""
+    """A function has no derivative; the message names it."""
 
 
 def _refused(*functions: Callable) -> None:
@@ -292,10 +292,10 @@ def _power(x, y):
 
 
 def _raised(x, y, made):
-    """Give the power `made` its slopes; those of a base of 0 are 0, but for the exponent 1."""
+    """Add slopes to the power `made`; for base 0 they are 0, except for exponent 1."""
     base, exponent = value_of(x), value_of(y)
     above = base > 0
-    some = base != 0  # below 0 a power is a number if the exponent is whole
+    some = base != 0  # for negative bases the exponent must be an integer
     over = where(some, base, 1)
     alone = where(exponent == 1, 1, 0) if not is_literal(exponent) else int(exponent == 1)
     return combined(

@@ -1,8 +1,8 @@
-"""The front end: the text of a function, walked statement by statement, becomes code.
+"""Front end: compiles the text of a function, statement by statement.
 
-Python's own values are computed at once. Where a number of the kernel decides, code is written for
-both branches, and where they meet, a variable merges its values (a phi of SSA form). A loop over a
-known range is unrolled where it is short or must be; any other loop stays one.
+Python's own values are computed at once. If a condition is known only at run time, code is written
+for both branches, and variables are merged where they meet (phis of SSA form). A loop over a known
+range is unrolled if short or if necessary; other loops remain loops.
 """
 
 import ast
@@ -30,7 +30,7 @@ from karamelo_py.compiler.values import LONG, Untraceable, emit
 
 @functools.cache
 def _stored(node: ast.AST) -> frozenset[str]:
-    """List the names that a statement gives something to."""
+    """List the names that a statement assigns."""
     return frozenset(
         n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
     )
@@ -38,7 +38,7 @@ def _stored(node: ast.AST) -> frozenset[str]:
 
 @functools.cache
 def _globals_in(code: python.CodeType) -> frozenset[str]:
-    """List globals; variables of comprehensions, of the function from 3.12 on, may be called so."""
+    """List globals; from Python 3.12 on also variables of comprehensions."""
     loads = (i for one in codes_in(code) for i in dis.get_instructions(one))
     return frozenset(i.argval for i in loads if i.opname == "LOAD_GLOBAL")
 
@@ -47,7 +47,7 @@ _began = time.time()
 
 
 def _is_as_read(code: python.CodeType, text: str) -> bool:
-    """Tell whether a file is as Python has read it; what was typed in lies in no file."""
+    """Tell whether a file is unchanged since Python read it; interactive code has no file."""
     try:
         about = os.stat(code.co_filename)
     except OSError:
@@ -59,7 +59,7 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
 
 @functools.cache
 def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """Parse a text; list its functions by name and first line, decorators included."""
+    """Parse a text; list functions by name and first line, decorators included."""
     found: dict[tuple[str, int], list] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
@@ -71,7 +71,7 @@ def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast
 
 
 def _has(node: ast.expr, code: python.CodeType) -> bool:
-    """Tell whether the code of a lambda lies within an expression."""
+    """Tell whether the code of a lambda is within an expression."""
     begin, end = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
     places = [p for p in code.co_positions() if None not in p and p[3]]
     return all(begin <= (p[0], p[2]) and (p[1], p[3]) <= end for p in places)
@@ -79,12 +79,12 @@ def _has(node: ast.expr, code: python.CodeType) -> bool:
 
 @functools.cache
 def source_of(code: python.CodeType) -> list[ast.stmt]:
-    """Find the statements of a function; of a lambda, what it returns."""
+    """Return the statements of a function; for a lambda, its return."""
     text = "".join(linecache.getlines(code.co_filename))
     if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start anew")
     known = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
-    if code.co_name == "<lambda>":  # perhaps one of several in a line, or within another
+    if code.co_name == "<lambda>":  # perhaps one of several in a line, or nested
         known = sorted((n for n in known if _has(n.body, code)), key=lambda n: -n.body.col_offset)
     if not known:
         raise Untraceable("its text is not known: write it into a file")
@@ -95,9 +95,9 @@ def source_of(code: python.CodeType) -> list[ast.stmt]:
 
 
 class AstFunction:
-    """Compile a function from its text, statement by statement, where it is called.
+    """Compiles a function from its text where it is called.
 
-    ``seen(thing)`` gives what kernels have for a global, a variable of a closure or a default.
+    ``seen(thing)`` replaces globals, closure variables and defaults.
     """
 
     def __init__(self, function: Callable, seen: Callable[[Any], Any]):
@@ -106,22 +106,22 @@ class AstFunction:
         self.__name__ = function.__name__
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
-        # Of loops, by all that decides on their code: types of literals that one begins with, by
-        # place; None of one that must be written out.
+        # For loops, by all that determines their code: types of initial literals by name; None if a
+        # loop must be unrolled.
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__
-        )  # its signature is of the code, whatever the function shows
+        )  # the signature of the code object
         plain.__kwdefaults__ = function.__kwdefaults__
         self.signature = inspect.signature(plain)
 
     def free(self) -> dict[str, Any]:
-        """Give the variables of the closure."""
+        """Return the closure variables."""
         cells = zip(self.__code__.co_freevars, self.function.__closure__ or (), strict=True)
         return {name: self.seen(cell.cell_contents) for name, cell in cells}
 
     def of_module(self, name: str) -> Any:
-        """Give a global, or a builtin."""
+        """Return a global or builtin."""
         true = self.function.__globals__
         if name not in true and not hasattr(builtins, name):
             raise NameError(f"name '{name}' is not defined")
@@ -135,7 +135,7 @@ class AstFunction:
 def _bound(
     signature: inspect.Signature, arguments: tuple, keywords: dict, seen: Callable = lambda x: x
 ) -> dict[str, Any]:
-    """Give the variables that a call begins with; `seen` what kernels have for defaults."""
+    """Return the initial variables of a call; `seen` replaces defaults."""
     bound = signature.bind(*arguments, **keywords)
     given = {*bound.arguments}
     bound.apply_defaults()
@@ -143,7 +143,7 @@ def _bound(
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Give types in the place of values, and all else as it is; `within` functions that know it."""
+    """Replace values by types; `within` are functions that know further things."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):
@@ -179,26 +179,26 @@ _WORDS = {
 
 
 class AstCompiler:
-    """Compile one call of a function."""
+    """Compiles one call of a function."""
 
     def __init__(self, walked: AstFunction, names: dict[str, Any], free: dict[str, Any]):
         self.walked, self.names, self.free = walked, names, free
-        self.depth = 0  # of branches and loops of the kernel
+        self.depth = 0  # of branches and loops in the kernel
         self.yielded: list = []
-        self.goes = True  # whether anything is done after the statement before
+        self.goes = True  # False after a return or raise
         self.returns: list[Edge] = []
         self.breaks: list[Edge] = []
         self.continues: list[Edge] = []
 
     @property
     def flow(self) -> Flow:
-        """Give what writes now; types may be found before there is code."""
+        """The present writer; types may be determined before there is code."""
         return Flow(values.now())
 
     def result(self) -> Any:
-        """Compile the body; return what the function returns."""
+        """Compile the body; return the result of the function."""
         self.block(self.walked.body)
-        if self.walked.generates:  # all at once
+        if self.walked.generates:  # evaluated at once
             return self.yielded
         if self.goes:
             self.names = {"": None}
@@ -210,32 +210,32 @@ class AstCompiler:
 
     @property
     def branches(self) -> bool:
-        """Tell whether only some edges come by here: elsewhere all is as Python does it."""
+        """Tell whether this is in a branch; otherwise everything is as in Python."""
         return bool(self.depth or self.returns or self.breaks or self.continues)
 
-    # --- ways
+    # --- branches
 
     def edge(self) -> Edge:
-        """End a way here."""
+        """End a branch here."""
         return self.flow.edge(self.names)
 
     def here(self) -> list[Edge]:
-        """List the way that goes on here, if one does."""
+        """List the present branch, if it is reachable."""
         return [self.edge()] if self.goes else []
 
     def leave(self, edges: list[Edge]) -> None:
-        """End this way here: it goes on where `ways` meet."""
+        """End this branch here: it continues where `ways` merge."""
         edges.append(self.edge())
         self.goes = False
 
     def meet(self, edges: list[Edge]) -> None:
-        """Go on where ways meet."""
+        """Continue where branches merge."""
         self.goes = bool(edges)
         if edges:
             self.names = self.flow.meet(edges)
 
     def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
-        """Go both ways, and on from where they meet."""
+        """Compile both branches, and continue where they merge."""
         edges: list[Edge] = []
         before = self.names
         for begin, do in zip(self.flow.part(condition), (then, otherwise), strict=True):
@@ -248,14 +248,14 @@ class AstCompiler:
             edges += self.here()
         self.meet(edges)
 
-    # --- expressions, by what the names in them stand for
+    # --- expressions
 
     def do(self, node: ast.AST) -> Any:
         """Compile a statement, or an expression to its value."""
         return getattr(self, type(node).__name__, self.unknown)(node)
 
     def unknown(self, node: ast.AST) -> None:
-        """Refuse what kernels do not know."""
+        """Refuse a construct that kernels do not support."""
         kind = type(node).__name__
         raise Untraceable(f"kernels know no {_WORDS.get(kind, kind)}")
 
@@ -364,7 +364,7 @@ class AstCompiler:
         return _BINARY[type(op)](a, b)
 
     def among(self, a: Any, things: Any) -> Any:
-        """Compile the question whether `a` is one of some things."""
+        """Compile `a in things`."""
         if is_value(things):
             raise Untraceable("kernels do not look for a number in an array")
         same = [operator.eq(a, b) for b in things] if is_value(a) else [a in things]
@@ -374,7 +374,7 @@ class AstCompiler:
         return self.chain(node.values, isinstance(node.op, ast.And))
 
     def chain(self, nodes: list[ast.expr], every: bool) -> Any:
-        """Compile `and` or `or`: the first value that decides, or the last one."""
+        """Compile `and` or `or`: the first deciding value, or the last."""
         value = self.do(nodes[0])
         if len(nodes) == 1:
             return value
@@ -384,7 +384,7 @@ class AstCompiler:
         return self.either(value, *((rest, stay) if every else (stay, rest)))
 
     def either(self, condition: Any, then: Callable, otherwise: Callable) -> Any:
-        """Compile the choice of one of two expressions."""
+        """Compile a conditional expression."""
         result = ast.Name("?")
         self.branch(
             condition, lambda: self.give(result, then()), lambda: self.give(result, otherwise())
@@ -424,7 +424,7 @@ class AstCompiler:
         return self.closing(call, node, signature)
 
     def signature(self, given: ast.arguments) -> inspect.Signature:
-        """Make the signature of a function within."""
+        """Make the signature of a nested function."""
         bare = copy.copy(given)
         bare.defaults, bare.kw_defaults = [], [None] * len(given.kwonlyargs)
         text = ast.fix_missing_locations(ast.Expression(ast.Lambda(bare, ast.Constant(None))))
@@ -437,7 +437,7 @@ class AstCompiler:
     def closing(
         self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature
     ) -> Callable:
-        """Mark a function with its text and what its names stand for, which decide on its code."""
+        """Mark a function with its text and variables, which determine its code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
         known = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
         defaults = [p.default for p in signature.parameters.values()]
@@ -445,7 +445,7 @@ class AstCompiler:
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
-        """List what a comprehension makes, turn by turn."""
+        """Evaluate a comprehension item by item."""
         out: list = []
         outer = dict(self.names)
 
@@ -482,7 +482,7 @@ class AstCompiler:
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Compile statements one after another; note where one fails."""
+        """Compile statements in order; record where one fails."""
         for statement in statements:
             if not self.goes:
                 return
@@ -547,7 +547,7 @@ class AstCompiler:
         self.If(ast.If(node.test, [], [ast.copy_location(failed, node)]))
 
     def give(self, target: ast.expr, value: Any) -> None:
-        """Let a target stand for a value."""
+        """Assign a value to a target."""
         if isinstance(target, ast.Name):
             self.names[target.id] = value
         elif isinstance(target, ast.Tuple | ast.List):
@@ -566,7 +566,7 @@ class AstCompiler:
             self.unknown(target)
 
     def changed(self, target: ast.Subscript) -> Any:
-        """Compile what has an item that is to be changed."""
+        """Compile the object whose item is assigned."""
         things = self.do(target.value)
         if self.branches and isinstance(things, _CHANGING):
             raise Untraceable(_ON_ALL_WAYS)
@@ -584,7 +584,7 @@ class AstCompiler:
             things[place] = operation(things[place], self.do(node.value))
         else:
             before = self.name(target.id)
-            if is_value(before) and isinstance(before._kind, types.Array):  # it would change
+            if is_value(before) and isinstance(before._kind, types.Array):  # changes in place
                 raise Untraceable("an array as a whole is changed: change its items")
             self.names[target.id] = operation(before, self.do(node.value))
 
@@ -607,7 +607,7 @@ class AstCompiler:
             self.unroll(node, through)
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
-        """Tell whether a loop over a known range stays a loop: a long one, if it can be."""
+        """Tell whether a loop over a known range remains a loop: if it is long and can be one."""
         if len(through) <= LONG:
             return False
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
@@ -620,7 +620,7 @@ class AstCompiler:
         return loops[key] is not None
 
     def without_code(self, do: Callable[[], None]) -> None:
-        """Do something for its types alone, and go back to here."""
+        """Do something for its types only, and restore the state."""
         go_back, here = self.state(), values.now()
         typed = type(here)(here.seen)
         typed.read = dict(here.read)
@@ -631,7 +631,7 @@ class AstCompiler:
             go_back()
 
     def state(self) -> Callable[[], None]:
-        """Make what goes back to here, where something is to be tried."""
+        """Return a function that restores the present state after a trial."""
         names, depth = dict(self.names), self.depth
         breaks, continues = self.breaks, self.continues
         returns, read = [*self.returns], dict(self.flow.lowering.read)
@@ -644,7 +644,7 @@ class AstCompiler:
         return go_back
 
     def unroll(self, node: ast.For, through: Iterable) -> None:
-        """Write a loop out."""
+        """Unroll a loop."""
         outer = self.breaks, self.continues
         self.breaks, self.continues = [], []
         for item in through:
@@ -664,9 +664,9 @@ class AstCompiler:
     def roll(
         self, node: ast.For | ast.While, bounds: tuple | None, item: Callable | None = None
     ) -> None:
-        """Compile a loop that ends when the run says so; `item` is what a count stands for.
+        """Compile a loop that ends at run time; `item` maps the count to the loop variable.
 
-        Types are found first: literals that it begins with become numbers of these types.
+        Types are determined first: initial literals become numbers of these types.
         """
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
         if self.flow.builder and key not in loops:
@@ -726,4 +726,4 @@ class AstCompiler:
 
 
 LONGEST = 1000  # range in a comprehension
-_COUNT = "for"  # no name of a function
+_COUNT = "for"  # not a valid function name

@@ -1,13 +1,12 @@
-"""Loops that threads share out: one for all kernels, which calls what is done by its address.
+"""Parallel loops: one implementation for all kernels, which calls the loop body by address.
 
-The arguments of a loop stay where they are in memory. What is done with them is a function of that
-place and a number.
+The arguments of a loop stay in memory; the body is a function of their address and an index.
 
-Threads that sleep between two loops take as long to wake up as a small loop takes. A kernel of many
-loops is therefore run by a *team* (`by_team`): its first thread leads, and goes through the kernel;
-the others wait for loops of it. Each has its part of the numbers of a loop, the same in each step,
-and takes those of a thread that does not go on. The leader waits for numbers that were taken, never
-for threads: one that another program keeps from running holds nobody up.
+Waking sleeping threads takes as long as a small loop. A kernel with many loops is therefore run by
+a *team* (`by_team`): its first thread executes the kernel, the others wait for its loops. Each
+thread has a fixed range of the indices of a loop, the same in each step, and takes indices of
+threads that make no progress. The leader waits for indices that were taken, never for threads, so a
+thread that is preempted delays nobody.
 """
 
 import ctypes
@@ -42,12 +41,12 @@ class Serial(NamedTuple):
 
 
 class Threaded(NamedTuple):
-    """All threads that there are; `team` is where what a team shares lies (`new_team`)."""
+    """All threads; `team` is the address of a team's shared memory (`new_team`)."""
 
     team: int = 0
 
 
-# --- words of memory that threads share -------------------------------------------------------
+# --- shared memory words ----------------------------------------------------------------------
 
 
 def _word(builder: Any, place: Any) -> Any:
@@ -56,7 +55,7 @@ def _word(builder: Any, place: Any) -> Any:
 
 @intrinsic
 def read(place):
-    """Read the word at an address; all is seen that was written before it was."""
+    """Load a word with acquire ordering."""
 
     def codegen(builder, at):
         return builder.load_atomic(_word(builder, at), "acquire", 8)
@@ -66,7 +65,7 @@ def read(place):
 
 @intrinsic
 def write(place, value):
-    """Write a word; who sees it sees all that was written before."""
+    """Store a word with release ordering."""
 
     def codegen(builder, at, number):
         builder.store_atomic(number, _word(builder, at), "release", 8)
@@ -76,7 +75,7 @@ def write(place, value):
 
 @intrinsic
 def add(place, value):
-    """Add to a word, which others may do, too."""
+    """Add to a word atomically."""
 
     def codegen(builder, at, number):
         builder.atomic_rmw("add", _word(builder, at), number, "acq_rel")
@@ -86,7 +85,7 @@ def add(place, value):
 
 @intrinsic
 def replaced(place, old, new):
-    """Put `new` in the place of `old`; false if the word was another one."""
+    """Compare and swap: store `new` if the word is `old`; return whether it was."""
 
     def codegen(builder, at, *numbers):
         found = builder.cmpxchg(_word(builder, at), *numbers, "acq_rel", "acquire")
@@ -97,7 +96,7 @@ def replaced(place, old, new):
 
 @intrinsic
 def pause(long):
-    """Wait a moment; if `long`, sleep."""
+    """Wait briefly; if `long`, sleep."""
 
     def codegen(builder, sleeps):
         def call(name, result, *numbers):
@@ -118,7 +117,7 @@ def pause(long):
 
 
 def add_among(array, i, j, value):
-    """Add a whole number to an item of an array, which other threads may do, too."""
+    """Add an integer to an item of an array atomically."""
     array[i, j] += value
 
 
@@ -134,14 +133,14 @@ def _add_among(array, i, j, value):
 
 # --- threads ----------------------------------------------------------------------------------
 
-# Where its arguments are, a number, and where it may fail.
+# Address of the arguments, an index, and the address of the `Failure`.
 _TASK = ir.FunctionType(ir.VoidType(), [I64] * 3)
 _PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
 _SHARE_OUT = [ctypes.c_int64] * 6
 
 
 class _Pools(threading.local):
-    """Hold the threads that serve a thread of Python, by their number."""
+    """The thread pools of a Python thread, by size."""
 
     def __init__(self) -> None:
         self.of = functools.cache(ThreadPoolExecutor)
@@ -149,16 +148,16 @@ class _Pools(threading.local):
 
 _pools = _Pools()
 if hasattr(os, "register_at_fork"):
-    # A process that another one made by copying itself has none of its threads.
+    # A forked process has none of the threads.
     os.register_at_fork(after_in_child=lambda: _pools.of.cache_clear())
 
 
 def _share_out(
     count: int, part: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
-    """Do a task for each number below `count`, by `part`, a function of a range of these.
+    """Run a task for each index below `count`, by `part`, a function of a range of indices.
 
-    By so many threads, or all if 0.
+    `threads` is the number of threads; 0 for all.
     """
     do, threads = _PART(part), threads or config.NUMBA_NUM_THREADS
     size = min(count, threads)
@@ -169,7 +168,7 @@ def _share_out(
         for pair in pairs:
             others.append(_pools.of(threads - 1).submit(do, task, arguments, *pair, failure))
         do(task, arguments, *ends[:2], failure)
-    except BaseException as error:  # such as Ctrl-C; the others still work on these arguments
+    except BaseException as error:  # such as Ctrl-C; others still use these arguments
         note(error, failure)
     while others:
         try:
@@ -183,7 +182,7 @@ machine.publish_python("karamelo_share_out", ctypes.CFUNCTYPE(None, *_SHARE_OUT)
 
 
 class _Task(NamedTuple):
-    """Do something with the items of a held tuple, which lies at a place, and a number."""
+    """Calls a function of the items of a held tuple at an address, and an index."""
 
     function: Callable
     held: HeldTuple
@@ -195,7 +194,7 @@ class _Task(NamedTuple):
 
 
 def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
-    """Give the address of a function of its own, of as many whole numbers."""
+    """Return the address of a separate function of `count` integers."""
     made = lowering.function(name, run, (types.intp,) * count, types.none)
     if getattr(made, "raises", False):
         lowering.builder.function.raises = True
@@ -204,7 +203,7 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
-    """Put items into memory; the address of what does a function of them and a number; theirs."""
+    """Store items; return the addresses of a function of them and an index, and of the items."""
     held = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     found = formula(function.seen, (*held, types.intp))
     there = held_as(lowering, items, held)
@@ -227,7 +226,7 @@ def _call(task, arguments, number):
 
 @in_kernels
 def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
-    """Call a function; an exception in it is left to who called this one."""
+    """Call a function; its exceptions are left to the caller of the present one."""
     lowering.regardless = True
     try:
         return function(*arguments)
@@ -242,7 +241,7 @@ def _do_part(task, arguments, begin, end):
 
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
-    """Do a task for each number below `count`, by threads that begin for it (`_share_out`)."""
+    """Run a task for each index below `count`, by a thread pool (`_share_out`)."""
     found = formula(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
@@ -255,18 +254,18 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 
 # --- teams ------------------------------------------------------------------------------------
 
-# Words, each in a line of the caches of its own.
+# Words, each in a separate cache line.
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses, some 0.3 ms; then threads sleep, since others may need their cores
-_APART, _LOOKS = 10, 64  # pauses between looks at what is left of another's part; looks, 30 us
-_PATIENCE = 11000  # pauses until a thread does not wait for a leader any more
-_LEFT = (1 << 32) - 1  # of a ticket: how many numbers are left; above them the loop
+_SHORT = 8000  # pauses, about 0.3 ms; then threads sleep, since others may need their cores
+_APART, _LOOKS = 10, 64  # pauses between looks at another's remaining range; looks, 30 us
+_PATIENCE = 11000  # pauses until a thread stops waiting for a leader
+_LEFT = (1 << 32) - 1  # of a ticket: the remaining indices; the upper bits are the loop
 
 
 def new_team(threads: int) -> np.ndarray:
-    """Make what a team of so many threads shares; its address is that in `Threaded`."""
+    """Make the shared memory of a team; its address goes into `Threaded`."""
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words
@@ -274,10 +273,11 @@ def new_team(threads: int) -> np.ndarray:
 
 @noinline
 def _take_part(team, k):
-    """Do what thread `k` gets of the loop of now, its own part first; how many numbers.
+    """Process the indices of thread `k` in the present loop, its own range first; return the
+    number.
 
-    What a thread works on is in its caches, and to get it from there may take longer than the work:
-    others take of its part when that gets no smaller for a while.
+    Data of a thread is in its caches, and moving it may cost more than the work. So others take
+    from a range only if it does not shrink for a while.
     """
     size = read(team + _SIZE)
     epoch = read(team + _TICKETS + 64 * k) >> 32
@@ -301,7 +301,7 @@ def _take_part(team, k):
             for _ in range(_APART):
                 pause(False)
         elif replaced(team + _TICKETS + 64 * part, word, word - 1):
-            # As long as a number is not done, the loop stays that of now.
+            # While an index is unfinished, the loop stays the present one.
             end = read(team + _COUNT) * (part + 1) // size
             task, arguments = read(team + _TASK_AT), read(team + _ARGUMENTS)
             _call(task, arguments, end - left)
@@ -311,7 +311,7 @@ def _take_part(team, k):
 
 @noinline
 def _share(team, count, task, arguments):
-    """Let the team do a loop; its leader calls this."""
+    """Run a loop on the team; called by its leader."""
     size = read(team + _SIZE)
     write(team + _TASK_AT, task)
     write(team + _ARGUMENTS, arguments)
@@ -351,7 +351,7 @@ def _serve(team, k):
 
 @noinline
 def _distribute(team, count, task, arguments):
-    """Do a loop: by the team that is at work, if one is, else by threads that begin for it."""
+    """Run a loop on the active team, or else on a thread pool."""
     if team == 0:
         _in_parallel(count, task, arguments, 0)
     elif read(team + _STATE) != _LEADS:
@@ -363,7 +363,7 @@ def _distribute(team, count, task, arguments):
 
 
 def shared_out(function: Callable) -> Callable:
-    """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`."""
+    """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`, in parallel."""
     noinline(function)
 
     def loop(mode, count, *arguments):
@@ -377,14 +377,14 @@ def shared_out(function: Callable) -> Callable:
 
 
 def by_threads(share: Callable) -> Callable:
-    """Make the kernel ``f(mode, count, ...)`` that does ``share(..., k)`` for each k below `count`.
+    """Make the kernel ``f(mode, count, ...)`` that runs ``share(..., k)`` for each k below `count`.
 
-    The threads of `mode` divide these numbers among them.
+    The threads of `mode` divide the indices.
     """
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 
-    @functools.wraps(share, updated=())  # marks stay with the share
+    @functools.wraps(share, updated=())  # keeps marks of the function
     def all_shares(*arguments):
         loop(*arguments)
 
@@ -394,9 +394,9 @@ def by_threads(share: Callable) -> Callable:
 
 
 def by_team(function: Callable) -> Callable:
-    """Make ``f(mode, ...)``: ``function(mode, ...)``, a whole number, by a team where there is one.
+    """Make ``f(mode, ...)``: ``function(mode, ...)``, an integer, run by a team if there is one.
 
-    Its first thread does it, the others serve it.
+    The first thread executes it, the others serve.
     """
     inner = noinline(function)
 

@@ -1,10 +1,9 @@
-"""Find what a function is for arguments of some types, and compile it where it is called.
+"""Select functions by argument types, and compile them where they are called.
 
-Each number is a :class:`~karamelo_py.compiler.values.Value`; every operation that meets one is
-lowered at once, into the function that calls. Tuples and classes are Python's: what only takes them
-apart costs nothing. The walk through the text is in :mod:`~karamelo_py.compiler.statements`. Only
-what the key of a kernel on disk follows may be called (:mod:`karamelo_py.compiler.fingerprint`):
-methods of classes of tuples are refused.
+Each number is a :class:`~karamelo_py.compiler.values.Value`; every operation on one is lowered at
+once, into the calling function. Tuples and classes are Python's and cost nothing. Statements are
+compiled in :mod:`~karamelo_py.compiler.statements`. Only functions that the cache key follows may
+be called (:mod:`karamelo_py.compiler.fingerprint`): methods of classes of tuples are refused.
 """
 
 import functools
@@ -27,7 +26,7 @@ from karamelo_py.compiler.statements import AstFunction
 
 
 class CannotCompile(TypeError):
-    """Tell why a function cannot become code of a kernel; what was wrong is its cause."""
+    """A function cannot be compiled; the reason is its cause."""
 
     def __init__(self, reason: str, function: Callable):
         super().__init__(f"{reason} (in {name_of(function)})")
@@ -36,7 +35,7 @@ class CannotCompile(TypeError):
 
 
 class Undefined(TypeError):
-    """Tell that a point function is not defined for classes that need it."""
+    """A point function is not defined for classes that need it."""
 
     def __init__(self, function: str, classes: tuple):
         names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
@@ -45,19 +44,19 @@ class Undefined(TypeError):
 
 
 def _reason(error: BaseException) -> str:
-    """Tell what is wrong, in one line."""
+    """Describe an error in one line."""
     if isinstance(error, values.Untraceable):
         return str(error)
     return ": ".join(filter(None, (type(error).__name__, str(error))))
 
 
 def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
-    """List the files and lines that took part in an exception, the innermost first."""
+    """Yield files and lines in the traceback of an exception, innermost first."""
     if isinstance(error, CannotCompile):
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
-    yield from getattr(error, "places", ())  # in the text that was walked
+    yield from getattr(error, "places", ())  # in compiled text
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
 
@@ -67,7 +66,7 @@ _copies: dict[Any, Any] = {}
 
 
 class Module:
-    """Show the functions of a module like globals."""
+    """Presents the functions of a module like globals."""
 
     def __init__(self, module: python.ModuleType, seen: Callable[[Any], Any]):
         self._module, self._seen = module, seen
@@ -117,7 +116,7 @@ _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number,
 
 
 def _seen(thing: Any) -> Any:
-    """Find what takes the place of a global in functions that are run here."""
+    """Return the replacement of a global in functions that are run here."""
     if isinstance(thing, (*_CONSTANT, values.Emitted, Module)):
         return thing
     if isinstance(thing, python.ModuleType):
@@ -131,7 +130,7 @@ def _seen(thing: Any) -> Any:
     if not isinstance(thing, Hashable):
         raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
     if thing not in _copies:
-        with parts_noted() as parts:  # with those in closures
+        with parts_noted() as parts:  # including those in closures
             made = _copy(thing)
             if isinstance(made, AstFunction | type):
                 note([getattr(made, "__code__", made)])
@@ -142,7 +141,7 @@ def _seen(thing: Any) -> Any:
 
 
 def _copy(thing: Any) -> Any:
-    """Make the same for what is called."""
+    """Make the replacement of a called thing."""
     if thing in INSTEAD:
         return INSTEAD[thing]
     if thing in _SAFE:
@@ -158,7 +157,7 @@ def _copy(thing: Any) -> Any:
 
 
 def _copied(function: Callable) -> AstFunction:
-    """Give what compiles a function from its text."""
+    """Return the compiler of a function's text."""
     if function not in _walked:
         _walked[function] = AstFunction(function, _seen)
     return _walked[function]
@@ -170,7 +169,7 @@ _METHODS = python.FunctionType | property | classmethod | staticmethod
 
 @functools.cache
 def _methods_of(one: type) -> frozenset[str]:
-    """List the names of the functions that a class of tuples has of its own."""
+    """List the functions defined in a class of tuples."""
     if not getattr(one, "_fields", ()) or getattr(one, "is_followed", False):
         return frozenset()
     own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
@@ -178,7 +177,7 @@ def _methods_of(one: type) -> frozenset[str]:
 
 
 def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
-    """Refuse methods of tuples: they would run as they are, and nothing would follow them."""
+    """Refuse methods of tuples, because cache keys do not follow them."""
     functions = frozenset().union(*map(_methods_of, classes))
     inner = itertools.chain.from_iterable(map(codes_in, codes))
     named = functions & {name for code in inner for name in code.co_names}
@@ -190,24 +189,24 @@ def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> Non
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """Call a point function for one that nothing sees through, as methods do."""
+    """Call a point function for one that is opaque, as methods do."""
     return _seen(dispatch)(*arguments)
 
 
 class _Formula(NamedTuple):
-    """Keep what is run for arguments of some types, its type, and what it consists of."""
+    """A function to run for argument types, its result type, and its dependencies."""
 
     run: Callable
     result: types.Type
     parts: frozenset
-    plain: bool  # whether the type says all that is known of the result
+    plain: bool  # whether the type determines the result
     name: str
 
 
 _formulas: dict[tuple, _Formula | None] = {}
-MOST_FORMULAS = 4000  # that are kept: some 12 kB each, 800 for a scene with contact
-_own: set[Callable] = set()  # functions that are not written into what calls them
-# One of the threads of Python writes functions down at a time: they share what is known of these.
+MOST_FORMULAS = 4000  # cached: about 12 kB each, 800 for a scene with contact
+_own: set[Callable] = set()  # functions that are not inlined
+# One Python thread compiles at a time, because this cache is shared.
 one_at_a_time = threading.RLock()
 
 
@@ -218,7 +217,7 @@ def _is_plain(thing: Any) -> bool:
 
 
 def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
-    """Find by a run what :func:`formula` gives."""
+    """Determine what :func:`formula` returns, by running the function."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen)
@@ -245,7 +244,7 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
 
 
 def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
-    """Find what to run for arguments of these types; None if nothing is chosen."""
+    """Return what to run for arguments of these types; None if nothing is selected."""
     if values.at_work():
         return _formula(dispatch, kinds)
     with one_at_a_time:
@@ -268,26 +267,26 @@ def _formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     return found
 
 
-_outdated = threading.Event()  # of what is known of functions
-changes = 0  # of implementations that compiled kernels may have
+_outdated = threading.Event()  # invalidates the cache
+changes = 0  # of implementations that compiled kernels may contain
 
 
 def forget() -> None:
-    """Find anew what is run: a point function has another implementation than was known."""
+    """Drop cached selections: a point function has a new implementation."""
     if values.at_work():
         _formulas.clear()
-    else:  # another thread of Python may write a function down now
+    else:  # another Python thread may be compiling
         _outdated.set()
 
 
 def outdate_kernels() -> None:
-    """Have kernels found anew: what some of them have is another function now."""
+    """Let kernels be looked up again: some of their functions have changed."""
     global changes
     changes += 1
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
-    """List the types of numbers among types, and in tuples, that implement functions."""
+    """Yield the number types among types, and in tuples, that implement functions."""
     for kind in kinds:
         one = tag_class(kind) or type(kind)
         if hasattr(one, "implements"):
@@ -297,7 +296,7 @@ def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
 
 
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
-    """Find what a function is for arguments of some types; None if nothing is chosen."""
+    """Return the implementation of a function for argument types; None if there is none."""
     for one in _number_types(kinds):
         if dispatch in one.implements:
             return one.implements[dispatch]
@@ -314,12 +313,12 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
 
 
 def alone(dispatch: Callable) -> None:
-    """Let kernels call `dispatch` as a function of its own, which is not written into them."""
+    """Let kernels call `dispatch` as a separate function, without inlining."""
     _own.add(dispatch)
 
 
 def _call(function: Callable, arguments: tuple) -> Any:
-    """Call the function that is chosen by the types of the arguments, if one is chosen."""
+    """Call the implementation selected by the argument types, if there is one."""
     if function not in choosers:
         return NotImplemented
     lowering = values.now()

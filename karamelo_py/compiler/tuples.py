@@ -1,13 +1,13 @@
-"""Records of arrays, nested tuples and their numbers, one after another; parts that may be absent.
+"""Records of arrays, nested tuples as flat sequences, and arrays that may be absent.
 
-Comprehensions are of lists, which Python makes in two thirds of the time where all is interpreted.
+Comprehensions make lists, which Python interprets in two thirds of the time.
 """
 
 from karamelo_py.compiler.compile import Weighted, fma, shared
 
 
 def flat(nested):
-    """The numbers of nested tuples, one after another."""
+    """The numbers of nested tuples in order."""
     numbers = ()
     for item in nested:
         numbers += flat(item) if isinstance(item, tuple) else (item,)
@@ -15,7 +15,7 @@ def flat(nested):
 
 
 def nested_as(like, numbers):
-    """Numbers one after another, in tuples nested as those of `like`, and of their classes."""
+    """Numbers in order, nested like `like`, in the same classes."""
     made, begin = [], 0
     for item in like:
         inner = isinstance(item, tuple)
@@ -51,9 +51,9 @@ def row(array, i, first, like):
 
 
 def record(table, i):
-    """A NamedTuple of arrays, seen at index `i`: the same NamedTuple of scalars.
+    """Row `i` of a NamedTuple of arrays: the same NamedTuple of scalars.
 
-    NamedTuples of arrays in it become NamedTuples of scalars, too.
+    Nested NamedTuples become NamedTuples of scalars, too.
     """
     return type(table)(*[record(c, i) if isinstance(c, tuple) else c[i] for c in table])
 

@@ -1,7 +1,7 @@
-"""Traced values: numbers, lanes, arrays and references to tuples while a kernel is written down.
+"""Traced values: numbers, lanes, arrays and held tuples while a kernel is compiled.
 
-See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and every operation that
-meets one becomes code of the function that is compiled.
+See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and every operation on one
+becomes code.
 """
 
 import contextvars
@@ -20,11 +20,11 @@ from karamelo_py.compiler.code import Lanes, scalar_of
 
 
 class Untraceable(BaseException):
-    """Say why a function cannot become code of a kernel; no function may catch that."""
+    """A function cannot be compiled; functions must not catch this."""
 
 
 def words(kind: types.Type) -> str:
-    """Name a type as a user would."""
+    """Name a type for users."""
     if isinstance(kind, types.BaseTuple):
         return getattr(getattr(kind, "instance_class", None), "__name__", "a tuple")
     if isinstance(kind, Lanes):
@@ -46,7 +46,7 @@ _WORDS = (
 
 
 def _only_at_run_time(use: str) -> Callable:
-    """Make the method of values that stands for a `use` that needs to know what they are."""
+    """Make a method of values for a `use` that needs their value at compile time."""
 
     def ask(*arguments: Any) -> Any:
         raise Untraceable(f"{use} is only known when the kernel runs")
@@ -54,20 +54,20 @@ def _only_at_run_time(use: str) -> Callable:
     return ask
 
 
-# --- where code goes to -------------------------------------------------------------------------
+# --- active lowering ----------------------------------------------------------------------------
 
-# At work, innermost last; in each thread of Python its own.
+# Active lowerings, innermost last; separate for each Python thread.
 _lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", default=())
 
 
 def now() -> Any:
-    """Return what writes code now (:mod:`karamelo_py.compiler.lowering`)."""
+    """Return the active writer of code (:mod:`karamelo_py.compiler.lowering`)."""
     return _lowerings.get()[-1]
 
 
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
-    """Let operations become code of `lowering` meanwhile."""
+    """Let operations become code of `lowering` within this context."""
     before = _lowerings.get()
     _lowerings.set((*before, lowering))
     try:
@@ -77,25 +77,25 @@ def writing(lowering: Any) -> Iterator[None]:
 
 
 def at_work() -> bool:
-    """Tell whether functions are run for a kernel now, by this thread of Python."""
+    """Tell whether this Python thread is compiling a kernel."""
     return bool(_lowerings.get())
 
 
 def is_begun(key: tuple) -> bool:
-    """Tell whether the types of a formula are asked for now."""
+    """Tell whether the types of a formula are being determined."""
     return any(lowering.key == key for lowering in _lowerings.get())
 
 
 def _real_kind(thing: Any) -> Any:
-    """Find the number type of a real number or of lanes of these; None of all else."""
+    """Return the number type of a real number or real lanes; None for other things."""
     kind = scalar_of(thing._kind) if isinstance(thing, Value) else None
     return kind if isinstance(kind, types.Float) else None
 
 
 def alike(arguments: tuple) -> tuple:
-    """Give literals, and whole numbers, the type of the real numbers beside them.
+    """Convert literals and integers to the type of the real numbers among the arguments.
 
-    A literal has no precision of its own: `2 * x` is single where x is.
+    A literal adapts its precision: `2 * x` is single if x is.
     """
     kinds = [kind for kind in map(_real_kind, arguments) if kind is not None]
     if not kinds:
@@ -117,16 +117,16 @@ def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
     return thing
 
 
-# Where a module has all that it calls: see `in_one`.
+# For modules that contain all they call: see `in_one`.
 _called: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
 
 
 @contextmanager
 def in_one(called: dict[Any, Callable]) -> Iterator[None]:
-    """Write modules of threads of a GPU meanwhile, which have all that they call.
+    """Write GPU modules within this context, which contain all that they call.
 
-    Kernels are written into what calls them, and so is what is else called by its address:
-    `called` has the function for each signature.
+    Kernels are inlined, and so are functions otherwise called by address: `called` has the function
+    for each signature.
     """
     before = _called.set(tuple(called.items()))
     try:
@@ -136,32 +136,32 @@ def in_one(called: dict[Any, Callable]) -> Iterator[None]:
 
 
 def in_one_module() -> bool:
-    """Tell whether a module has all that it calls."""
+    """Tell whether a module contains all that it calls."""
     return _called.get() is not None
 
 
 def all_called_in_one() -> tuple | None:
-    """List signatures and functions as of `in_one`; None where a module calls others."""
+    """List signatures and functions of `in_one`; None if modules call others."""
     return _called.get()
 
 
 def called_in_one(signature: Any) -> Callable | None:
-    """Give what is written in the place of a call by address; None if nothing is."""
+    """Return the replacement of a call by address, or None."""
     return dict(_called.get() or ()).get(signature)
 
 
 def emit(function: Callable, *arguments: Any) -> Any:
-    """Write a call: of an operation, or of what was chosen by type."""
+    """Write a call of an operation, or of a function selected by type."""
     return now().call(function, arguments)
 
 
-# --- functions whose code is written by hand ------------------------------------------------------
+# --- functions with handwritten code --------------------------------------------------------------
 
 BUILTINS: dict[Callable, Callable] = {}
 
 
 def builtin(function: Callable) -> Callable[[Callable], Callable]:
-    """Decorate what `function` is in kernels: ``made(lowering, *arguments)``, of what is traced."""
+    """Decorate the code of `function` in kernels: ``made(lowering, *arguments)``, traced."""
 
     def register(made: Callable) -> Callable:
         BUILTINS[function] = made
@@ -171,16 +171,15 @@ def builtin(function: Callable) -> Callable[[Callable], Callable]:
 
 
 def in_kernels(made: Callable) -> Callable:
-    """Decorate a function that only kernels know, and that is written so: it is its own code."""
+    """Decorate a function that exists in kernels only, and is its own code."""
     return builtin(made)(made)
 
 
 class Intrinsic:
-    """Define a function of values: by its signature for types, and by what writes the code.
+    """A function of values, defined by its signature for types and its code.
 
     ``definition(*types)`` returns ``result(*arguments)`` and ``codegen(builder, *values)``, or None
-    where it is not defined. Types of whole numbers that are known are given where it is not
-    defined for others.
+    if it is not defined. If it is not defined otherwise, integer types with known values are tried.
     """
 
     def __init__(self, definition: Callable):
@@ -198,10 +197,10 @@ intrinsic = Intrinsic
 
 
 class Value:
-    """Stand for a number, lanes or an array of the function that is compiled."""
+    """A number, lanes or an array of the function that is compiled."""
 
     __slots__ = ("_kind", "_value")
-    __array_ufunc__ = None  # NumPy's numbers leave operations to this
+    __array_ufunc__ = None  # NumPy leaves operations to this
 
     def __init__(self, kind: types.Type, value: Any):
         self._kind, self._value = kind, value
@@ -235,7 +234,7 @@ _BITS = ("and_", "or_", "xor", "lshift", "rshift")
 
 
 def _operated(operation: Callable, a: Any, b: Any) -> Any:
-    """Write an operation; of tensors and the like, leave it to these."""
+    """Write an operation; tensors and the like handle theirs."""
     if isinstance(a if isinstance(b, Value) else b, tuple):
         return NotImplemented
     if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
@@ -246,7 +245,7 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
 
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
-        if isinstance(a._kind, types.Array):  # it would change
+        if isinstance(a._kind, types.Array):  # it would change in place
             raise Untraceable("an array as a whole is changed: change its items")
         return _operated(operation, a, b)
 
@@ -285,7 +284,7 @@ def mapped(change: Callable, thing: Any) -> Any:
 
 
 class HeldValue:
-    """Stand for a held tuple: its items are read when they are asked for, once on each way."""
+    """A held tuple; items are read on access, once per branch."""
 
     __slots__ = ("_kind", "_value")
 
@@ -319,7 +318,7 @@ class HeldValue:
 
 
 def implemented(function: Callable, arguments: tuple) -> Callable | None:
-    """Find what a function is for a type of numbers that are tuples, if there is one among them."""
+    """Return the implementation of a function for a tuple number type among the arguments."""
     for a in arguments:
         if isinstance(a, tuple):
             table = getattr(type(a), "implements", None)
@@ -330,25 +329,25 @@ def implemented(function: Callable, arguments: tuple) -> Callable | None:
 
 
 def is_literal(thing: Any) -> bool:
-    """Tell whether a number stands in the text, so that it is known."""
+    """Tell whether a number is a literal, known at compile time."""
     return type(thing) in (int, float)
 
 
 class Emitted:
-    """Call a function that compiled code has a version of its own of."""
+    """Calls a function that has another version in compiled code."""
 
     def __init__(self, function: Callable):
         self.seen = function
 
     def __call__(self, *arguments: Any) -> Any:
         if self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments):
-            return self.seen(*arguments)  # of numbers that are known, as lengths of loops are
+            return self.seen(*arguments)  # known numbers, such as loop lengths
         made = implemented(self.seen, arguments)
         if made is not None:
             return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
             if self.seen not in choosers and all(map(is_literal, arguments)):
-                return self.seen(*arguments)  # known already
+                return self.seen(*arguments)  # already known
             arguments = alike(arguments)
         return emit(self.seen, *arguments)
 
@@ -358,7 +357,7 @@ class Emitted:
 
 
 OF_WHOLE = {min, max, abs, int, bool}
-# Functions whose literals are of the type of the numbers beside them; more are added by name.
+# Functions whose literals adapt to the other operands; more are added by name.
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
-LONG = 8  # turns of a loop over a known range that is unrolled even where it need not be
+LONG = 8  # iterations up to which a loop over a known range is unrolled without need

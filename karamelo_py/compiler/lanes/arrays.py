@@ -1,4 +1,4 @@
-"""Arrays of points and what is read at numbers in lanes."""
+"""Arrays of points, and items at numbers in lanes."""
 
 import operator
 from collections.abc import Callable
@@ -24,30 +24,30 @@ from karamelo_py.compiler.compile import (
 )
 from karamelo_py.compiler.values import intrinsic
 
-AHEAD = 256  # bytes by which arrays of points are asked of the memory ahead of their use
+AHEAD = 256  # bytes of point arrays prefetched ahead
 
 
 class LaneGroup(types.Type):
-    """The numbers of up to `width` points that lie one after another."""
+    """The numbers of up to `width` consecutive points."""
 
     def __init__(self, width: int):
         self.width = width
         super().__init__(name=f"LaneGroup({width})")
 
     def register_type(self) -> ir.Type:
-        """LLVM's type: the first, and how many."""
+        """LLVM type: the first number, and the count."""
         return ir.LiteralStructType([I64, I64])
 
 
 class Beside(types.Type):
-    """Nodes that are as many steps from those in lanes, the same in all lanes."""
+    """Nodes at a distance from those in lanes, the same in all lanes."""
 
     def __init__(self, nodes: Lanes):
         self.nodes, self.width = nodes, nodes.width
         super().__init__(name=f"Beside({nodes})")
 
     def register_type(self) -> ir.Type:
-        """LLVM's type: the nodes, and the steps."""
+        """LLVM type: the nodes, and the distance."""
         return ir.LiteralStructType([code.register_type(self.nodes), I64])
 
 
@@ -64,13 +64,13 @@ class EightLanes(NamedTuple):
 
 
 def lanes_for(bits: int) -> type:
-    """Choose the lanes for numbers of so many bits: the points visited at once, sorted for that."""
+    """Choose the number of lanes for numbers of this many bits."""
     return {64: FourLanes, 32: EightLanes}[bits]
 
 
 @intrinsic
 def group(tag, first, count):
-    """The `count` points from `first` on, as many as the tag says at most."""
+    """The `count` points from `first` on, at most as many as the tag's lanes."""
     made = LaneGroup(tag.instance_class.width)
 
     def codegen(builder, _, *numbers):
@@ -81,15 +81,15 @@ def group(tag, first, count):
 
 @intrinsic
 def spread(tag, value):
-    """The same number in all lanes, as many as the tag says."""
+    """The same number in all lanes."""
     lanes = Lanes(value, tag.instance_class.width)
     return lanes(tag, value), lambda builder, _, number: splat(builder, number, lanes)
 
 
 def room_for(points, numbers):
-    """An array (components, points) for a while, for such numbers of so many points.
+    """Temporary array (components, points) for such numbers of this many points.
 
-    It lies where a function keeps its variables, and is gone with it.
+    It is on the stack of the function.
     """
     return np.zeros((len(numbers), points), np.asarray(numbers[0]).dtype)
 
@@ -105,7 +105,7 @@ def _room_for(points, numbers):
     def codegen(builder, *_):
         number = code.memory_type(array.dtype)
         memory = code.room(builder, ir.ArrayType(number, shape[0] * shape[1]))
-        memory.align = 64  # bytes that caches get at once
+        memory.align = 64  # bytes of a cache line
         size = array.dtype.bitwidth // 8
         data = builder.bitcast(memory, number.as_pointer())
         strides = shape[1] * size, size
@@ -134,7 +134,7 @@ def _of_present(p, value):
 
 
 def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> Any:
-    """The value of `first` where the condition holds, else that of `second`: one code is run."""
+    """Branch: the value of `first` if the condition holds, else of `second`."""
     found = []
     with builder.if_else(condition) as branches:
         for branch, write in zip(branches, (first, second), strict=True):
@@ -151,9 +151,9 @@ def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> 
 def _all_or_masked(
     builder: Any, pointer: Any, p: Any, lanes: Lanes, whole: Callable, partly: Callable
 ) -> Any:
-    """Read or write all lanes if all have a point, as in nearly all groups, else some of them.
+    """Read or write all lanes if all have a point, as in nearly all groups; else masked.
 
-    `partly` gets the name of LLVM's vectors, the address, the alignment and the mask.
+    `partly` gets the LLVM name of the vectors, the address, the alignment and the mask.
     """
     size = lanes.scalar.bitwidth // 8
     vector = code.register_type(lanes)
@@ -168,17 +168,17 @@ def _all_or_masked(
 
 
 def _points_at(builder: Any, array: types.Array, value: Any, at: Any, place: Any) -> tuple:
-    """Address of an item whose last index is a group: that of its first point; and the group."""
+    """Address of an item whose last index is a group (its first point), and the group."""
     kinds, values = _indices(builder, at, place)
     first = builder.extract_value(values[-1], 0)
-    # Points lie one after another in each row, however far the rows are apart.
+    # Points are contiguous in each row, for any distance between rows.
     size = I64(array.dtype.bitwidth // 8)
     indices = [*_as_places(builder, kinds[:-1], values[:-1]), first]
     return code.item_pointer(builder, array, value, indices, size), values[-1]
 
 
 def _indices(builder: Any, at: Any, value: Any) -> tuple[list, list]:
-    """Types and values of the indices of an item, one or a tuple of them."""
+    """Types and values of the indices of an item, one or a tuple."""
     if isinstance(at, types.BaseTuple):
         return list(at), code.unpack(builder, value)
     return [at], [value]
@@ -197,7 +197,7 @@ def _load_points(array, at):
         pointer, p = _points_at(builder, array, value, at, place)
 
         def partly(name, here, align, mask):
-            """Lanes without a point get the first's number."""
+            """Lanes without a point get the first point's number."""
             kinds = [here.type, I32, mask.type, vector]
             load = code.external(builder, f"llvm.masked.load.{name}", vector, kinds)
             loaded = builder.call(load, [here, align, mask, ir.Constant(vector, None)])
@@ -233,7 +233,7 @@ def _store_points(array, at, value):
 
 
 def ask(builder: Any, pointer: Any, ahead: Any) -> None:
-    """Have the memory bring what lies so many bytes behind an address."""
+    """Prefetch data at this offset from an address."""
     at = builder.gep(builder.bitcast(pointer, code.NOTHING), [ahead])
     kinds = [code.NOTHING, I32, I32, I32]
     function = code.external(builder, "llvm.prefetch.p0", ir.VoidType(), kinds)
@@ -252,9 +252,9 @@ def _prefetch(array, at):
 
 
 def at_lane(builder, kind, array, of, at, k, *rest):
-    """Address of an item of an array; its first index is that of lane `k` of nodes `at`.
+    """Address of an item of an array whose first index is lane `k` of nodes `at`.
 
-    Of a number that is not in lanes it is the same for all.
+    For a number without lanes it is the same for all.
     """
     if not lanes_of(of):
         return code.item_pointer(builder, kind, array, [at, *rest])
@@ -265,7 +265,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     found = code.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return found
-    # From there on: the place of the first node is found once for all that is beside it.
+    # Relative to the first node, whose address is computed once for its neighbours.
     stride = code.ArrayParts(builder, kind, array).strides[0]
     return code.byte_pointer(builder, found, builder.mul(steps, stride))
 
@@ -287,7 +287,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # Of parameters: mostly all points of a group are of one material.
+        # Parameters: mostly all points of a group have one material.
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

@@ -1,4 +1,4 @@
-"""Records of nodes, (nodes, components), read and written in lanes."""
+"""Node records (nodes, components), read and written in lanes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,15 +20,15 @@ from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane
 from karamelo_py.compiler.tuples import row
 from karamelo_py.compiler.values import intrinsic
 
-# Bytes of a record that a field is given to at once: a register. Of wider vectors LLVM makes two,
-# and where registers are narrow there are too few of them for that.
+# Bytes of a record written at once: a register. LLVM splits wider vectors in two, and narrow
+# registers are too few for that.
 _AT_ONCE = 64 if "+avx512f" in machine.features() else 32
 
-AHEAD = 16  # nodes by which records are asked of the memory ahead of their use
+AHEAD = 16  # nodes whose records are prefetched ahead
 
 
 def _transposed(builder: Any, rows: list) -> list:
-    """Four vectors of four numbers, or of two, transposed: lanes from records."""
+    """Transpose four vectors of four numbers, or of two: lanes from records."""
     if rows[0].type.count == 2:
         ab = shuffle(builder, rows[0], rows[1], [0, 2, 1, 3])
         cd = shuffle(builder, rows[2], rows[3], [0, 2, 1, 3])
@@ -43,15 +43,15 @@ def _transposed(builder: Any, rows: list) -> list:
 
 
 def _record(builder: Any, kind: Any, pointer: Any, components: int) -> Any:
-    """Address of so many components of a record, as a vector."""
+    """Address of some components of a record, as a vector."""
     vector = ir.VectorType(code.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())
 
 
 def _chunks(count: int) -> list[tuple[int, int]]:
-    """Components in chunks as wide as registers: (first, number), 4, 2 or 1; 3 are 4.
+    """Split components into register-wide chunks: (first, number), with 4, 2 or 1; 3 count as 4.
 
-    Records are as wide as that: what lies behind their last component belongs to them.
+    Records are padded accordingly.
     """
     out, first = [], 0
     while first < count:
@@ -72,7 +72,7 @@ def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
 
 
 def _gathered(builder: Any, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
-    """Components of records in lanes: ``read(lane, column, count)`` gives some of one point."""
+    """Components of records in lanes: ``read(lane, column, count)`` returns some of one point."""
     found: list = []
     for begin, count in _chunks(len(like)):
         column = builder.add(first, I64(begin))
@@ -83,7 +83,7 @@ def _gathered(builder: Any, lanes: Lanes, first: Any, like: Any, read: Callable)
 
 @intrinsic
 def _gather_row(array, nodes, first, like):
-    """Components of the records of nodes, as many as `like` has."""
+    """Components of node records, as many as `like` has."""
     lanes = Lanes(array.dtype, nodes.width)
     made = types.UniTuple(lanes, len(like))
 
@@ -99,7 +99,7 @@ def _gather_row(array, nodes, first, like):
 
 @intrinsic
 def _gather_weighted(array, nodes, first, weights, like):
-    """The same of the weighted sum of the records of some nodes: each is read as it lies there."""
+    """The same for the weighted sum of some node records, each read where it is."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
@@ -127,7 +127,7 @@ def _size(array: types.Array) -> int:
     return array.dtype.bitwidth // 8
 
 
-_fma = arithmetic.of_library("llvm.fma")  # a b + c of vectors, with one rounding
+_fma = arithmetic.of_library("llvm.fma")  # a b + c of vectors, rounded once
 
 
 @implements(prefetch_records, Lanes, Beside)
@@ -152,7 +152,7 @@ def _row(array, i, first, like):
 
 @intrinsic
 def _scatter(array, nodes, first, values):
-    """Add to components of the records of nodes, lane after lane; summed before to one node."""
+    """Add to components of node records, lane by lane; first summed if all go to one node."""
     lanes = Lanes(array.dtype, max(lanes_of(value) for value in values))
     at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
@@ -177,9 +177,9 @@ def _scatter(array, nodes, first, values):
 
 
 def move_record(array, i, other, j, first, like, keep):
-    """Add components of the record of a node of another array, as many as `like` has.
+    """Add components of a node record of another array, as many as `like` has, and zero them there.
 
-    They are zero there then. If not `keep`, they take the place of what was here.
+    If not `keep`, they replace the old content.
     """
     for k in range(first, first + len(like)):
         array[i, k] = (array[i, k] if keep else 0) + other[j, k]
@@ -228,11 +228,10 @@ def _accumulate(array, i, first, values):
 
 
 def accumulate_affine(array, nodes, first, weights, value, slopes):
-    """Give nodes their weights times an affine field: components from the `first` on.
+    """Add an affine field times the weights to nodes: components from `first` on.
 
-    `value` is that of the first node; the field grows by ``slopes[d]`` to the next in direction `d`
-    (of nodes in a square or a cube, the last direction running fastest), or is the same everywhere
-    where there are none.
+    `value` is the field at the first node. It grows by ``slopes[d]`` to the next node in direction
+    `d` (nodes form a square or cube, last direction fastest); without slopes it is constant.
     """
     width = round(len(nodes) ** (1 / max(1, len(slopes))))
     for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
@@ -245,9 +244,9 @@ def accumulate_affine(array, nodes, first, weights, value, slopes):
 @implements(accumulate_affine)
 @intrinsic
 def _accumulate_affine(array, nodes, first, weights, value, slopes):
-    """The records of the points, each with one vector; the weights are read one by one.
+    """The records of the points as vectors, with weights read one by one.
 
-    So the records are made once per point, not at each node.
+    So records are made once per point, not per node.
     """
     lanes = weights[0]
 
@@ -264,7 +263,7 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
             count = widest if left > 4 else _chunks(left)[0][1]
             column = builder.add(first, I64(begin))
             one = Lanes(array.dtype, count)
-            # By the place of the node in the first directions.
+            # By the position of the node in the first directions.
             at = {(): _records_of(builder, values[some], lanes, count)}
             grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
 
@@ -296,7 +295,7 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
 
 
 def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
-    """A record of `count` components for each lane."""
+    """Make a record of `count` components for each lane."""
     parts = [*parts, *[ir.Constant(code.register_type(lanes), None)] * 8][:count]
     rows = []
     for k in range(0, lanes.width, 4):
@@ -312,10 +311,9 @@ def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
 
 
 def _kept_in_memory(builder: Any, vectors: list) -> Callable:
-    """Store vectors in memory that LLVM does not see through; return the address of a lane.
+    """Store vectors in memory that is opaque to LLVM; return the address of a lane.
 
-    A number from memory gets into all lanes as it is loaded; out of a register that takes as long
-    as a shuffle.
+    Broadcasting from memory is part of the load; from a register it costs a shuffle.
     """
     room = code.room(builder, ir.ArrayType(vectors[0].type, len(vectors)))
     room.align = 64
