@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-WEIGHT = 1000 * 0.4 * 0.1 * 10
+WEIGHT = 1000 * 0.2 * 0.1 * 10
 BASE = """
     base = 0.2
     method({method})
     dimension(2, 0, 1, 0, 1, 0.1)
-    region(b, block, 0.3, 0.7, base, base + 0.1)
-    region(q, block, 0.2, 0.8, 0.1, base)
+    region(b, block, 0.4, 0.6, base, base + 0.1)
+    region(q, block, 0.3, 0.7, 0.1, base)
     material(soft, linear, 1000, 1e5, 0.3)
     material(stiff, linear, 1000, 4e5, 0.3)
     solid(b, region, b, 2, soft, 0.1)
@@ -75,7 +75,7 @@ def test_a_smaller_step_leaves_bodies_at_rest(run_interpreted, kind):
 PULL = "\n".join([
     "region(up, block, -INF, INF, base, INF)", "group(b, particles, region, up, all)",
     "compute(c, center_of_mass, b)", "log_modify(custom, step, dt, time, w_x, w_y, c_x)",
-    "fix(pull, force_particles, b, 0.2*40*10*min(time/0.2, 1), NULL)",
+    "fix(pull, force_particles, b, 0.2*20*10*min(time/0.2, 1), NULL)",
 ])  # fmt: skip
 
 
