@@ -328,10 +328,10 @@ class Others(OfNodes):
 """
 PUBLISHING = """
 method(ulmpm, FLIP, linear, 0.99)
-dimension(2, 0, 1, 0, 1, 0.02)
+dimension(2, 0, 1, 0, 1, 0.05)
 region(box, block, 0.2, 0.8, 0.2, 0.8)
 material(rubber, neo-hookean, 1000, 1000, 0.3)
-solid(body, region, box, 2, rubber, 0.02, 0)
+solid(body, region, box, 2, rubber, 0.05, 0)
 fix(p, many/points, all)
 fix(n, many/nodes, all)
 log_modify(custom, step, p_a, p_b, p_c, p_d, n_a, n_b, n_c, n_d)

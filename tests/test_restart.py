@@ -112,8 +112,8 @@ def test_a_step_that_was_halved(run_script):
              "dt_factor(1.9)", "set_output(5)", "log_modify(custom, step, dt, limit)",
              "compute(E, energy_balance, all)", "dump(d, all, particle, 20, d.*.txt, x, vx)",
              "run(60, on_trouble=halve)"]  # fmt: skip
-    script = with_files(block(2, *lines, size=(0.3, 0.3)), "restart(6, r.*.h5)\n")
-    whole = goes_on(run_script, script, files=9)
+    script = with_files(block(2, *lines, size=(0.3, 0.3)), "restart(12, r.*.h5)\n")
+    whole = goes_on(run_script, script, files=4)
     halvings = {content(file)["run"][0] for file in whole.glob("r.*.h5")}
     assert max(halvings) > 0
 

@@ -526,7 +526,7 @@ def test_the_work_of_rigid_bodies_is_known_to_newmark(run_interpreted):
 
 # Two bars above each other, the lower one on a floor or rigid and led by 0.05.
 BARS = """
-h = 0.1
+h = 0.2
 method({kind}, FLIP, linear, 1)
 dimension(1, 0, 2, h)
 region(a, block, 0, 0.6)
@@ -543,7 +543,7 @@ group(a, particles, region, a, solid, a)
 fix(g, body_force, all, -9.81)
 {fixes}
 set_output(1000)
-run(100)
+run(50)
 """
 LED = "fix(lead, velocity_particles, a, 0.05)\n"
 DAMPED = "fix(x, local_damping, all, 0.5)"
