@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -43,6 +44,20 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("tests")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Groups of tests come first, the largest of them at the head.
+
+    One process runs a whole group: one that begins late runs on when the others are done.
+    """
+    groups = {
+        item: mark.args[0] if (mark := item.get_closest_marker("xdist_group")) else ""
+        for item in items
+    }
+    sizes = Counter(groups.values())
+    sizes[""] = 0
+    items.sort(key=lambda item: (-sizes[groups[item]], groups[item]))
 
 
 def pytest_collection_finish() -> None:
