@@ -191,14 +191,12 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
     more = {"NUMBA_DISABLE_JIT": "1"} if entry.interpreted else {}
     told = []
     for line in lines:
-        command = program_of(line)
         done = subprocess.run(
-            command,
+            [*PROGRAM, *shlex.split(line)],
             cwd=place, env={**environment(), **more}, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
         )  # fmt: skip
-        program = "python" if line.startswith("docs/") else "karamelo-py"
-        told.append(f"$ {program} {line}\n{done.stdout}")
+        told.append(f"$ karamelo-py {line}\n{done.stdout}")
         write_whole(place / SAID, "\n".join(told))
         if done.returncode:
             print(done.stdout, end="")
@@ -206,14 +204,6 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
     made = {"key": key, "commands": lines, **surroundings()}
     write_whole(record, json.dumps(made, indent=1))
     return "done"
-
-
-def program_of(line: str) -> list[str]:
-    """Give the words that start a command: of karamelo-py, or a script of this folder."""
-    first, *rest = shlex.split(line)
-    if first.startswith("docs/"):
-        return [sys.executable, str(Path(__file__).parents[1] / first), *rest]
-    return [*PROGRAM, first, *rest]
 
 
 def key_of(lines: list[str]) -> str:

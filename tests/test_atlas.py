@@ -162,9 +162,6 @@ def test_the_atlas_of_the_pages_names_scripts_and_commands_that_exist():
     for entry in entries:
         for small in (False, True):
             for line in entry.lines(str(inputs), small=small):
-                if line.startswith("docs/"):
-                    assert (ROOT / line.split()[0]).is_file(), line
-                    continue
                 options = parser.parse_args(shlex.split(line))
                 script = getattr(options, "script", None)
                 assert script is None or script.is_file(), line

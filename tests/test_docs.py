@@ -217,7 +217,7 @@ def test_command_lines_of_pages_are_understood(page):
                 name = given.partition("=")[0] if isinstance(given, str) else given[0]
                 assert re.search(rf"^{name} *=", text, re.M), line
         if words[0] == "chart":
-            assert str(options.table) in made, line
+            assert set(map(str, options.tables)) <= set(made), line
         made.append(str(getattr(options, "o", "")))
 
 

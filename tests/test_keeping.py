@@ -5,12 +5,11 @@ import re
 from pathlib import Path
 
 import atlas
-import keeping
 import numpy as np
 import pytest
-from keeping import judge, look_at
 
 from karamelo_py.app.cli import main
+from karamelo_py.app.studies.keeping import judge, look_at
 
 ROOT = Path(__file__).parent.parent
 
@@ -72,9 +71,7 @@ def test_the_energy_table_reduced(tmp_path, monkeypatch, capsys, starts_are_chea
     entry = next(e for e in entries if e.name == "energy/transfers")
     entry.small.update(periods="1", transfers="PIC,TPIC", schemes=",".join(ORDERS))
     for line in entry.lines(str(ROOT / "inputs"), small=True):
-        words = line.split()
-        act, words = (main, words) if words[0] == "sweep" else (keeping.main, words[1:])
-        assert act([*words, *["-var", "ppc=1"] * (act is main)]) == 0
+        assert main([*line.split(), *["-var", "ppc=1"] * line.startswith("sweep")]) == 0
     text = (tmp_path / "energy.md").read_text(encoding="utf-8")
     lines = [line[2:-2].split(" | ") for line in text.splitlines() if line.startswith("| ")]
     cells = {(row[0], order): row[-2 + k] for row in lines for k, order in enumerate(ORDERS)}
@@ -107,18 +104,18 @@ run(20)
 """
     (tmp_path / "in.fall").write_text(script, encoding="utf-8")
     assert main(["sweep", "in.fall", "-var", "speed=0", "-o", "runs.csv"]) == 0
-    assert keeping.main(["runs.csv", "Ek"]) == 0
+    assert main(["chart", "runs.csv", "-keeps", "Ek"]) == 0
     out = capsys.readouterr().out
     assert "| grows " in out and "gains" not in out and "silent" not in out
-    assert keeping.main(["runs.csv", "E"]) == 0
+    assert main(["chart", "runs.csv", "-keeps", "E"]) == 0
     assert "| keeps " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["F"], "the log has no 'F'"),
-        (["E", "-by", "bass"], "did you mean 'basis'?"),
+        (["-keeps", "F"], "the log has no 'F'"),
+        (["-keeps", "E", "-by", "bass"], "did you mean 'basis'?"),
     ],
 )
 def test_mistakes(tmp_path, monkeypatch, capsys, words, said):
@@ -126,7 +123,7 @@ def test_mistakes(tmp_path, monkeypatch, capsys, words, said):
     log_of(tmp_path, [1, 1])
     head = "basis,seconds,status,reason,folder\n"
     (tmp_path / "runs.csv").write_text(head + "linear,1,done,,.\n", encoding="utf-8")
-    assert keeping.main(["runs.csv", *words]) == 1
+    assert main(["chart", "runs.csv", *words]) == 1
     assert said in capsys.readouterr().err
 
 

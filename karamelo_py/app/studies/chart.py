@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.app.studies import pictures, records, results
+from karamelo_py.app.studies import keeping, look, pictures, records, results
 from karamelo_py.app.studies.curves import Family, Table, order, require
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
-from karamelo_py.output.files import read_json
+from karamelo_py.output.files import read_json, write_whole
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -22,12 +22,17 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
   karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
   karamelo-py chart sweep.csv -y runout -x a -law "1.2*a" -data seen.csv -o runout.png   a result
-  karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs"""
+  karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
+  karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?
+  karamelo-py chart a.csv b.csv -accuracy err -versus digits -o d.png  two values, scene by scene"""
 
 
 def add_options(parser: ArgumentParser) -> None:
     """Add what the subcommand takes."""
-    parser.add_argument("table", type=Path, help="what karamelo-py sweep has written")
+    parser.add_argument(
+        "tables", type=Path, nargs="+", metavar="table",
+        help="what karamelo-py sweep has written; several with -versus",
+    )  # fmt: skip
     wanted = parser.add_mutually_exclusive_group()
     wanted.add_argument("-accuracy", metavar="COLUMN", help="column of the error")
     wanted.add_argument(
@@ -36,6 +41,11 @@ def add_options(parser: ArgumentParser) -> None:
     wanted.add_argument(
         "-y", metavar="A,B", help="draw results over the variable -x, a line per value of -by"
     )
+    wanted.add_argument(
+        "-keeps", metavar="COLUMN",
+        help="write a table of what a log column does: keeps, damps, gains, breaks, refused; "
+        "rows by -by, columns by the other variables",
+    )  # fmt: skip
     parser.add_argument("-cost", metavar="COLUMN", help="column of the cost (seconds)")
     parser.add_argument(
         "-by", action="append", default=[], metavar="A,B", help="variables with a line per value"
@@ -43,6 +53,9 @@ def add_options(parser: ArgumentParser) -> None:
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("-x", metavar="NAME", help="draw errors over this variable, not over cost")
     kinds.add_argument("-heat", metavar="A,B", help="draw errors over two variables, as colours")
+    kinds.add_argument(
+        "-versus", metavar="NAME", help="compare its two values in each of the tables"
+    )
     parser.add_argument("-law", metavar="FORMULA", help="a formula of -x, drawn with -y")
     parser.add_argument("-data", type=Path, metavar="FILE", help="measured points, drawn with -y")
     parser.add_argument("-exact", metavar="COLUMN", help="log column of the exact -curve")
@@ -58,16 +71,22 @@ def run(options: Any) -> int:
     """Do what the command line says; returns the exit status."""
     costs = bool(options.cost) or not options.x
     options.cost = options.cost or "seconds"
-    if options.axes and not (options.o or options.curve):
+    if options.axes and (options.keeps or not (options.o or options.curve)):
         raise ScriptError("-axes", expected="-curve, or -accuracy or -y with -o")
-    if not (options.accuracy or options.curve or options.y):
-        hint = f"karamelo-py chart {options.table} -accuracy error -o chart.png"
-        expected = "-accuracy of an error, -y of a result, or -curve"
+    if not (options.accuracy or options.curve or options.keeps or options.y):
+        hint = f"karamelo-py chart {options.tables[0]} -accuracy error -o chart.png"
+        expected = "-accuracy of an error, -y of a result, -curve or -keeps"
         raise ScriptError("no column is named", expected=expected, hint=hint)
     if (options.law or options.data) and not options.y:
         raise ScriptError("-law and -data are drawn with -y", expected="-y COLUMN -x NAME")
-    table = read(options.table, options.where)
+    if options.versus:
+        return side_by_side(options)
+    if len(options.tables) > 1:
+        raise ScriptError(f"{len(options.tables)} tables", expected="one, or several with -versus")
+    table = read(options.tables[0], options.where)
     by = names(",".join(options.by))
+    if options.keeps:
+        return keeps(options, table, by or table.variables)
     if options.curve:
         return curves(options, table, by or table.variables)
     if options.y:
@@ -115,6 +134,32 @@ def read(path: Path, where: Sequence[str]) -> Table:
     return Table(rows, variables, path, made)
 
 
+def side_by_side(options: Any) -> int:
+    """Draw two values of a variable beside each other, for the scenes of all tables."""
+    if not options.accuracy:
+        raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
+    out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
+    found, known = [], []
+    for path in options.tables:
+        table = read(path, options.where)
+        some, values = pictures.pairs(table, options.versus, options.accuracy, options.cost)
+        if known and values != known:
+            expected = ", ".join(known) + ", as in the first table"
+            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}", expected=expected)
+        known = values
+        found += some
+    if out is not None:
+        cost = look.label(options.cost).removesuffix(" (s)")
+        words = along(
+            options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
+        )
+        pictures.draw_pairs(found, known, out, words, options.accuracy, options.title or "")
+    pictures.tell_pairs(found, known, options.accuracy, options.cost)
+    if out is not None:
+        print(f"drawn: {out}")
+    return 0
+
+
 def curves(options: Any, table: Table, by: list[str]) -> int:
     """Draw a column of the logs, a curve for each run."""
     out = out_file(options.o or Path("curves.png"), *pictures.SUFFIXES)
@@ -135,6 +180,25 @@ def curves(options: Any, table: Table, by: list[str]) -> int:
     for each in found:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
+    return 0
+
+
+def keeps(options: Any, table: Table, by: list[str]) -> int:
+    """Show whether a log column stays what it was, and which runs fail without a known cause."""
+    out = out_file(options.o, ".md") if options.o else None
+    require("-by", by, table.variables)
+    what = options.x or "Time", options.keeps, keeping.WITHIN, table.made.get("computes", ())
+    kept = [keeping.look_at(row, table.path.parent, *what) for row in table.rows]
+    text, silent = keeping.verdicts(table, kept, by)
+    if out:
+        write_whole(out, text)
+    print(text)
+    for word in dict.fromkeys(one.word for one in kept):
+        print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
+    for line in silent:
+        print(f"nothing says why: {line}")
+    if out:
+        print(f"written: {out}")
     return 0
 
 

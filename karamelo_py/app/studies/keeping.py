@@ -1,21 +1,16 @@
 """Runs judged by a log column, such as an energy, that should stay: a cell for each."""
 
-import sys
-from argparse import ArgumentParser
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import record_of, worded
-from karamelo_py.app.studies.chart import read
-from karamelo_py.app.studies.curves import Table, missing, require
-from karamelo_py.app.studies.variables import names, out_file
+from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
-from karamelo_py.output.files import write_whole
-from karamelo_py.script.errors import ScriptError, codes
+from karamelo_py.script.errors import codes
 
 SHARE = 0.2  # of the run: means over its first and its last part are compared
 WRONG = ("gains", "breaks")
@@ -71,7 +66,7 @@ def look_at(
         return Kept(word, np.nan, causes, warned)
     for name in (over, column):
         if name not in log:
-            raise missing("column" if name == column else "-x", name, list(log), "the log")
+            raise missing("-keeps" if name == column else "-x", name, list(log), "the log")
     if row["status"] == "failed":
         word, number = "breaks", float(log[over][-1])
         warned = warned or any("cause" in note for note in said)
@@ -126,41 +121,3 @@ def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
     said = "\n".join(f"{k}. {note}" for k, note in enumerate(notes, 1))
     return f"{text}\n\n{said}".rstrip() + "\n", silent
-
-
-def main(words: Sequence[str] | None = None) -> int:
-    """Write the table of a sweep; returns the exit status."""
-    parser = ArgumentParser(description=__doc__)
-    parser.add_argument("table", type=Path, help="what karamelo-py sweep has written")
-    parser.add_argument("column", help="log column that should stay")
-    parser.add_argument("-x", default="Time", help="log column over which it does (Time)")
-    parser.add_argument("-by", default="", metavar="A,B", help="variables with a row per value")
-    parser.add_argument("-where", action="append", default=[], help="only these rows")
-    parser.add_argument("-o", type=Path, help="file (.md)")
-    options = parser.parse_args(words)
-    try:
-        return _write(options)
-    except ScriptError as error:
-        print(error.render(), file=sys.stderr)
-        return 1
-
-
-def _write(options: Any) -> int:
-    table = read(options.table, options.where)
-    out, by = out_file(options.o, ".md") if options.o else None, names(options.by)
-    require("-by", by, table.variables)
-    what = options.x, options.column, WITHIN, table.made.get("computes", ())
-    kept = [look_at(row, table.path.parent, *what) for row in table.rows]
-    text, silent = verdicts(table, kept, by or table.variables)
-    if out:
-        write_whole(out, text)
-    print(text)
-    for word in dict.fromkeys(one.word for one in kept):
-        print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
-    for line in silent:
-        print(f"nothing says why: {line}")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
