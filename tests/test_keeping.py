@@ -4,11 +4,11 @@ import json
 import re
 from pathlib import Path
 
-import atlas
 import numpy as np
 import pytest
 
 from karamelo_py.app.cli import main
+from karamelo_py.app.studies import atlas
 from karamelo_py.app.studies.keeping import judge, look_at
 
 ROOT = Path(__file__).parent.parent

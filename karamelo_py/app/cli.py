@@ -90,6 +90,7 @@ ELSEWHERE = {
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest set-up within an error."),
     "fit": ("karamelo_py.app.studies.fit", "Find the values of variables that match measurements."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
+    "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }
 OPTIONS = ("gpu", "ranks", "live", "threads")  # of run, as listed by help
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)

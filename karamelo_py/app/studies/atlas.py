@@ -1,4 +1,4 @@
-"""Make the pictures and tables of a page again, each by commands that any user can run."""
+"""karamelo-py atlas: makes again what a page shows, each picture by commands for everybody."""
 
 import hashlib
 import json
@@ -7,11 +7,9 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 import time
 import tomllib
-from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from collections.abc import Sequence
+from argparse import ArgumentParser
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -31,9 +29,9 @@ Makes the pictures and tables of an atlas again: a file (TOML) that lists them w
 karamelo-py that make each. What is done is not done again; an interrupted atlas goes on where it
 stopped when the same command is given again.
 
-  python docs/atlas.py docs/atlas.toml -list
-  python docs/atlas.py docs/atlas.toml -only failures
-  python docs/atlas.py docs/atlas.toml -page docs/atlas.md
+  karamelo-py atlas docs/atlas.toml -list
+  karamelo-py atlas docs/atlas.toml -only failures
+  karamelo-py atlas docs/atlas.toml -page docs/atlas.md
 
 An entry has a name, a text, and commands that run in a folder of its own; {inputs} is the folder
 `inputs` of the atlas, and other words in braces are values of the entry, or its smaller values:
@@ -105,9 +103,8 @@ def read(path: Path) -> tuple[list[Entry], Path]:
     return entries, (path.parent / found.get("inputs", "inputs")).resolve()
 
 
-def parser_of() -> ArgumentParser:
-    """Make the command line."""
-    parser = ArgumentParser(description=DESCRIPTION, formatter_class=RawDescriptionHelpFormatter)
+def add_options(parser: ArgumentParser) -> None:
+    """Add what the subcommand takes."""
     parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
     parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups: NAME,NAME")
     parser.add_argument("-small", action="store_true", help="use the smaller values of the entries")
@@ -117,22 +114,12 @@ def parser_of() -> ArgumentParser:
         "-o", type=Path, default=Path("atlas"), metavar="FOLDER", help="folder for the runs (atlas)"
     )
     parser.add_argument(
-        "-page", type=Path, help="page to write; its pictures go to _static/atlas next to it"
+        "-page", type=Path, help="page to write; its pictures go to _static/atlas beside it"
     )
-    return parser
-
-
-def main(words: Sequence[str] | None = None) -> int:
-    """Do what the command line says; returns the exit status."""
-    try:
-        return run(parser_of().parse_args(words))
-    except ScriptError as error:
-        print(error.render(), file=sys.stderr)
-        return 1
 
 
 def run(options: Any) -> int:
-    """Make what is asked for; returns the exit status."""
+    """Do what the command line says; returns the exit status."""
     entries, inputs = read(options.atlas)
     asked = names(options.only)
     known = [*{entry.group for entry in entries}, *(entry.name for entry in entries)]
@@ -264,7 +251,3 @@ def abridged(said: str) -> str:
     commands = [line for line in lines if line.startswith("$ ")]
     last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
     return "\n".join([*commands, *lines[last + 1 :]])
-
-
-if __name__ == "__main__":
-    sys.exit(main())
