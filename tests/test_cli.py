@@ -74,7 +74,7 @@ def test_an_id_that_is_given_twice_is_one_mistake(run_interpreted):
     twice = BODY.replace("material(", "region(line, block, 0.5, 1)\nmaterial(")
     twice += "solid(other, region, right, 2, rubber, 0.1)\nrun(-1)\n"
     said = run_interpreted(twice, status=1).err
-    assert "region ID 'line' is already used (line 4)" in said and "'right'" not in said
+    assert "region: ID 'line' is already used (line 4)" in said and "'right'" not in said
     assert said.count("error: ") == 1
 
 

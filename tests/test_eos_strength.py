@@ -345,14 +345,14 @@ def test_values_of_a_replaced_compute_are_forgotten():
 @pytest.mark.parametrize(
     "line, says",
     [
-        ("eos(bulk, linear, 2, 160)", "eos ID 'bulk' is already used (line 6)"),
+        ("eos(bulk, linear, 2, 160)", "eos: ID 'bulk' is already used (line 6)"),
         ("eos(e, linear, 0, 160)", "'rho0' must be a number above 0, not 0"),
         ("eos(e, linear, 2, -1)", "'K' must be a number above 0, not -1"),
         ("eos(e, linear, 2)", "eos(ID, linear, rho0, K)"),
         ("eos(e, linaer, 2, 160)", "did you mean 'linear'?"),
         ("strength(s, plastic, 80, 0)", "'yield_stress' must be a number above 0, not 0"),
         ("strength(s, plastc, 80, 1)", "did you mean 'plastic'?"),
-        ("strength(mild, linear, 80)", "strength ID 'mild' is already used (line 7)"),
+        ("strength(mild, linear, 80)", "strength: ID 'mild' is already used (line 7)"),
         ("material(m, eos-strength, bulc, mild)", "unknown eos 'bulc'"),
         ("material(m, eos-strength, bulc, mild)", "did you mean 'bulk'?"),
         ("material(m, eos-strength, bulk, mld)", "unknown strength 'mld'"),

@@ -218,7 +218,7 @@ def test_compiled_is_the_same(run_script, run_interpreted):
         ("strength(s, drucker-prager, 80, 1, 30, 0, tension=-1)", "'tension' must be a number"),
         ("damage(d, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 300, 300)", "is not above Tr = 300"),
         ("damage(d, damage_johnson_cook, -1, 1, 1, 0, 0, 1, 0, 1)", "d1 + d2 = 0, is not above"),
-        ("damage(ductile, damage_johnson_cook)", "damage ID 'ductile' is already used"),
+        ("damage(ductile, damage_johnson_cook)", "damage: ID 'ductile' is already used"),
         ("damage(d, johnson_cook, 1)", "did you mean 'damage_johnson_cook'?"),
         ("temperature(t, plastic_work, 0.9, 0, 0, 0, 298, 1356)", "'cp' must be a number above 0"),
         ("temperature(t, plastic_work, 2, 1, 0, 0, 298, 1356)", "'chi' must be a number"),

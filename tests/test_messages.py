@@ -1,5 +1,6 @@
 """Codes of messages: data that `karamelo-py help CODE` and the pages of messages are made from."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -74,3 +75,37 @@ def test_pages_are_written_from_the_data(tmp_path, monkeypatch):
     }
     assert len(own) > 20
     assert set(re.findall(r"^## (\S+)$", text["known-failures"], re.M)) == own
+
+
+SAID = {"message", "hint", "expected", "sentence"}  # fields of errors that are for readers
+
+
+def decisions_by_wording():
+    """Calls and comparisons that look into the sentences of an error."""
+
+    def is_said(node):
+        return any(isinstance(n, ast.Attribute) and n.attr in SAID for n in ast.walk(node))
+
+    for path in (ROOT / "karamelo_py").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            looked = []
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+                if getattr(node.func.value, "id", "") == "re":
+                    looked = node.args[1:]
+                elif node.func.attr in {"startswith", "endswith", "partition", "find", "split"}:
+                    looked = [node.func.value]
+            elif isinstance(node, ast.Compare) and not isinstance(node.ops[0], (ast.Is, ast.IsNot)):
+                values = [node.left, *node.comparators]
+                looked = values if any(isinstance(one, ast.Constant) for one in values) else []
+            yield from (f"{path}:{node.lineno}" for one in looked if is_said(one))
+
+
+def test_nothing_decides_by_the_wording_of_a_message():
+    assert [*decisions_by_wording()] == []
+
+
+def test_studies_look_into_no_output_of_runs():
+    """Their files are shown, whole or by lines; facts come from run.json and the log."""
+    reads = re.compile(r"\bre\.\w+\([^)]*(?:said_in|complaint|stdout|out\.txt|err\.txt)")
+    files = (ROOT / "karamelo_py" / "app").rglob("*.py")
+    assert [path for path in files if reads.search(path.read_text("utf-8"))] == []

@@ -338,9 +338,7 @@ def test_a_longer_run_by_a_variable(run_interpreted):
     text = with_files("n = 4\n" + FLY.replace("run(4)", "run(2*n)"))
     run_interpreted(text)
     result = run_interpreted(text.replace("n = 4", "n = 6"), "-restart", "r.4.h5", status=1)
-    assert "hint: leave n=4 as it was here, and write run(2*6) instead of run(2*n)" in (
-        result.err
-    )
+    assert "hint: leave n=4 as it was here, and write run(2*6) instead of run(2*n)" in (result.err)
     longer = text.replace("run(2*n)", "run(2*6)")
     assert run_interpreted(longer, "-restart", "r.4.h5").log.Step[-1] == 12
 

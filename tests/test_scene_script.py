@@ -93,7 +93,7 @@ def test_the_axis_of_a_cylinder_is_a_word():
         "region(rod, cylinder, x, 0.5, 0.5, 0.2, INF, 0.5)\n"
         "region(ball, sphere, 0.5, 0.5, 0.5, 0.2)\n"
     )
-    assert hub.regions["rod"].axis[0] == 0
+    assert hub.regions["rod"].across == (1, 2)
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
         name = f"{ID}_{suffix}" if suffix else ID
         if name in MEANINGS or name in SEEDS:
             raise ScriptError(
-                f"{kind} '{ID}' would publish its value as '{name}', which is "
+                f"'{ID}' would publish its value as '{name}', which is "
                 + MEANINGS.get(name, "a coordinate of points"),
                 argument="ID",
                 expected="an ID that means nothing else",

@@ -184,13 +184,13 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
     """
     if style == "default" and keys:
         raise ScriptError(
-            "log_modify: default takes no columns",
+            "default takes no columns",
             argument="keys",
             expected="log_modify(default) or log_modify(custom, step, ...)",
         )
     if style == "custom" and not keys:
         raise ScriptError(
-            "log_modify: custom needs at least one column",
+            "custom needs at least one column",
             expected="log_modify(custom, step, dt, time, ...)",
         )
     hub.output.log.columns = list(keys)
@@ -238,7 +238,7 @@ def plot(
     plots = hub.output.plots
     if ID in plots:
         raise ScriptError(
-            f"plot ID '{ID}' is already used",
+            f"ID '{ID}' is already used",
             argument="ID",
             expected="another ID",
             code="already-used",

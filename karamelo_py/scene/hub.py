@@ -44,7 +44,7 @@ class Catalogue(dict):
             before = getattr(self[ID], "place", None)
             where = f" (line {before.line})" if before else ""
             raise ScriptError(
-                f"{self.kind} ID '{ID}' is already used{where}",
+                f"ID '{ID}' is already used{where}",
                 argument="ID",
                 code="already-used",
                 kind=self.kind,

@@ -24,9 +24,6 @@ class Region(Named):
     `exterior` region is the outside of the shape; `parts` are regions that it is made of.
     """
 
-    # Direction (0, 1, 2) and centre of the axis of a 3D region that is a cylinder of constant
-    # `radius`.
-    axis: tuple | None = None
     radius = 0.0
     skin: Any = None  # the surface of a region from a file
     catalogue = "regions"

@@ -95,9 +95,7 @@ class ScriptError(Exception):
     @property
     def sentence(self) -> str:
         """The message, after the command or style that raises it."""
-        if self.command and not self.message.startswith(self.command):
-            return f"{self.command}: {self.message}"
-        return self.message
+        return f"{self.command}: {self.message}" if self.command else self.message
 
     def render(self) -> str:
         """Format the message for the user: place, marked line, expectation, fix.
