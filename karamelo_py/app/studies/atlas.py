@@ -114,7 +114,7 @@ def add_options(parser: ArgumentParser) -> None:
         "-o", type=Path, default=Path("atlas"), metavar="FOLDER", help="folder for the runs (atlas)"
     )
     parser.add_argument(
-        "-page", type=Path, help="page to write; its pictures go to _static/atlas beside it"
+        "-page", type=Path, help="page to write; its pictures go to _static/atlas next to it"
     )
 
 
@@ -211,7 +211,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     shown = page.parent / "_static" / "atlas"
     parts = [
         "# Atlas of accuracy and stability",
-        "Written by `karamelo-py atlas`, by the commands that stand below pictures.",
+        "Written by `karamelo-py atlas`, by the commands below pictures.",
     ]
     group = ""
     for entry in entries:
@@ -246,7 +246,7 @@ def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
 
 
 def abridged(said: str) -> str:
-    """Keep all commands, and what the last one printed: orders, edges, the table of a machine."""
+    """Return all commands, and what the last one printed: orders, edges, the table of a machine."""
     lines = [line.rstrip() for line in said.rstrip().splitlines()]
     commands = [line for line in lines if line.startswith("$ ")]
     last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
