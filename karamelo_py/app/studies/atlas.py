@@ -26,14 +26,14 @@ from karamelo_py.script.errors import ScriptError, plural, unknown
 
 DESCRIPTION = """\
 Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
-karamelo-py that make each. What is done is not done again; an interrupted atlas goes on where it
+karamelo-py that make each. What is done is not done again; an interrupted atlas continues where it
 stopped when the same command is given again.
 
   karamelo-py atlas docs/atlas.toml -list
   karamelo-py atlas docs/atlas.toml -only failures
   karamelo-py atlas docs/atlas.toml -page docs/atlas.md
 
-An entry has a name, a text, and commands that run in a folder of its own; {inputs} is the folder
+An entry has a name, a text, and commands that run in a separate folder; {inputs} is the folder
 `inputs` of the atlas, and other words in braces are values of the entry, or its smaller values:
 
   [[entry]]
