@@ -3,32 +3,35 @@
 A scene may have several grids with separate nodes; a :class:`Grid` is a row of their table.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
+
+Length = Any  # of one grid, and counts; in the setup of a scene they are arrays of all grids
+Count = Any
 
 
 class Grid(NamedTuple):
     """One regular grid. Lengths are in the units of the scene, counts in cells."""
 
-    x0: float  # lower corner
-    y0: float
-    z0: float
-    h: float  # cell size
-    inv_h: float  # 1 / h
-    spacing: float  # distance between nodes
-    nx: int  # cells per direction
-    ny: int
-    nz: int
-    lx: float  # size in cells, not always an integer
-    ly: float
-    lz: float
-    slack: float  # distance outside at which a point still counts as on it, in cells
-    step_x: int  # difference of node numbers of neighbours along x
-    step_y: int
-    first: int  # number of the first node
-    first_cell: int  # number of the first cell
+    x0: Length  # lower corner
+    y0: Length
+    z0: Length
+    h: Length  # cell size
+    inv_h: Length  # 1 / h
+    spacing: Length  # distance between nodes
+    nx: Count  # cells per direction
+    ny: Count
+    nz: Count
+    lx: Length  # size in cells, not always an integer
+    ly: Length
+    lz: Length
+    slack: Length  # distance outside at which a point still counts as on it, in cells
+    step_x: Count  # difference of node numbers of neighbours along x
+    step_y: Count
+    first: Count  # number of the first node
+    first_cell: Count  # number of the first cell
 
 
 def renumbered(grid, first, step_x, step_y):

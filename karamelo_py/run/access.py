@@ -36,11 +36,11 @@ class NodesByNumber:
                 arrays = {name: array[first:end] for name, array in of_nodes(s)}
                 own = {name: of[first:end] for name, of in sums.items()}
             else:
-                arrays = rows_at(simulation, np.arange(first, end), gather)
+                found = rows_at(simulation, np.arange(first, end), gather)
                 own = self._sums_between(first, end, sums, gather)
-                if arrays is None:
+                if found is None:
                     continue
-                arrays |= {f"nodes/{name}": array[first:end] for name, array in kept}
+                arrays = found | {f"nodes/{name}": array[first:end] for name, array in kept}
             own = {name: of.sum(axis=1) for name, of in own.items()}
             yield NodeTable(hub, np.arange(first, end), s.kin, arrays, own, weights)
 

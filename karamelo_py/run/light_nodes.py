@@ -77,7 +77,8 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
 
     radius = places[:, 0] if isinstance(kin, Axisymmetric) else None
     area = volume if radius is None else volume / radius
-    filled = sum(np.bincount(nodes(k), area * weight(k), count) for k in pairs)
+    none = np.zeros(count)
+    filled = sum((np.bincount(nodes(k), area * weight(k), count) for k in pairs), none)
     limit = LIGHT * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
@@ -93,7 +94,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
         return inf
     mass = filled  # of all points, not only of those near
     if radius is not None:
-        mass = sum(np.bincount(nodes(k), volume * weight(k), count) for k in pairs)
+        mass = sum((np.bincount(nodes(k), volume * weight(k), count) for k in pairs), none)
     number = np.cumsum(seen) - 1
     at = np.stack([number[nodes(k)[near]] for k in pairs], axis=1)
     slopes = [np.stack([weight(k, i)[near] for k in pairs], 1) for i in range(kin.dimension)]

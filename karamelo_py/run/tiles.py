@@ -234,7 +234,7 @@ class Tiles:
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
         parts[:, 9] = kernel_arrays.CLEAR
         ranges = grid_boxes.ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1)
-        return spans, ranges, [0, len(spans)], parts
+        return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
         """Find spans and ranges of nodes in tiles that boxes reach; first of each share, and parts.

@@ -300,7 +300,7 @@ def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> T
 def take_points(points: Points, found: Mapping[str, Any], stem: str) -> Points:
     """Return points in the order and number of the arrays, which they keep where these fit."""
     check_points(points, found, stem)
-    own = {
+    own: dict[str, Any] = {
         name: None if array is None else as_rows_of_points(found[stem + name])
         for name, array in points._asdict().items()
         if name != "fields"
@@ -382,7 +382,8 @@ def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
         }
     )
     # Tiles as of one process.
-    tilings, rows = [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks], {}
+    tilings = [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks]
+    rows: dict[str, np.ndarray] = {}
     for k, tiling in enumerate(tilings if parts is not None else ()):
         tiling.count[1] = 1 if simulation.tiles.direct else SHARES
         join_tilings(tiling, [part["tiling"][k] for part in parts])
@@ -397,8 +398,8 @@ def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
         yield from wholes({"values": own["values"]})
     if found := [part["touched"] for part in parts or () if part["touched"]]:
         nodes, first = np.unique(np.concatenate([of["nodes"] for of in found]), True)
-        rows = np.concatenate([of["rows"] for of in found])[first]
-        yield from wholes({"touched/nodes": nodes, "touched/rows": rows})
+        of_nodes = np.concatenate([of["rows"] for of in found])[first]
+        yield from wholes({"touched/nodes": nodes, "touched/rows": of_nodes})
 
 
 def points_of_tiles(

@@ -409,7 +409,7 @@ class LoadSteps:
 
     def refuse_all_loose(self) -> None:
         """Refuse, before any step, a scene in which no fix holds a node that points give to."""
-        s, held = self.simulation.setup, self.held().any(1)
+        s, held = self.simulation.setup, np.any(self.held(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
         if not (self.dynamic or rigid or any(held[a:b].any() for a, b in used(s.spans)[1:])):
             raise self._loose(next(iter(self.simulation.hub.solids)), "is held by nothing")

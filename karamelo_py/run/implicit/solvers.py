@@ -27,7 +27,7 @@ class Unconverged(Exception):
 def hold(A: sp.bsr_matrix, given: np.ndarray, more: np.ndarray) -> None:
     """Make the given components (m, d) of a matrix stand alone; add `more` (m,) to the others."""
     rows = np.repeat(np.arange(len(given)), np.diff(A.indptr))
-    some = given.any(1)
+    some = np.any(given, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
     A.data[at] *= ~(given[rows[at]][:, :, None] | given[A.indices[at]][:, None, :])
     own, i = np.flatnonzero(rows == A.indices), np.arange(given.shape[1])

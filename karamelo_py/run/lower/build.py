@@ -49,7 +49,7 @@ SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
 class State(NamedTuple):
     """State of all points after a run, in the order of their ids; arrays (components, N)."""
 
-    count: int  # number of points, N
+    count: int  # type: ignore[assignment]  # number of points, N
     present: np.ndarray  # (N,) bool, False for points that were deleted
     places: np.ndarray
     v: np.ndarray
@@ -178,7 +178,7 @@ def lower(
     if hub.update.boundary == "reflect":
         grids = ReflectingGrid(*grids)
     count = sum(lattice.node_count for lattice in lattices)
-    heat = Insulated()
+    heat: Insulated | Conducting = Insulated()
     if hub.update.thermal:
         means = lower_nodes((NodalMean,), Line(), count, real)
         heat = Conducting(means, tiles.empty_buffers(means, len(hub.solids)))

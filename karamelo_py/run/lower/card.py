@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from karamelo_py.compiler.gpu import Counted, NoCard, card
+from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.language import registry
 from karamelo_py.run.lower.build import PRECISIONS
@@ -81,7 +82,7 @@ def memory_there(simulation: Any) -> int:
     return simulation.hub.settings.card.taken
 
 
-def refusals(hub: Hub, setup: Any = None) -> Iterator[ScriptError]:
+def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
     """Say what of a scene no GPU can do: each with its line, and what helps.
 
     Before there are arrays (`setup`), what depends on them is not looked at.
@@ -116,9 +117,8 @@ def refusals(hub: Hub, setup: Any = None) -> Iterator[ScriptError]:
         )
 
 
-def refuse(hub: Hub, setup: Any = None) -> None:
+def refuse(hub: Hub, setup: Setup | None = None) -> None:
     """Refuse a scene that no GPU can run."""
-    first, *others = [*refusals(hub, setup)] or [None]
-    if first is not None:
-        first.others = others
-        raise first
+    if found := [*refusals(hub, setup)]:
+        found[0].others = found[1:]
+        raise found[0]

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler.tuples import flat, record
+from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, results
 from karamelo_py.kernels.laws import law_in, law_on
@@ -24,6 +25,7 @@ from karamelo_py.points.laws import parameter
 from karamelo_py.points.laws.strengths import hardening, shear_response
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
 from karamelo_py.script.errors import plural
 
@@ -33,7 +35,7 @@ TRIED = 8  # points, at least, if the scene has enough
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
-def try_parts(hub: Hub, setup: Any) -> None:
+def try_parts(hub: Hub, setup: Setup) -> None:
     """Try the laws, the basis and the transfer of a scene that plug-ins brought."""
     for solid in hub.solids.values():
         law = law_on(solid.material.law, solid.h, solid.T0)
@@ -53,7 +55,7 @@ def try_parts(hub: Hub, setup: Any) -> None:
                 _try_hook(setup, fix, moment, hook)
 
 
-def _samples(setup: Any, fix: Any, hook: Any) -> Iterator[tuple]:
+def _samples(setup: Setup, fix: Fix, hook: Any) -> Iterator[tuple]:
     """Yield what `results` is called with for a node, or for a point of each law in the group."""
     tag, kin = hook.tag(0, ()), setup.kin
     if hook.on_nodes:
@@ -65,13 +67,13 @@ def _samples(setup: Any, fix: Any, hook: Any) -> Iterator[tuple]:
             yield what, *state_at(kin, points, table, p), p
 
 
-def _one_node(setup: Any) -> Any:
+def _one_node(setup: Setup) -> Any:
     """Make a node of mass 1 with what the nodes of a setup have."""
     fields = tuple(type(one)(one.array[:1].copy()) for one in setup.nodes.fields)
     return type(setup.nodes)(*(np.ones_like(a[:1]) for a in setup.nodes[:3]), fields)
 
 
-def _try_hook(setup: Any, fix: Any, moment: str, hook: Any) -> None:
+def _try_hook(setup: Setup, fix: Fix, moment: str, hook: Any) -> None:
     """Try a function of whole points or nodes."""
     part = PartInUse(f"fix {fix.style}", type(fix), fix.place)
     says = f"{moment}: {hook.function.__name__} has to return "
@@ -105,7 +107,7 @@ def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
     return next((part for part in foreign_parts(hub) if part.kind in kinds), None)
 
 
-def _one(setup: Any) -> Any:
+def _one(setup: Setup) -> Any:
     return setup.nodes.sums.dtype.type(1)
 
 
@@ -193,7 +195,7 @@ def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None
             raise fault(part.name, what, part.place)
 
 
-def _try_basis(hub: Hub, setup: Any) -> None:
+def _try_basis(hub: Hub, setup: Setup) -> None:
     basis, points = setup.basis, setup.blocks[0].points
     part = _part_of(hub, [type(basis)])
     for p in range(0, len(points.id), 1 + len(points.id) // TRIED):
@@ -201,7 +203,7 @@ def _try_basis(hub: Hub, setup: Any) -> None:
             _try_functions(part, setup, points, p)
 
 
-def _try_functions(part: PartInUse, setup: Any, points: Any, p: int) -> None:
+def _try_functions(part: PartInUse, setup: Setup, points: Any, p: int) -> None:
     """Try the functions of a basis at a point: they add up to 1 everywhere, their slopes to 0."""
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])

@@ -20,6 +20,7 @@ from karamelo_py.language.faults import as_script_error
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import unique
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import NodesView, PieceView, PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
@@ -95,7 +96,7 @@ class _Builder:
         self.rigid = any(can(law, constrained_velocity) for law in laws)
         self.whole: list[Any] = []  # tags of hooks on whole points
 
-    def add(self, fix: Any, moment: str, hook: CompiledHook) -> None:
+    def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
         slot = -1
         if hook.publishes and fix.published:
@@ -139,7 +140,7 @@ class _Builder:
                 return 0
         return fixes[0].group.total()
 
-    def _members(self, fix: Any, hook: CompiledHook) -> tuple[int, int]:
+    def _members(self, fix: Fix, hook: CompiledHook) -> tuple[int, int]:
         if fix.group.all:
             return -1, -1
         if hook.on_nodes:
@@ -163,7 +164,7 @@ def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
     return begin, begin + len(piece)
 
 
-def sets_initial_state(fix: Any) -> bool:
+def sets_initial_state(fix: Fix) -> bool:
     """Tell whether all a fix does is a hook in Python before the first step."""
     hooks = fix.hooks()
     return set(hooks) == {"initial_integrate"} and not isinstance(
@@ -207,7 +208,7 @@ class PythonHooks:
             self.simulation.act(lambda whole: function(self, whole, stage, *arguments), s)
 
 
-def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
+def _call(simulation: Any, fix: Fix, hook: Callable, view: Any) -> None:
     """Call a hook; of one that each process calls for its own, see that all agree.
 
     All have to have asked for the same, else one would wait for the others for ever, and to have
@@ -222,7 +223,7 @@ def _call(simulation: Any, fix: Any, hook: Callable, view: Any) -> None:
         raise
 
 
-def _agree(simulation: Any, fix: Any) -> None:
+def _agree(simulation: Any, fix: Fix) -> None:
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
     own = {name: values.get(name) for name in names if name in values}
@@ -294,7 +295,7 @@ def _at_heated_points_python_hooks(hooks, s):
     hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
-def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
+def view_of(simulation: Any, fix: Fix, *, then: bool) -> PointsView:
     """Show the points of a fix, or those of them that are at hand."""
     if fix.point_by_point:
         return PieceView(
@@ -303,7 +304,7 @@ def view_of(simulation: Any, fix: Any, *, then: bool) -> PointsView:
     return PointsView(simulation, simulation.points.members(fix.group), then)
 
 
-def views_of(simulation: Any, fix: Any) -> Iterator[PointsView]:
+def views_of(simulation: Any, fix: Fix) -> Iterator[PointsView]:
     """Yield the points of a fix before a step, in pieces where it looks at each on its own."""
     if not fix.point_by_point:
         yield view_of(simulation, fix, then=False)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Block
 from karamelo_py.run.boxes import used
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, lower_points, part_of, point_kinds
@@ -87,7 +88,7 @@ def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
     return [(name + " (heat)" * (kind == "heat"), array) for (kind, _, name), array in parts]
 
 
-def point_fields(block: Any) -> list[tuple[str, str, int]]:
+def point_fields(block: Block) -> list[tuple[str, str, int]]:
     """List name, shape and bytes of each field that a point of this block carries."""
     found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
     found += [(name, array) for name, array in arrays.arrays_of(block.points) if name != "x"]

@@ -174,9 +174,7 @@ class SharedTiles(Tiles):
         )
         return s._replace(blocks=blocks)
 
-    def _with(
-        self, k: int, points: Points, stay: np.ndarray, come: list[list[np.ndarray]]
-    ) -> Points:
+    def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
         """Join the points that stay and those that have come, in the memory of the sort before."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
         # Fresh memory for all of them would cost more than all else that a sort does.
@@ -418,7 +416,7 @@ def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) 
 
 def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
     """Pack the points and tiles of `s` in tiles of which `own` says so, by name."""
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for k, block in enumerate(s.blocks):
         points, tiles = share_of_tiling(k, block.tiling, own)
         arrays = arrays_of(block.points)
