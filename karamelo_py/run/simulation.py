@@ -322,6 +322,11 @@ class Simulation(SceneArrays):
         return self._called or (self.python if self.python.by_stage else self.hooks)
 
     @property
+    def acting(self) -> list:
+        """Return the fixes that act in the next step."""
+        return (self._first or self.python).fixes
+
+    @property
     def begins(self) -> bool:
         """Return True if fixes of the first step are still to act."""
         return self._first is not None

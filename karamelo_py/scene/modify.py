@@ -125,6 +125,19 @@ class Fix(Publisher):
         """Numbers of the nodes that it acts on, for fixes on nodes."""
         return self.group.nodes
 
+    def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Give the components (m, k) of `nodes` at `x` (m, d) that it prescribes, and their values.
+
+        Those that it has `formulas` for. For implicit schemes, which do not call its hooks for it.
+        """
+        own = np.isin(nodes, self.nodes)
+        given = np.outer(own, [formula is not None for formula in self.formulas])
+        values, x = np.zeros(given.shape), x[own]
+        for k, formula in enumerate(self.formulas):
+            if formula is not None:
+                values[own, k] = formula.evaluate_points(self.hub.values, x, x)
+        return given, values
+
     def defined(self) -> None:
         """Called when the fix has its ID and is part of the scene."""
 

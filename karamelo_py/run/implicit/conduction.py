@@ -10,11 +10,11 @@ from karamelo_py.kernels.heat import FLOW_TO_NODES, HOLD, WARM
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.kinematics import Line
 from karamelo_py.run.implicit.equations import Equations
-from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import direct
+from karamelo_py.scene.modify import Fix
 
 
-def conduct(equations: Equations, hooks: Any, dt: float) -> None:
+def conduct(equations: Equations, hooks: Any, fixes: list[Fix], dt: float) -> None:
     """Let heat flow for a step of `dt`, before the points are strained by that.
 
     With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T'. Conduction is
@@ -37,8 +37,8 @@ def conduct(equations: Equations, hooks: Any, dt: float) -> None:
     mapped = heated.velocity[nodes, 0].astype(float)
     flow = sums[nodes, of_force(Line())].astype(float)
     K = equations.conduction()
-    found = prescribed(s, update, nodes, 1, lambda: take_rows((HOLD,), s, mode, hooks))
-    given, temperatures = found[0][:, 0], found[1][:, 0]
+    holding = [fix for fix in fixes if "post_update_grid_heat" in fix.hooks()]
+    given, temperatures = (of[:, 0] for of in equations.prescribed(holding, 1))
     free = some & ~given
     change = np.where(given, temperatures - mapped, 0.0)
     stored = capacity / dt

@@ -1,5 +1,6 @@
 """The equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
 from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
+from karamelo_py.scene.modify import Fix
 
 AT_ONCE = 8192  # points whose derivatives are kept until they are in the matrix
 FAR = 0.5  # cells that nodes may go at once towards others, and that for each cell between them
@@ -266,6 +268,15 @@ class Equations:
             for block, (_, response) in zip(self.blocks, self.parts, strict=True):
                 loops.keep_stress(self.s.kin, block.points, block.laws, response.stress)
         return self._forces()
+
+    def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Find what fixes prescribe of `count` components of the nodes, (m, count), and values."""
+        given, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
+        for fix in fixes:  # the last one decides
+            own, value = fix.prescribed(self.nodes, self.positions)
+            given |= own
+            values[own] = value[own]
+        return given, values
 
     @cached_property
     def positions(self) -> np.ndarray:

@@ -13,7 +13,7 @@ from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
 from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
-from karamelo_py.points.kinematics import free_from
+from karamelo_py.points.kinematics import Axisymmetric, free_from
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import used
 from karamelo_py.run.implicit.conduction import conduct
@@ -21,7 +21,6 @@ from karamelo_py.run.implicit.contact import Contact, contact_of
 from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
-from karamelo_py.run.implicit.prescribed import prescribed
 from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import PushingTool, tools_of
 from karamelo_py.run.no_number import no_number
@@ -227,7 +226,7 @@ class LoadSteps:
         """Let heat flow, before the equilibrium: that of the temperatures of the end."""
         s, mode = self.simulation.setup, self.simulation.mode
         try:
-            conduct(Equations(s, mode, self.known, False), hooks, dt)
+            conduct(Equations(s, mode, self.known, False), hooks, self.simulation.acting, dt)
         except Singular:
             raise self._error(
                 "temperatures have no solution: something conducts no finite heat",
@@ -265,7 +264,7 @@ class LoadSteps:
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         self._check_numbers(external, "a node gets a force that is not a number")
-        fixed, velocities = self._prescribed(equations, hooks)
+        fixed, velocities = self._prescribed(equations)
         led = equations.led[:, None]
         given = fixed | led
         velocities = np.where(led, equations.velocity_of_rigid, velocities)
@@ -306,24 +305,14 @@ class LoadSteps:
         reaction = newton.reaction(u)
         return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
 
-    def _prescribed(self, equations: Equations, hooks: Any) -> tuple[np.ndarray, np.ndarray]:
+    def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
         """Find which components of the nodes are held, and the velocities that they get."""
-        simulation, s = self.simulation, equations.s
-        given, velocities, changed = prescribed(
-            s,
-            s.nodes.update,
-            equations.nodes,
-            equations.d,
-            lambda: take_rows(self.scheme.hold, s, simulation.mode, hooks),
-        )
-        now = s.nodes.update[equations.nodes, : equations.d]
-        self._check_numbers(now, "a node gets a velocity that is not a number")
-        if np.any(changed):
-            raise self._error(
-                "a fix changes velocities of nodes without prescribing them, which implicit steps "
-                "know nothing of",
-                "fix velocity_nodes, or scheme(musl)",
-            )
+        holding = [f for f in self.simulation.acting if "post_update_grid_state" in f.hooks()]
+        given, velocities = equations.prescribed(holding, equations.d)
+        self._check_numbers(velocities, "a node gets a velocity that is not a number")
+        if isinstance(equations.s.kin, Axisymmetric):
+            on_axis = equations.positions[:, 0] == 0
+            given[on_axis, 0], velocities[on_axis, 0] = True, 0.0
         return given, velocities
 
     def _check_numbers(self, numbers: Any, message: str) -> None:

@@ -176,7 +176,7 @@ class PythonHooks:
     """Hooks of a step when some fixes act from Python: theirs, and the compiled ones."""
 
     def __init__(self, simulation: Any, fixes: list):
-        self.simulation = simulation
+        self.simulation, self.fixes = simulation, fixes
         self.functions = [hook.function for _, _, hook in compiled_hooks(fixes)]
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
         self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}

@@ -55,8 +55,7 @@ class PairContact(Gripping):
         method = hub.update.method
         if not method.own_grids:
             hub.warn(
-                "solids on one grid are in contact there already; "
-                "this fix adds further forces",
+                "solids on one grid are in contact there already; this fix adds further forces",
                 hint="method(tlmpm, ...) uses a separate grid for each solid"
                 + (
                     "; fix contact/friction is for the contact on the grid"
