@@ -115,9 +115,9 @@ def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
 class Tiling(NamedTuple):
     """The points of a block by tile."""
 
-    count: np.ndarray  # (3,) int64: number of occupied tiles, of shares of the points, and of
-    #                    shares that other processes wait for
-    share: np.ndarray  # (S + 1,) int64: tiles of the k-th share are order[share[k]:share[k + 1]]
+    count: np.ndarray  # (3,) int64: number of occupied tiles, of parts of the points, and of
+    #                    parts that other processes wait for
+    share: np.ndarray  # (S + 1,) int64: tiles of the k-th part: order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: in which the occupied tiles are visited
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: the grid of the k-th occupied tile
@@ -148,12 +148,12 @@ class Buffers(NamedTuple):
     first two directions; the action.
 
     In scenes of few points the buffers are the nodes themselves: these are cleared before a visit,
-    and the tiles add to them in turn.
+    and the tiles add to them one by one.
     """
 
     nodes: Nodes  # the fields that points scatter to
-    count: np.ndarray  # (2,) int64: number of shares of the nodes; whether boxes are the nodes
-    first: np.ndarray  # (S + 1,) int64: parts of the k-th share are first[k]:first[k + 1]
+    count: np.ndarray  # (2,) int64: number of parts of the nodes; whether boxes are the nodes
+    first: np.ndarray  # (S + 1,) int64: rows of the k-th part are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
     number: int  # index among the buffers of a scene
 
@@ -387,13 +387,13 @@ class Setup(NamedTuple):
     buffers: Buffers
     blocks: tuple[Block, ...]  # one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
-    ranges: np.ndarray  # (S + rows, 2) int64: for each share of the nodes, its range of the
-    #                     following rows; then the ranges of node numbers in use, by share
+    ranges: np.ndarray  # (S + rows, 2) int64: for each part of the nodes, its range of the
+    #                     following rows; then the ranges of node numbers in use, by part
     control: Control
 
 
 def with_items_of(values, others):
-    """Replace items by those of another NamedTuple with the same names."""
+    """Replace items by the items with the same names in another NamedTuple."""
     new = dict(zip(others._fields, others, strict=True))
     items = zip(values._fields, values, strict=True)
     return type(values)(*[new.get(name, item) for name, item in items])

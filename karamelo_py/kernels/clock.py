@@ -176,7 +176,7 @@ def checked_move(frame, kin, grids, points, now, stride, p):
 
 @by_threads
 def _check_points(frame, kin, grids, points, tiling, now, stride, k):
-    """Report the largest move of the points of the k-th share, and the point that went wrong."""
+    """Report the largest move of the points of the k-th part, and the first point with an error."""
     grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]

@@ -215,7 +215,7 @@ def _normal(contact, kin, nodes, n, other):
 def _is_hollow(contact, kin, nodes, n, normal, other):
     """Return True if, of the faces towards another body around a node, two face each other.
 
-    They do if, along the surface, their normals turn towards the connecting vector.
+    They do if, along the surface, their normals rotate towards the connecting vector.
     """
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
@@ -392,7 +392,7 @@ def _friction_of(pair, friction, push, slide, share):
 def _meet(contact, nodes, n):
     """Write the fields with mass at the position of node `n` to `meeting`; return their number.
 
-    It is 0 if an earlier field than that of `n` is among them: a position is visited once.
+    It is 0 if an earlier field than the one of `n` is among them: a position is visited once.
     """
     if not nodes.sums[n, MASS] > 0:
         return 0

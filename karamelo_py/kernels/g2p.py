@@ -359,7 +359,7 @@ gathered_all = visit.for_tags(gathered, "w, stencil, k, totals", each="totals")
 
 
 def updated_all(tasks, w, stencil, p, dt, totals, fastest):
-    """Update by the tasks in turn: distances are summed, and the rate is passed on."""
+    """Update by the tasks in order: distances are summed, and the rate is passed on."""
     moved = real(0, fastest)
     for task, total in zip(tasks, totals, strict=True):
         further, fastest = updated(task, w, stencil, p, dt, total, totals, fastest)

@@ -1,12 +1,12 @@
 """A step on a GPU: what one thread does for a point, a cell, a node, or the clock.
 
-Points belong to cells: that of a point is the first node it sees, and all points of a cell see the
-same nodes. They are listed cell by cell before each scatter, those of a cell in the order of their
+Points belong to cells, numbered by the first node a point sees, and all points of a cell see the
+same nodes. They are listed cell by cell before each scatter, within a cell in the order of their
 ids. A thread sums what the points of a cell give to each node that they see; another sums at a node
 what cells have given. No real number is added by two threads at once: results are the same in
 each run, and do not depend on how points lie in memory.
 
-`fate` holds how the points fared (doubles); threads of steps behind one that ended do nothing.
+`fate` holds errors and extremes (doubles); threads of steps after the last one do nothing.
 """
 
 import functools
@@ -36,11 +36,11 @@ from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
-MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; 0: it goes on, else 1 + a status of steps
+MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; 0: continue, else 1 + a status of steps
 BEHIND = 2.0**53  # all numbers of points
 CHUNK = 64  # items that one thread adds up
 WARP = 32  # threads that read memory at once
-OCCUPIED = 1 << 40  # in the sums of `CellLists.sums`: a cell with points, beside their number
+OCCUPIED = 1 << 40  # in `CellLists.sums`: flag of a cell with points, plus their number
 
 
 # The stages of a step that functions of threads belong to, as `karamelo-py bench` names them.
@@ -65,7 +65,7 @@ OTHERS = "clock, reports, totals"
 
 
 class CellLists(NamedTuple):
-    """The points of a block by cell; N is the number of nodes, n that of points.
+    """The points of a block by cell; with N nodes and n points.
 
     Of domains each corner is listed, in its own cell: corner c of point p as c n + p.
     """
@@ -73,7 +73,7 @@ class CellLists(NamedTuple):
     count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
     number: np.ndarray  # (n,) int32: the cell of each point
     first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
-    box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; behind them how many are
+    box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; then the count
     cell: np.ndarray  # (boxes,) int32: the cell of a box
     order: np.ndarray  # (n,) int32: the points
     sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
@@ -83,7 +83,7 @@ class CellLists(NamedTuple):
 
 
 class InCell(NamedTuple):
-    """In the place of a basis: the nodes of a point have the numbers 0, 1, ... of its stencil."""
+    """Replaces a basis: the nodes of a point are numbered 0, 1, ... as in its stencil."""
 
     basis: NamedTuple
 
@@ -113,7 +113,7 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 
 @functools.cache  # one for all launches
 def while_steps_go_on(function: Callable) -> Callable:
-    """Make what a thread does for as long as steps go on: nothing behind one that ended."""
+    """Make a thread function that does nothing once the steps have ended."""
 
     def go_on(i, fate, *arguments):
         if fate[STATUS] == 0:
@@ -196,7 +196,7 @@ class Stage:
         self.at_point = at_point  # the context of the visit, and the work at a point
 
     def _keep(self) -> Callable:
-        """Make what keeps the load of a point."""
+        """Make the function that stores the load of a point."""
         quantities, scatters = self.row.visit.quantities, self.scatters
 
         def keep(w, p, dt, cells):
@@ -217,7 +217,7 @@ class Stage:
         return load_of_point
 
     def load_point(self) -> Callable:
-        """Make what a point does that has not gathered: it keeps its load."""
+        """Make the function of a point that has not gathered: it stores its load."""
         at_point, keep = self.at_point, self._keep()
 
         def load_point(i, fate, s, block, cells):
@@ -227,7 +227,7 @@ class Stage:
         return load_point
 
     def gather(self) -> Callable:
-        """Make what a point does: it gathers from the nodes, is updated, and keeps its load."""
+        """Make the function of a point: gather from the nodes, update, store its load."""
         at_point, tasks, keep = self.at_point, self.row.visit.tasks, self._keep()
 
         def gather_point(i, fate, s, block, cells):
@@ -468,7 +468,7 @@ def list_point(i, fate, cells):
 
 
 def _point_and_corner(corners, count, listed):
-    """Find the point that is listed, of so many, and which of its corners."""
+    """Return the listed point and the index of its corner."""
     return (index(listed), 0) if corners == 1 else (index(listed % count), listed // count)
 
 
@@ -575,13 +575,13 @@ def take_reports(take: Callable) -> Callable:
 
 
 def finish_step(i, fate, s):
-    """End a step: time goes on, and the size of the next is chosen."""
+    """End a step: advance time, and choose the next step size."""
     fate[DRIFT] += s.control.clock[0].move
     finish(s.control)
 
 
 def end_step(i, fate, s):
-    """Say whether steps go on."""
+    """Tell whether steps continue."""
     clock = s.control.clock[0]
     if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
         fate[STATUS] = 1.0 + ABOVE_LIMIT

@@ -115,17 +115,17 @@ class HeatedPoints(NamedTuple):
 
 
 def _turns(what, k, parts):
-    """Return begin, end and stride of the turns of thread `k` of `parts`."""
+    """Return begin, end and stride of the chunks of thread `k` of `parts`."""
     if isinstance(what, (HookedNodes, WholeNodes)):
         shares = what.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-    # In turns, as members may be clustered.
+    # Interleaved, because members may be clustered.
     size = TURN if parts > 1 else max(what.ids.size, 1)
     return k * size, what.ids.size, parts * size
 
 
 def _bounds(what, turn, parts):
-    """Return the range of members in a turn."""
+    """Return the range of members in a chunk."""
     if isinstance(what, (HookedNodes, WholeNodes)):
         return what.ranges[turn, 0], what.ranges[turn, 1]
     return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size

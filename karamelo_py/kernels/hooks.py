@@ -74,7 +74,7 @@ class CompiledHook(NamedTuple):
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
     holds: bool  # sets v_star, or bounds it: one of several decides; leads a temperature
-    tag: Callable | None = None  # of whole points: makes what stands for the function
+    tag: Callable | None = None  # of whole points: makes the replacement of the function
     reads: tuple = ()
     writes: tuple = ()
     internal: bool = False  # its arguments are no plug-in's, and cards do not know it
@@ -163,7 +163,7 @@ NODE_WORDS = {
         what, what.nodes.sums, n, arrays.of_force(what.kin)
     ),
 }
-# The moments of hooks on whole nodes, and what they can change beside fields.
+# The moments of hooks on whole nodes, and what they can change other than fields.
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 
@@ -240,7 +240,7 @@ def vector_hook(
     where = WHOLE_NODES if nodes else WHOLE_POINTS
     if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
         return CompiledHook(function, where, publishes, False, False, False, None, reads, writes)
-    # Beside the function, so that it can be imported, and kernels with it be cached.
+    # In the module of the function, so that it can be imported, and its kernels cached.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
     while hasattr(module, name):  # it serves another hook, too

@@ -1,10 +1,10 @@
 """Implicit steps: nodal forces of points after trial displacements, and their derivatives.
 
-Weights and gradients are those of the beginning of a step, and stay what they are while Newton's
-method goes on. With H = sum_I u_I (x) grad N_I of the trial displacements, the nominal stress
+Weights and gradients are taken at the beginning of a step, and do not change while Newton's
+method iterates. With H = sum_I u_I (x) grad N_I of the trial displacements, the nominal stress
 P(H) = tau(H) (I + H)^-T gives the forces V0 P grad N. Its derivatives dP/dH
 (:mod:`karamelo_py.compiler.slopes`) give the whole stiffness V0 grad N dP/dH grad N: geometry, and
-all that a law does while it yields (Charlton, Coombs & Augarde 2017 keep gradients in the same
+all that a law does while it yields (Charlton, Coombs & Augarde 2017 hold gradients in the same
 way).
 """
 
@@ -40,7 +40,7 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import advance, by_rates, kirchhoff_stress, specific_volume
 
-PARTS = 64  # of a loop that threads share out; points of whole groups of lanes each
+PARTS = 64  # of a parallel loop; points of whole groups of lanes each
 GROUP = 8
 
 
@@ -211,7 +211,7 @@ def respond_to_changes(kin, points, laws, dt, response, first, end, tangent, par
 
 @kernel
 def keep_stress(kin, points, laws, stress):
-    """Keep V0 P of the present state: no place has changed yet."""
+    """Store V0 P of the present state, before positions change."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
@@ -220,7 +220,7 @@ def keep_stress(kin, points, laws, stress):
 
 
 # --- at the nodes -----------------------------------------------------------------------------
-# A node sums what the points that see it give, in their order: threads share out nodes.
+# A node sums the contributions of its points in order: threads divide the nodes.
 
 
 @kernel

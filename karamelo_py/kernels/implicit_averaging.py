@@ -1,4 +1,4 @@
-"""Averaged volumes (F-bar) in implicit steps, and their derivatives, which reach further.
+"""F-bar in implicit steps, and its derivatives, which couple more nodes.
 
 With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k directions, of which r is
 
@@ -6,12 +6,12 @@ With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k direction
 
 Of the energy e(A, r) of a point P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, with the
 mean p of the stresses tau along these directions. Nodal forces are the derivatives by
-displacements: P grad N, and V J A^-T grad N times the average of q that belongs to that of r.
+displacements: P grad N, and V J A^-T grad N times the average of q paired with the average of r.
 Their derivatives, with S = dR/du,
 
     K + X^T S + S^T Y + S^T Z S,
 
-are those of each point, and products of matrices of the nodes that it sees: X of dP/dr, Y of dq/dA
+are sums over each point, and products of matrices of the nodes that it sees: X of dP/dr, Y of dq/dA
 and Z of dq/dr.
 """
 
@@ -115,7 +115,7 @@ def respond_averaged(kin, points, laws, dt, response, averages, part):
 
 @kernel
 def keep_averaged_stress(kin, points, laws, response, averages):
-    """Keep P and q of the present state: no place has changed yet."""
+    """Store P and q of the present state, before positions change."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)

@@ -46,7 +46,7 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Choose three loops over a stretch of points: gather, update, scatter; else one for all.
 
-    Three short loops are faster than a long one where there is much to update: processors keep
+    Three short loops are faster than a long one if there is much to update: processors cache
     some thousand instructions at hand, and a law alone may have as many. That is so in lanes, of
     visits that do nothing but strain. Where points move stretches cost more than they bring: there
     is little to update, and stencils are found twice.
@@ -56,7 +56,7 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Choose the lanes of the particle update: in stretches of doubles twice those of the gather.
+    """Choose the lanes of the particle update: with doubles, twice the lanes of the gather.
 
     Chains of operations that wait for each other serve eight points in the time of four. To gather
     and to scatter, four are faster.

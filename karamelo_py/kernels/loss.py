@@ -1,10 +1,10 @@
 """Kinetic energy that a transfer takes, given back as heat to laws that have an internal energy.
 
 A point p of mass m gives a node i the velocity a_ip = v_p + what its moment adds there, with the
-weight N_ip m. The nodes keep the mean v_i, and sum_p N_ip m |a_ip - v_i|^2 / 2 is gone there: never
-negative. The node keeps it per mass, and points take it back by their weights, which conserves it.
-On the way back points keep of v_i its mean and its moment, and m sum_i N_ip |v_i - v_p|^2 / 2, less
-what the moment holds, is gone at the point. FLIP, v -> alpha v + (1 - alpha) P v with P to the
+weight N_ip m. The nodes store the mean v_i, and lose sum_p N_ip m |a_ip - v_i|^2 / 2: never
+negative. The node stores it per mass, and points take it back by their weights, conserving it.
+On the way back points retain the mean and the moment of v_i, and m sum_i N_ip |v_i - v_p|^2 / 2,
+less what the moment holds, is gone at the point. FLIP, v -> alpha v + (1 - alpha) P v with P to the
 nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of the second.
 
 For AFLIP and its kin these are the sums with their moments, and what is left out, the energy of the
@@ -14,9 +14,9 @@ series, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2]) su
 |w_ki - S w_k|^2, q = [(m+1)/2]: each part is local, and never negative.
 
 The change dv by forces is no part of this. What forces give to velocities that points do not take
-does not strain the points either, where the strain is that of the points' velocity mapped again
+does not strain the points either, if the strain is from the points' velocity mapped again
 (musl): there is nothing to give back, and a hot point alone in its cells would heat itself by that.
-Beside the time integration, what is left is that moments are mapped a little differently after a
+Apart from time integration, the remainder is that moments are mapped a little differently after a
 move (not with splines), and that usl strains by dv, which may only cost.
 """
 
@@ -28,8 +28,8 @@ from karamelo_py.points import laws, transfers
 from karamelo_py.points.basis import support
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
-# Share of the mass at its nodes from where on a point loses its moment, to the power of dimensions:
-# of points one per cell that stand on nodes it is 0.594 with quadratic splines, and less of others.
+# Fraction of the mass at its nodes above which a point loses its moment, per dimension:
+# for one point per cell, on nodes, it is 0.594 with quadratic splines, and less for other bases.
 ALONE = 0.6
 
 
@@ -96,11 +96,11 @@ def warm(w, stencil, p, v):
 
 
 def in_company(w, stencil, p, moment):
-    """Return the part of `moment` that point `p` of a gas keeps: none where it is alone.
+    """Return the part of `moment` that point `p` of a gas retains: none if it is alone.
 
-    Nodes that nobody else sees show it what it gave them: its moment would stay for ever, driven by
+    Nodes of no other point return what it gave them: its moment would persist, driven by
     its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
-    what it does not keep heats it.
+    the rest heats it.
     """
     lost = fields.field(w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:
@@ -112,7 +112,7 @@ def in_company(w, stencil, p, moment):
 
 
 def _own_share(lost, w, stencil, mass):
-    """Return the share of a point of this mass in what its nodes have, by its weights."""
+    """Return the weighted fraction of the mass at its nodes that a point of this mass has."""
     share = mass - mass
     for i, weight, _ in nodes_of(w, stencil):
         share += weight * weight * mass / max(lost[i, 2], real(1e-36, mass))

@@ -38,7 +38,7 @@ class ExtendSeries(NamedTuple):
 
 
 class KeepLoss(NamedTuple):
-    """Energy loss of a node: kinetic energy that points brought, less that of the node."""
+    """Energy loss of a node: kinetic energy from points minus its own kinetic energy."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 
@@ -73,10 +73,10 @@ class SumsToVelocity(NamedTuple):
 class UpdateToVelocity(NamedTuple):
     """The velocity whose gradient deforms the points is v*, limited at light nodes (USL).
 
-    A point of mass m that gives a node the share N of it gets back the strain of f dt / (N m) from
-    there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes lighter
-    than `light` = d (c dt / h)^2 times the mean mass of the points that they see, weighted with
-    what these give, count as such; the limit vanishes with the step.
+    A point of mass m that gives a node the fraction N of it gets back the strain of f dt / (N m)
+    from there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes
+    lighter than `light` = d (c dt / h)^2 times the mean mass of the points that they see, weighted
+    with what these give, count as such; the limit vanishes with the step.
     """
 
     light: float
@@ -97,7 +97,7 @@ def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
 
 @at_node.on(KeepLoss)
 def _at_node_keep_loss(task, kin, nodes, n, dt):
-    """Keep per mass what the node does not have of the energy that it was brought."""
+    """Store, per mass, the energy from points that the node does not have."""
     lost, mass = field(nodes.fields, EnergyLoss), nodes.sums[n, arrays.MASS]
     if mass > 0:
         one = real(1, mass)
@@ -141,7 +141,7 @@ def _at_node_sums_to_velocity(task, kin, nodes, n, dt):
 
 
 def unlimited(seen, n, mass, light):
-    """Return the share of its change of velocity that a node shows: all where it is not light."""
+    """Return the fraction of its velocity change that a node shows: 1 unless it is light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -152,7 +152,7 @@ def unlimited(seen, n, mass, light):
 @at_node.on(UpdateToVelocity)
 def _at_node_update_to_velocity(task, kin, nodes, n, dt):
     # See UpdateToVelocity.light: the change of a light node's velocity enters the gradient by the
-    # share of its mass. Points take the whole change: momentum is kept.
+    # fraction of its mass. Points take the whole change: momentum is conserved.
     one = real(1, dt)
     share = unlimited(field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light)
     for k in range(kin.dimension):

@@ -364,7 +364,7 @@ def _clear_record(quantities, kin, nodes, n):
 
 @by_threads
 def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
-    """Sum the quantities at the nodes of a share, tile after tile, box after box."""
+    """Sum the quantities at the nodes of a part, tile after tile, box after box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts
     for part in range(first[share], first[share + 1]):

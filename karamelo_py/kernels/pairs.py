@@ -19,7 +19,7 @@ from karamelo_py.points.kinematics import zero_vector
 
 
 class TwoBodies(NamedTuple):
-    """The points of two bodies by id, those of the second (from `first2` on) behind the others."""
+    """The points of two bodies by id; the second body starts at `first2`."""
 
     x: np.ndarray  # (n, d)
     v: np.ndarray  # (n, d)
@@ -43,7 +43,7 @@ class Cells(NamedTuple):
 
 
 def cells_for(points: int) -> Cells:
-    """Make scratch for the search among so many points."""
+    """Make scratch for the search among this number of points."""
     return Cells(
         start=np.zeros(2 * points + 65, np.int64), cell=np.zeros(points, np.int64),
         order=np.zeros(points, np.int64), corner=np.zeros(3), length=np.zeros(3),
@@ -161,7 +161,7 @@ def _lay_cells(d, bodies, cells, reach):
 
 @noinline
 def _find_cells(d, bodies, cells, width):
-    """Find the cell of every point, and sort those of the second body by it, stably."""
+    """Find the cell of every point, and sort the second body's points by it, stably."""
     n, m = bodies.first2, bodies.mass.size
     used = cells.count[0] * cells.count[1] * cells.count[2]
     cells.start[: used + 1] = 0
@@ -239,7 +239,7 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total, contact):
 
 @noinline
 def _rub(law, kin, bodies, step, dt, i, contact):
-    """Find the friction on point `i`, in the place of the velocity in `contact`."""
+    """Compute the friction on point `i`, replacing the velocity in `contact`."""
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
@@ -256,7 +256,7 @@ def _rub(law, kin, bodies, step, dt, i, contact):
 
 @noinline
 def _pass_on(law, kin, bodies, reach, dt, kick, i, j, total, contact):
-    """Let a partner of point `i` take its part of the friction: that of the load."""
+    """Apply a partner's part of the friction of point `i`, in proportion to the load."""
     d = kin.dimension
     square = _push_between(law, kin, bodies, reach, dt, kick, i, j).squared()
     if square > 0:
@@ -271,7 +271,7 @@ def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
 
     Two points touch when they are closer than the sum of their radii, and closer than `reach` in
     every direction. `total` (3,) takes the force on the first body. Points have moved
-    for the time `step`; `dt` and `kick` are those of the stiffness.
+    for the time `step`; `dt` and `kick` set the stiffness.
     """
     bodies, cells = at_hand(bodies), at_hand(cells)
     d = kin.dimension

@@ -1,4 +1,4 @@
-"""A scene that several processes share: where the kernels of one call the others.
+"""A scene on several processes: where the kernels of one call the others.
 
 They call a function of Python by its address. Whatever it gets from the other processes, it leaves
 in the arrays that the kernels know.

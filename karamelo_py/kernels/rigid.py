@@ -1,4 +1,4 @@
-"""Rigid bodies on a grid that all solids share: nodes near them take their velocity.
+"""Rigid bodies on a common grid: nodes near them take their velocity.
 
 Rigid points scatter mass and momentum to separate sums (`RigidSums`), so that the nodal sums belong
 to the other solids alone, whatever the density of a rigid body. A node with rigid points takes
@@ -37,7 +37,7 @@ class RigidBodies(NamedTuple):
 def _impose(kin, nodes, rigid, dt, control, n):
     """Set the velocity of a node with rigid points; the force for that is stored in `rigid`.
 
-    Its work on the other points is that of a prescribed velocity.
+    Its work on the other points is as for a prescribed velocity.
 
     The change v* - v of the node includes that force: otherwise FLIP points never acquire the
     velocity of the body that they touch.
@@ -70,7 +70,7 @@ def _impose_on_strain(kin, nodes, rigid, n):
 
 
 def _add_forces(s, block, p):
-    """Add the force on a rigid point, and its torque about the origin, to those of its solid."""
+    """Add the force on a rigid point, and its torque about the origin, to its solid's."""
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
     grid = record(s.grids, points.grid[p])

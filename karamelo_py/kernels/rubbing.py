@@ -8,7 +8,7 @@ from karamelo_py.points.kinematics import zero_vector
 
 @kernel
 def rub_points(kin, mu, normal, load, pull, stop, grip, force):
-    """Add the friction of n points to their forces (n, d), and keep their `grip` (n, d + 2).
+    """Add the friction of n points to their forces (n, d), and update their `grip` (n, d + 2).
 
     Parameters
     ----------

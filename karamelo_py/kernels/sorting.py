@@ -28,7 +28,7 @@ class Neighbourhood(NamedTuple):
 
     top: np.ndarray  # (g, d) the last node of each grid
     per_cell: int
-    beyond: int  # nodes that are seen beyond those of a cell
+    beyond: int  # nodes seen beyond the nodes of a cell
     least: int  # points at a wall see as many nodes as others: all up to this one
     reach: float
     offset: float  # of the first node that a point sees now, see points.basis.first_node
@@ -39,7 +39,7 @@ class SortedOrder(NamedTuple):
 
     width: int  # of groups of points
     ends: np.ndarray  # (parts, T) the last row takes where the points of each tile end
-    share: np.ndarray  # (parts + 1,) takes the first tile of each share of as many points
+    share: np.ndarray  # (parts + 1,) output: the first tile of each part of as many points
     boxes: np.ndarray  # (2, T, d) takes the first and last nodes that points of each tile may see
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
     order: np.ndarray  # (n,) takes the numbers that the points had
@@ -48,7 +48,7 @@ class SortedOrder(NamedTuple):
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Find the cell of a point that lies so many cells from the corner of the grid.
+    """Find the cell of a point from its distance to the corner of the grid, in cells.
 
     Clamped, since a hook may have put a point anywhere: the next sweep finds it.
     """
@@ -89,7 +89,7 @@ def find_tiles(kin, grids, tiles, x, of, ends, tile, k):
 
 @noinline
 def _begin_tiles(found):
-    """Set where each part's points begin in each tile; share out the tiles by points."""
+    """Set where each part's points begin in each tile; divide the tiles by points."""
     ends, share, points = found.ends, found.share, found.order.size
     parts = ends.shape[0]
     place = shares = 0
@@ -118,7 +118,7 @@ def _order_parts(found, k):
 
 @shared_out
 def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
-    """Sort the points of each tile of the k-th share by the first node that they see, then by id.
+    """Sort the points of each tile of the k-th part by the first node that they see, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
     first. The order follows from where the points are, not from where they were.
@@ -169,7 +169,7 @@ def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
 
 @by_threads
 def find_rows(kin, grids, around, x, tiling, parts, k):
-    """Find `Tiling.rows` of the k-th part of the tiles in space; their points are at `x` (w, n)."""
+    """Find `Tiling.rows` of the k-th part of the tiles in 3D; their points are at `x` (w, n)."""
     grids, around, tiling = at_hand(grids), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]

@@ -23,7 +23,7 @@ from karamelo_py.points.kinematics import from_columns, zero_vector
 # --- what is affine around a point: mass, momentum, force of MLS ------------------------------
 #
 # In lanes such a quantity is brought into the order of the nodes' records once per point, not once
-# per node: half of the work of a scatter, in space two thirds.
+# per node: half of the work of a scatter, in 3D two thirds.
 
 
 @point_function(otherwise=True)
@@ -45,7 +45,7 @@ def _affine(w, stencil, value, growths):
 
 
 def _momentum(w, stencil, mass, v, moment):
-    """Return the momentum at the first node, and its growth; () where nobody knows."""
+    """Return the momentum at the first node, and its growth; () if unknown."""
     momentum = mass * v
     if not len(moment):
         return () if transfers.nodal_momentum.defined(type(w.transfer)) else (momentum, ())
@@ -86,7 +86,7 @@ def _affine_part_internal_force(quantity, w, stencil, load):
 
 
 def _beside(a, b):
-    """Put `b` behind `a` and zeros, from the fifth component on."""
+    """Append `b` to `a`, padded with zeros to four components."""
     return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
 
 
@@ -112,7 +112,7 @@ def give_affine(lanes, w, stencil, parts):
 
 
 def gathered_by_arms(w):
-    """(a,), where what a point keeps is a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
+    """(a,), if a point stores a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
     return transfers.by_arms(w.transfer, inverse_spread(w.basis, w.grid))
 
 
@@ -164,11 +164,11 @@ gathered_at_once_all = for_tags(gathered_at_once, "w, stencil, totals", each="to
 affine_parts = for_tags(affine_part, "w, stencil, loads", each="loads")
 
 
-# --- corners of domains, each in the place of a node ------------------------------------------
+# --- corners of domains, used as nodes -------------------------------------------------------
 #
 # The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight
 # or the gradient of a node once, as a factor, is therefore done with the few corners: a corner
-# shows what the nodes around it have, and shares out among them what it is given.
+# interpolates from the nodes around it, and distributes contributions to them.
 
 
 def all_by_corners(parts, w):
@@ -188,7 +188,7 @@ def all_by_corners(parts, w):
 
 
 def _seeing(basis, w):
-    """Return the work with something in the place of the basis."""
+    """Return the work with the basis replaced."""
     items = zip(w._fields, w, strict=True)
     return type(w)(*[basis if name == "basis" else item for name, item in items])
 
@@ -268,7 +268,7 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
 
 
 def _ask_ahead(tags, w, stencil):
-    """Ask the memory for records of nodes behind the last of a stencil: the others were seen."""
+    """Prefetch node records after the last of a stencil; the others were used before."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
     for array in all_records_of(tags, w.nodes):
         if array is not None:

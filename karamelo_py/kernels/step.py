@@ -130,7 +130,7 @@ _alone: Any = functools.cache(table.one_by_one)
 
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)
 PATIENCE = 50  # steps above the stable limit before a run is stopped
-SMALLEST = 1e-6  # share of the first stable step at which a run is stopped: it would never end
+SMALLEST = 1e-6  # fraction of the first stable step at which a run is stopped: it would never end
 
 
 def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:

@@ -68,7 +68,7 @@ def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surfac
 
 @noinline
 def _behind(k):
-    """Return the node that a walk comes to behind node `k` and all below it, 0 behind the last."""
+    """Return the node visited after node `k` and its subtree; 0 after the last."""
     k += 1
     while k & 1 == 0:
         k >>= 1
@@ -264,7 +264,7 @@ def _crossing_triangle(kin, surface, i, x):
         return 0
     normal = _cross(b - a, c - a)
     low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
-    # A triangle on edge has any height between its ends: there the position is beside it.
+    # A triangle seen edge-on has any height between its ends: there the position is next to it.
     height = low
     if normal[2] != 0:
         fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
@@ -371,7 +371,7 @@ def depth(shape, kin, x, reach):
 
 @point_function(otherwise=True)
 def slopes(shape, kin, x, reach, within, step):
-    """Return how the depth falls from a step before `x`, at the depth `within`, to one behind."""
+    """Return how the depth changes from a step before `x`, at depth `within`, to a step after."""
     return _slopes_across(shape, kin, x, reach, step)
 
 

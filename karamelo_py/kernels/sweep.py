@@ -5,11 +5,11 @@ A sweep over the points goes from a scene to a point in five steps:
 - `sweep` clears the nodes, goes over the points, and sums at the nodes what they gave;
 - `sweep_blocks` goes over the blocks, one for each law, in the order that other processes need;
 - `sweep_points` goes over one block, in the way of its mode: by threads, or measured;
-- `visit_shares` goes over the tiles of one share of a block: the work of one thread;
+- `visit_shares` goes over the tiles of one part of a block: the work of one thread;
 - `visit_tile` gathers, updates and scatters the points of one tile.
 
-The points of a tile give to a buffer of their own: a dense box of the nodes that they may reach.
-Then each tile of nodes sums the boxes that reach it. Threads share out tiles and need no atomics;
+The points of a tile scatter to a separate buffer: a dense box of the nodes that they may reach.
+Then each tile of nodes sums the boxes that reach it. Threads divide the tiles and need no atomics;
 sums are made in one order, whatever the number of threads.
 """
 
@@ -67,7 +67,7 @@ class Visit(NamedTuple):
 
 
 class Context(NamedTuple):
-    """The part of a `Setup` that a sweep over the points needs; its type is that of the kernel."""
+    """The part of a `Setup` that a sweep over the points needs; its type selects the kernel."""
 
     frame: Tag
     kin: Tag
@@ -97,7 +97,7 @@ class PresentWeights(NamedTuple):
 
 
 def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
-    """Return the arrays and tags of a visit to points of a block; `nodes` are those of `grid`."""
+    """Return the arrays and tags of a visit to points of a block; `nodes` belong to `grid`."""
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
         places, s.common, s.kick,
@@ -105,7 +105,7 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
 
 
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the scatter from that of the gather; of reference places it stays."""
+    """Return the stencil of the scatter from the gather's; unchanged for reference positions."""
     if isinstance(weights, OldWeights) or not w.frame.moves:
         return stencil
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
@@ -221,7 +221,7 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
 
 @by_threads
 def visit_shares(visit: Visit, s: Context, block: Block, first: int, k: int) -> None:
-    """Visit the points of the tiles of the k-th share behind the `first`, one thread's work."""
+    """Visit the points of the tiles of part `first` + k, the work of one thread."""
     share, order = block.tiling.share, block.tiling.order
     for t in range(share[first + k], share[first + k + 1]):
         visit_tile(visit, s, block, order[t])
@@ -229,7 +229,7 @@ def visit_shares(visit: Visit, s: Context, block: Block, first: int, k: int) -> 
 
 @by_threads
 def _visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number, k: int) -> None:
-    """Do `task` at the nodes of the k-th share; `ranges` as in `Setup`."""
+    """Do `task` at the nodes of the k-th part; `ranges` as in `Setup`."""
     nodes = at_hand(nodes)
     for r in range(ranges[k, 0], ranges[k, 1]):
         for n in range(ranges[r, 0], ranges[r, 1]):

@@ -4,10 +4,10 @@ A scheme names its rows once, stage by stage, as its class attribute ``rows``. F
 
 - the staged step, in which fixes act on points between the stages;
 - the fused step, with as few visits of the points as the rows allow: tasks and scatters that
-  nothing separates share a visit, and the first scatter joins the last visit of the step before;
+  nothing separates use one visit, and the first scatter joins the last visit of the step before;
 - what `karamelo-py check` says of a step, and the traffic that `karamelo-py bench` counts.
 
-Averaged volumes, XPIC, heat and contact are rows that a scene adds (`plain`).
+F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -44,7 +44,7 @@ class AtNodes(NamedTuple):
 
 
 class Gather(NamedTuple):
-    """Grid to points: a task, with the share of dt that it takes, of this step or of the last."""
+    """Grid to points: a task, with its fraction of dt, of this step or of the last."""
 
     task: NamedTuple
     share: float = 1.0
@@ -54,7 +54,7 @@ class Gather(NamedTuple):
 class Scatter(NamedTuple):
     """Points to grid: quantities, by old weights or present ones.
 
-    Present weights are those of the place after the move: of the step to come.
+    Present weights are taken at the position after the move, for the next step.
     """
 
     quantities: tuple
@@ -66,7 +66,7 @@ class NodeTask(NamedTuple):
 
     task: Any
     at: Any = None  # function of the setup: that with the nodes that are meant
-    length: Any = None  # function of the setup: that of time, where it is not `kick`
+    length: Any = None  # function of the setup: the time interval, if it is not `kick`
 
 
 class EachNode(NamedTuple):
@@ -91,7 +91,7 @@ class Once(NamedTuple):
 
 
 class ByFixes(NamedTuple):
-    """A function ``(hooks, *arguments, s)``: fixes act in a way of their own."""
+    """A function ``(hooks, *arguments, s)``: fixes act in it."""
 
     function: Any
     arguments: tuple = ()
@@ -105,7 +105,7 @@ class Repeated(NamedTuple):
 
 
 class SceneTask(NamedTuple):
-    """Rows that only some scenes have: ``rows(s)`` lists those of a scene."""
+    """Rows that only some scenes have: ``rows(s)`` lists them for a scene."""
 
     rows: Any
     says: str | None = None
@@ -153,7 +153,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of one visit; what strains is told of what comes before it.
+    """List the tasks of one visit; strains depend on the tasks before them.
 
     Strain behind a move knows what that gathered. By the velocity of the last step, points are
     strained where that has led them.
@@ -208,7 +208,7 @@ def staged(rows: Iterable[Any]) -> list[Any]:
 
 
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
-    """List the rows of a part of a step, each a visit of its own, or a part of one of `loops`."""
+    """List the rows of a part of a step, each a separate visit, or a part of one of `loops`."""
 
     def loop_of(own: Visit) -> Visit:
         """Find the one of `loops` with such tasks, or such quantities; else the visit itself."""
@@ -240,7 +240,7 @@ def says(row: Any, setup: Any) -> str | None:
 
 
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
-    """List the rows of a scene with all it adds: averaged volumes belong to visits that strain."""
+    """List the rows of a scene with all it adds: F-bar belongs to visits that strain."""
     for row in rows:
         if isinstance(row, SceneTask):
             yield from plain(row.rows(s), s)
@@ -298,7 +298,7 @@ def hold_axis(s: Setup) -> tuple:
 
 
 def sum_series(s: Setup) -> tuple:
-    """Put the new velocity of XPIC in the place of the change of velocity; others need nothing."""
+    """Replace the change of velocity by XPIC's new velocity; others need nothing."""
     if not isinstance(s.transfer, XPIC):
         return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
@@ -322,7 +322,7 @@ def average_volumes(row: Sweep) -> tuple:
 
 
 def average_stress(s: Setup) -> tuple:
-    """Put the averaged mean stress in the place of the points' own, with F-bar."""
+    """Replace the points' mean stress by the averaged one, with F-bar."""
     if not isinstance(s.averaging, FBar):
         return ()
     visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
@@ -337,10 +337,10 @@ def at_nodes_with(kind: type, task: Tag) -> Any:
 def light_node(s):
     """Return the mass below which USL limits gradients: d (c dt / h)^2 of a point that a node sees.
 
-    Less than one: a share below m / m_p would be less than what comes back to the node through the
-    points' velocities, and the strain of the node would run ahead of its stress. None in the total
-    frame where points have moments: what comes back through these is all of the node's velocity,
-    and any limit makes it grow. The step knows such nodes there.
+    Less than one: a fraction below m / m_p would be less than what comes back to the node through
+    the points' velocities, and the strain of the node would run ahead of its stress. None in the
+    total frame where points have moments: what comes back through these is all of the node's
+    velocity, and any limit makes it grow. The step knows such nodes there.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
@@ -357,7 +357,7 @@ HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperatur
 FRICTION = SceneTask(at_nodes_with(FrictionalHeat, nodes.ClearFrictionalHeat()))
 LOSS = SceneTask(
     at_nodes_with(EnergyLoss, nodes.KeepLoss()),
-    "kinetic energy that the nodes do not keep, as heat to the points",
+    "kinetic energy that the nodes lose, as heat to the points",
 )
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
 CONTACT = SceneTask(lambda s: s.contact.rows, "contact of v*")

@@ -1,11 +1,11 @@
 """Tables of numbers as text, the same bytes as ``"%.9g" % x`` and ``"%d" % n``, compiled.
 
-The nine digits of x are those of x 10^k, rounded. The product is taken with twice the digits of a
-double: it is exact where 10^k is (0 <= k <= 22), and elsewhere so close that only what lies within
-`DOUBT` of a tie cannot be told. Such a number is left to Python, and so are those near the ends of
-the range of doubles. Where nothing is compiled, or bytes are in the other order, all are.
+The nine digits of x are the digits of x 10^k, rounded. The product is taken with twice the digits
+of a double: it is exact where 10^k is (0 <= k <= 22), and elsewhere so close that only what lies
+within `DOUBT` of a tie cannot be told. Such a number is left to Python, and so are those near the
+ends of the range of doubles. Where nothing is compiled, or bytes are in the other order, all are.
 
-Digits are written eight at a time, with what stands behind them overwritten later: branches that
+Digits are written eight at a time; surplus ones are overwritten later: branches that
 cannot be foreseen cost more than bytes.
 """
 
@@ -89,7 +89,7 @@ def write_rows(numbers, integers, is_integer, start, text, at):
     start
         Index of the first number to write, counted along the rows.
     text : bytes
-        Has at least `NUMBER_BYTES` for each number; the text goes on at `at`.
+        Has at least `NUMBER_BYTES` for each number; the text continues at `at`.
 
     Returns
     -------

@@ -24,7 +24,7 @@ COARSE, FINE = 1e-200, 1e200  # largest terms that are added up as whole numbers
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # bits without the sign, which are in the order of the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# Rows of the totals: those of the published values have their slots, of which time, timestep and dt
+# Rows of the totals: published values use their slots, of which time, timestep and dt
 # are no sums.
 KINETIC, STORED, WORK = 0, 1, 2
 
@@ -112,7 +112,7 @@ def add_many(totals, row, terms, count):
 
 @noinline
 def hand_over(own, totals, row):
-    """Add what a thread's own totals have in a row to those of all, and leave zeros."""
+    """Add a row of a thread's totals to the common totals, and zero it."""
     for k in range(LIMBS):
         if own[row, k] != 0:
             add_among(totals, row, k, own[row, k])
@@ -204,7 +204,7 @@ def take_over(ranks, due):
 
 
 def publish(control, slot, count):
-    """Set the published values from `slot` on to those of their totals."""
+    """Set the published values from `slot` on to their totals."""
     collect(control.ranks, control, slot, count)
     for k in range(count):
         control.values[slot + k] = control.answer[k]

@@ -20,7 +20,7 @@ from karamelo_py.kernels.visit import volume_of
 from karamelo_py.points.bodies import along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
-SOFT = 0.1  # share of a penetration that a step undoes where it stops the approach, too
+SOFT = 0.1  # fraction of a penetration that a step removes while it stops the approach
 ASIDE = 0.05  # of the reach: where depths are compared
 LEVEL = 1e-3  # of that: a depth that changes by less falls nowhere
 CALL = types.int64(types.int64)
@@ -36,7 +36,7 @@ class Touch(NamedTuple):
     shape: NamedTuple
     mu: float
     reach: float  # from where on a depth is not known
-    lost: int  # address of the function that is told the number of a point without a way out
+    lost: int  # address of the function called with the number of a point without a way out
 
     of_nodes = False
     of_time = True  # its formulas are that, and it sees them at the end of the step, too

@@ -59,7 +59,7 @@ def node_of(w: Work, stencil: tuple, k: int) -> tuple:
 
 
 def straining_node(w: Work, stencil: tuple, k: int) -> tuple:
-    """Return the same, with its weight in strains and forces in the place of the gradient."""
+    """Return the same, with its weight in strains and forces instead of the gradient."""
     i, N, grad_N = node_of(w, stencil, k)
     return i, N, gradient_weight(w.transfer, w.basis, w.kin, w.grid, stencil, k, grad_N)
 
@@ -97,9 +97,9 @@ def deformed_state(w: Work, p: Index) -> tuple:
 
 
 def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
-    """Ask the memory for the data of the next points, in space.
+    """Prefetch the data of the next points, in 3D.
 
-    Those that keep moments of velocity are visited once per step, with all they have: that is more
+    Points with moments of velocity are visited once per step, with all their data: more
     arrays side by side than a processor sees the pattern of. So is what the update of a stretch of
     points needs (`apart`), while it gathers.
     """
@@ -163,7 +163,7 @@ class VolumeRatio(StepField):
 
 
 class NodalMean(SummedField):
-    """Sum of weight times value, and of weights, at a node; then the mean in place of the first.
+    """Sum weight times value, and weights, at a node; then replace the first by the mean.
 
     Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
     """
@@ -196,7 +196,7 @@ class FBar(NamedTuple):
 
     With d_p the rate of volume of a point and V_p its volume, the average is
     sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with volumes it is its own adjoint: the
-    mean stress averaged alike makes the forces whose power is that of the averaged strain.
+    mean stress averaged alike gives forces whose power equals the averaged strain's.
     """
 
     in_lanes = True

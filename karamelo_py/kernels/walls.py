@@ -13,7 +13,7 @@ from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts
 
-FRICTION = 3  # the program of the coefficient, after those of the components
+FRICTION = 3  # the program of the coefficient, after the components' programs
 
 
 @noinline

@@ -72,7 +72,7 @@ def energies_of(kin, points, laws, p):
 
 @shared_out
 def _look_at_shares(kin, points, laws, tiling, firsts, k):
-    """Sum energies, mass and momentum of points of each tile of the k-th share, for its report."""
+    """Sum energies, mass and momentum of points of each tile of the k-th part, for its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
