@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import look, pictures
+from karamelo_py.app.studies.chart import in_html
 from karamelo_py.app.studies.curves import Family, Table, order
 from karamelo_py.output.plots import blank_figure, tick_texts, tidy
 
@@ -385,6 +386,12 @@ def test_numbers_of_an_axis_have_one_style(ticks, said):
     assert axes.xaxis.get_major_formatter().format_ticks(positive) == tick_texts(positive)
 
 
+def test_numbers_of_an_axis_on_a_page():
+    said = ["2·10<sup>-7</sup>", "10<sup>-3</sup>", "0", "-1.5·10<sup>5</sup>"]
+    assert tick_texts([2e-7, 1e-3, 0, -1.5e5], in_html) == said
+    assert tick_texts([5e-4, 20.0], in_html) == ["0.0005", "20"]
+
+
 def lucky_rows():
     """Order 1 of two choices; the errors of one change their sign at N = 40 and grow again."""
     return [
@@ -486,6 +493,43 @@ def test_titles_have_the_units_of_the_script(tmp_path):
         "time of the stepping loop (s)",
     ]  # fmt: skip
     assert Table([], []).label("wall_s") == "time of the process (s)"
+
+
+def test_a_page_needs_nothing_else(table):
+    pytest.importorskip("plotly")
+    from PIL import Image
+
+    folder = table / "sweep" / "N=10,basis=linear"
+    folder.mkdir(parents=True)
+    Image.new("RGB", (900, 300), "red").save(folder / "plot.png")
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.html"]) == 0
+    page = (table / "chart.html").read_text(encoding="utf-8")
+    assert not re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"?http", page)
+    runs = json.loads(re.search(r"const runs = (\[.*?\]), aside", page, re.S)[1])
+    assert len(runs) == 12 and runs[0]["command"] == "karamelo-py in.x -var N 10 -var basis linear"
+    assert runs[0]["picture"].startswith("data:image/png;base64,") and not runs[1]["picture"]
+    assert "point 3 &lt;leaves&gt;" in page and "<leaves>" not in page.split("const runs")[0]
+
+
+def test_a_page_without_plotly_is_refused_before_the_table(table, monkeypatch, capsys):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-o", "chart.html"]) == 1
+    said = capsys.readouterr()
+    assert not said.out and "a page needs the package plotly" in said.err
+    assert "pip install '.[studies]'" in said.err
+
+
+def test_a_page_comes_to_life_in_a_browser(table, browser):
+    """A chart of all runs with a value, and the facts of one; those of another after a click."""
+    assert main(["chart", "sweep.csv", "-accuracy", "err", "-by", "basis", "-o", "page.html"]) == 0
+    front = Family(Table(rows(), ["N", "basis"]), "err", "seconds").front()
+    page = browser.new_page()
+    page.goto((table / "page.html").as_uri())
+    page.get_by_role("heading", name="N = 80, basis = cubic-spline").wait_for()
+    # 11 runs have a value; those of them that none beats are in the band as well.
+    assert page.locator("path.point").count() == 11 + len(front)
+    page.get_by_role("link", name="N = 80, basis = linear").click()
+    page.get_by_role("heading", name="N = 80, basis = linear").wait_for()
 
 
 @pytest.mark.parametrize(

@@ -133,10 +133,10 @@ def in_mathtext(lead: str, exponent: int) -> str:
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
-def tick_texts(numbers: Sequence[float]) -> list[str]:
+def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
     """Format the numbers of one axis consistently: 0.02, 500, or 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
-    return [f"{a:g}" if plain or a == 0 else in_mathtext(*_parts(a)) for a in numbers]
+    return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 
 
 def _parts(a: float) -> tuple[str, int]:

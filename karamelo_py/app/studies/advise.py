@@ -40,7 +40,7 @@ from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
-Runs the small members of a family, fits how error and cost go on, and says which variant meets a
+Runs the small members of a family, extrapolates error and cost, and says which variant meets a
 target at the least cost, how sure that is, and what to write.
 
   karamelo-py advise in.file -var N=10,20,40,80,160 -var basis=linear,cubic-spline \\
@@ -77,8 +77,8 @@ def forecast(
 ) -> Forecast | None:  # fmt: skip
     """Expect a run at `x` from the runs at `xs`, coarse ones first.
 
-    The error goes on with the order between the last two. Its bounds are those of the least and the
-    largest order so far, at least a third of the expected order above and half of it below; an
+    The error continues with the order between the last two. Its bounds follow from the least and
+    the largest order so far, at least a third of the expected order above and half of it below; an
     order that has fallen may fall by as much again, and one that has not yet reached 2 may. Errors
     that chance has made small count as large as they may be (`credible`, with the order `highest`
     of the functions). The time is steps times (a + b points), fitted to the runs; any other cost

@@ -1,4 +1,4 @@
-"""One run of a study: a process of its own in a folder of its own, and what is read from it."""
+"""One run of a study: a separate process in a separate folder, and the facts read from it."""
 
 import hashlib
 import json
@@ -54,7 +54,7 @@ class CaseOutcome:
         return said_in(self.folder / "err.txt")
 
 
-# What is measured of every run beside the log, with titles of axes.
+# Measured for every run, in addition to the log; with titles of axes.
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
     "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
@@ -144,7 +144,7 @@ class Launch:
         )
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
-        """Run a case and keep what became of it."""
+        """Run a case and store its outcome."""
         with reported(folder):
             folder.mkdir(parents=True, exist_ok=True)
             (folder / KEPT).unlink(missing_ok=True)

@@ -1,17 +1,25 @@
 """karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
 
+import base64
+import html
+import io
+import json
 from argparse import ArgumentParser
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from string import Template
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.app.live.server import require_plotly
 from karamelo_py.app.studies import keeping, look, pictures, records, results
-from karamelo_py.app.studies.curves import Family, Table, order, require
+from karamelo_py.app.studies.case import command_of, worded
+from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
 from karamelo_py.output.files import read_json, write_whole
+from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
@@ -21,10 +29,12 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -cost seconds -by basis,transfer -o chart.png
   karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
   karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
+  karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
   karamelo-py chart sweep.csv -y runout -x a -law "1.2*a" -data seen.csv -o runout.png   a result
   karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
   karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?
   karamelo-py chart a.csv b.csv -accuracy err -versus digits -o d.png  two values, scene by scene"""
+SUFFIXES = (*pictures.SUFFIXES, ".html")
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -64,7 +74,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="log of -curve (log.mpm)")
     parser.add_argument("-where", action="append", default=[], help="draw only these rows")
     parser.add_argument("-title", help="title (the name of the script)")
-    parser.add_argument("-o", type=Path, help="the picture: " + ", ".join(pictures.SUFFIXES))
+    parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
 
 
 def run(options: Any) -> int:
@@ -94,7 +104,9 @@ def run(options: Any) -> int:
     family = Family(table, options.accuracy, options.cost, by, options.x)
     if len(family.without) == len(table.rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
-    out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
+    out = out_file(options.o, *SUFFIXES) if options.o else None
+    if out is not None and out.suffix.lower() == ".html":
+        require_plotly()
     title = table.script if options.title is None else options.title
     axes = names(options.heat or "")
     require("-heat", axes, table.variables)
@@ -107,6 +119,10 @@ def run(options: Any) -> int:
     # First the picture: who reads the table may close the pipe.
     if out is None:
         pass
+    elif out.suffix.lower() == ".html":
+        if axes:
+            raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
+        write_page(family, out, words, title or "runs")
     elif axes:
         pictures.heat(family, *axes, out, words, title)
     else:
@@ -123,7 +139,7 @@ def read(path: Path, where: Sequence[str]) -> Table:
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
             f"{path} does not say which columns are variables",
-            expected=f"{path.with_suffix('.json')}, which sweep writes beside it",
+            expected=f"{path.with_suffix('.json')}, which sweep writes next to it",
         )
     variables = list(made.get("variables") or list(rows[0])[: list(rows[0]).index("seconds")])
     words = {row[name] for row in rows for name in variables}
@@ -135,7 +151,7 @@ def read(path: Path, where: Sequence[str]) -> Table:
 
 
 def side_by_side(options: Any) -> int:
-    """Draw two values of a variable beside each other, for the scenes of all tables."""
+    """Draw two values of a variable side by side, for the scenes of all tables."""
     if not options.accuracy:
         raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
     out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
@@ -246,3 +262,133 @@ def tell(family: Family, *, costs: bool) -> None:
             "note: these runs went side by side, their times disturb each other; "
             "sweep -time measures"
         )
+
+
+# ---- one page (HTML) that needs no server: a point shows its run --------------------------------
+
+_WIDEST = 480  # pixels of a picture in the page
+_MOST = 60  # pictures in a page
+
+
+def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -> None:
+    """Write the page with Plotly; `words` label the axes."""
+    from plotly import graph_objects
+    from plotly import io as plotly_io
+
+    rows = family.table.rows
+    number_of = {id(row): k for k, row in enumerate(rows)}
+    figure = graph_objects.Figure()
+    front = family.front()
+    if not family.convergence:
+        cost, error = column(front, family.cost), sizes(front, family.accuracy)
+        figure.add_scatter(
+            x=cost, y=error, mode="lines+markers", name="Pareto front", hoverinfo="skip",
+            line={"shape": "hv", "width": 8, "color": "#cccccc"},
+            marker={"size": 18, "color": "#cccccc"},
+        )  # fmt: skip
+    styles = look.styles([line.choice for line in family.lines])
+    for line, (colour, marker, dash) in zip(family.lines, styles, strict=True):
+        shown = np.flatnonzero(line.shown).tolist()
+        figure.add_scatter(
+            x=line.across[shown], y=line.error[shown], mode="lines+markers", name=line.label,
+            customdata=[number_of[id(line.rows[k])] for k in shown],
+            text=[_said(line.rows[k], family) for k in shown],
+            hovertemplate="%{text}<br>%{y:.4g} at %{x:.4g}<extra></extra>",
+            line={"color": colour, "dash": look.PLOTLY_DASHES[dash], "width": 2},
+            marker={
+                "symbol": [
+                    look.PLOTLY_MARKERS[marker] + "-open" * bool(line.chance[k]) for k in shown
+                ], "size": 10,
+            },
+        )  # fmt: skip
+    usual = {
+        "showgrid": True, "gridcolor": "#e6e6e6", "exponentformat": "power",
+        "linecolor": "#444", "ticks": "outside",
+    }  # fmt: skip
+    figure.update_layout(
+        template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
+        xaxis={**usual, "title": words[0], "type": "linear" if family.linear else "log"},
+        yaxis={**usual, "title": words[1], "type": "log"},
+        legend={"orientation": "h", "y": -0.15},
+    )  # fmt: skip
+    for axis, numbers in (("xaxis", "across"), ("yaxis", "error"))[family.linear :]:
+        drawn = np.concatenate([getattr(line, numbers)[line.shown] for line in family.lines])
+        ticks = look.log_ticks(*(drawn.min(), drawn.max()) if len(drawn) else (1.0, 10.0))
+        if 2 <= len(ticks) <= 14:
+            figure.layout[axis].tickvals = ticks
+            figure.layout[axis].ticktext = tick_texts(ticks, in_html)
+    if family.words:
+        figure.update_xaxes(tickvals=[*range(len(family.words))], ticktext=family.words)
+    runs = [_about(row, family, family.table.path.parent, k) for k, row in enumerate(rows)]
+    text = json.dumps(runs).replace("<", "\\u003c")
+    first = number_of[id(front[-1])] if front else 0
+    chart = plotly_io.to_html(
+        figure, include_plotlyjs=True, full_html=False, div_id="chart",
+        default_height="100%", config={"displaylogo": False, "responsive": True},
+    )  # fmt: skip
+    made = family.table.made
+    versions = ", ".join(f"{n} {v}" for n, v in made.get("versions", {}).items())
+    threads = f"{made['threads']} threads" if "threads" in made else None
+    about = filter(None, [made.get("processor"), threads, versions, made.get("date")])
+    template = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
+    page = template.substitute(
+        title=html.escape(title), chart=chart, failures=_failures(family, number_of),
+        footer=html.escape("; ".join(about)), runs=text, first=first,
+    )  # fmt: skip
+    write_whole(path, page)
+
+
+def in_html(lead: str, exponent: int) -> str:
+    """Write a number times a power of ten for a page; no lead is 1."""
+    return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
+
+
+def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:
+    return {name: row[name] for name in family.table.variables}
+
+
+def _said(row: Mapping[str, str], family: Family) -> str:
+    return html.escape(worded(_values(row, family)))
+
+
+def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict[str, Any]:
+    script = family.table.made.get("script", "SCRIPT")
+    values = _values(row, family)
+    skipped = {*values, "status", "reason", "folder"}
+    return {
+        "title": worded(values),
+        "command": command_of(script, values),
+        "status": row.get("status", ""),
+        "reason": row.get("reason", ""),
+        "numbers": [[n, v] for n, v in row.items() if n not in skipped and v],
+        "picture": _picture(folder / row["folder"]) if k < _MOST and row.get("folder") else None,
+    }
+
+
+def _picture(folder: Path) -> str | None:
+    """Read the newest picture of a run, small enough for a page, as a data URL."""
+    pictures = sorted(folder.glob("*.png"), key=lambda p: p.stat().st_mtime)
+    if not pictures:
+        return None
+    from PIL import Image
+
+    try:
+        with Image.open(pictures[-1]) as image:
+            small = image.convert("RGB")
+            small.thumbnail((_WIDEST, _WIDEST))
+            out = io.BytesIO()
+            small.save(out, "PNG", optimize=True)
+    except OSError:
+        return None
+    return "data:image/png;base64," + base64.b64encode(out.getvalue()).decode()
+
+
+def _failures(family: Family, number_of: Mapping[int, int]) -> str:
+    if not family.without:
+        return ""
+    items = ""
+    for row in family.without:
+        why = html.escape(row.get("reason") or row.get("status", ""))
+        link = f'<a href="#" data-run="{number_of[id(row)]}">{_said(row, family)}</a>'
+        items += f"<li>{link}: {why}</li>"
+    return f"<h2>Without a value</h2><ul>{items}</ul>"

@@ -115,7 +115,7 @@ def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.
 
 
 def usable(a: float | None) -> bool:
-    """Tell whether a number can stand on a logarithmic axis."""
+    """Tell whether a number has a place on a logarithmic axis."""
     return a is not None and 0 < a < inf
 
 

@@ -86,7 +86,7 @@ def _general(note: Mapping[str, str]) -> str:
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Write runs as Markdown: a row for each value of the variables `by`, columns for the others.
 
-    What runs said stands below, by the numbers in brackets. Variables that go in step with those of
+    The messages of runs follow, by the numbers in brackets. Variables that go in step with those of
     the rows are left out. Also names the runs that go wrong silently.
     """
     rows = table.rows

@@ -11,7 +11,7 @@ from karamelo_py.app.studies.case import COLUMNS
 from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.terms import number_of
 
-# After Okabe & Ito, for eyes that see colours differently; each has a marker of its own, so that a
+# After Okabe & Ito, for eyes that see colours differently; each has its marker, so that a
 # chart printed in grey can still be read.
 PALETTE = (
     "#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a",
@@ -20,6 +20,11 @@ PALETTE = (
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 DASHES = (
     "-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (9, 3)), (0, (3, 1, 1, 1, 1, 1)),
+)  # fmt: skip
+PLOTLY_DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
+PLOTLY_MARKERS = (
+    "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
+    "triangle-left", "triangle-right",
 )  # fmt: skip
 NEAR = 0.02  # share of the axes within which ends of lines are at one place
 PART = 0.105  # of a logarithmic axis, that a number of six digits covers
@@ -32,7 +37,7 @@ FAMILIES = (
 
 
 def known(word: str) -> bool:
-    """Tell whether a word has a colour and marker of its own."""
+    """Tell whether a word has a fixed colour and marker."""
     return any(word in family for family in FAMILIES)
 
 
@@ -195,7 +200,7 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names of lines beside the axes, by x and y of their ends, names and colours.
+    """Write names of lines next to the axes, by x and y of their ends, names and colours.
 
     Lines of a colour that end at one place share a name: "linear, usf / usavg".
     """

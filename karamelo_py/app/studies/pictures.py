@@ -1,4 +1,4 @@
-"""Charts of studies as pictures (PNG, SVG, PDF), by Matplotlib; `words` stand along their axes."""
+"""Charts of studies as pictures (PNG, SVG, PDF), by Matplotlib; `words` label their axes."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -244,7 +244,7 @@ def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
 def draw_histories(
     found: Sequence[History], path: Path, words: Sequence[str], title: str, exact: History | None
 ) -> None:
-    """Draw curves with their names beside them; a cross where a run was stopped."""
+    """Draw curves with their names at their ends; a cross where a run was stopped."""
     figure = blank_figure(7.2, 4.0)
     axes = figure.subplots()
     ys = np.concatenate([each.y for each in found])

@@ -1,4 +1,4 @@
-"""The table of a study: one row per run, as CSV, and what it was made with beside it."""
+"""The table of a study: one row per run, as CSV, and next to it a file about its origin."""
 
 import csv
 import io
@@ -71,7 +71,7 @@ class Reduction:
 class Recorded:
     """Take a number from a log: ``err`` (the last value of that column), ``max:err``, ...
 
-    ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers under a name of its own, in the
+    ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers with a name, in the
     language of scripts; it knows the variables of the study as well. What is abs(...) as a whole
     is recorded with its sign, too: `signed`.
     """
@@ -148,7 +148,7 @@ def _is_closed(text: str) -> bool:
 
 
 def _apart(text: str) -> list[str]:
-    """Part words at commas that stand in no parentheses."""
+    """Split words at commas outside parentheses."""
     words, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")

@@ -32,7 +32,7 @@ the domain, which tells nothing of the step), short (too few steps to see whethe
 failed, with the reason. A mistake of the script
 ends the study. Edges are searched by halves, from coarse to fine: cells between like ones are not
 run, and "run 7 of at most 400" is one of about 100. Rows of words (basis, transfer, scheme) are
-searched one by one. The table is written beside the picture (map.csv), and says which cells were
+searched one by one. The table is written next to the picture (map.csv), and says which cells were
 run; -var with one value is passed on. Where nothing grows and no run fails, -accuracy shades by
 errors.
 
@@ -50,7 +50,7 @@ LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program looks often enough at energies
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps, from which on slow growth is told
 FIRST = 0.1  # of the rows of a log: energies are means over so many
-FEW = 9  # values of a variable that stand at the axis one by one
+FEW = 9  # values of a variable that all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
     "short": "#e4e4e4", "failed": "#7d2a3a",
@@ -96,7 +96,7 @@ def run(options: Any) -> int:
     leaders = {name: group[0] for group in together for name in group}
     axes = [n for n in values if len(values[n]) > 1 and leaders.get(n, n) == n]
     worded = [name for name in axes if any(number_of(value) is None for value in values[name])]
-    axes.sort(key=worded.__contains__)  # words stand along the second
+    axes.sort(key=worded.__contains__)  # words go along the second
     if not 1 <= len(axes) <= 2:
         raise ScriptError(
             f"{len(axes)} variables have several values",
@@ -145,7 +145,7 @@ def run(options: Any) -> int:
 def growth(energy: np.ndarray) -> float:
     """Find the largest mean of an energy over that of its first tenth; infinite for NaN.
 
-    Means are over a tenth of the rows. From rest the median stands for the beginning.
+    Means are over a tenth of the rows. From rest the median replaces the first mean.
     """
     if not len(energy):
         return 0.0
@@ -191,7 +191,7 @@ class Map:
         self.leaders = leaders or {}
         self.study, self.values, self.axes = study, values, axes
         self.energy, self.bound, self.error = energy, bound, error
-        # Words stand side by side.
+        # Words are placed side by side.
         self.words = [
             [] if all(number_of(v) is not None for v in values[name]) else values[name]
             for name in axes
@@ -292,7 +292,7 @@ class Map:
     def line(self, step: str) -> list[float | None]:
         """Find in each row where the first step is that of this column; None where none is.
 
-        Beyond the runs of a row the ratio of the steps goes on as a power of the first variable.
+        Beyond the runs of a row the ratio of the steps continues as a power of the first variable.
         Rows of numbers with fewer than two runs lie between their neighbours.
         """
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]

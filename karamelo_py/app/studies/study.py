@@ -31,10 +31,10 @@ Runs a script with every combination of values of its variables, and writes one 
 
   karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
 
-Each run has a folder of its own, named after its values, in a folder named after the table. A run
+Each run has a separate folder, named after its values, in a folder named after the table. A run
 that fails is recorded with its reason and stops nothing; where none is done, the exit status is 1.
-An interrupted sweep goes on where it stopped when the same command is given again. Processor,
-threads and versions are written beside the table (sweep.json)."""
+An interrupted sweep continues where it stopped when the same command is given again. Processor,
+threads and versions are written next to the table (sweep.json)."""
 _FACTS = ("seconds", "points", "steps")
 _STATUS = 24  # characters at least, for what became of a run, while there are facts
 
@@ -69,14 +69,14 @@ class Study:
         return tuple(case.values()) in self.rows or bool(kept)
 
     def describe(self, **said: Any) -> None:
-        """Write beside the table what it is made with."""
+        """Write next to the table how it is made."""
         how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
         text = json.dumps({"script": str(self.launch.script), **said, **how}, indent=1) + "\n"
         self.claim_folder()
         write_whole(self.out.with_suffix(".json"), text)
 
     def claim_folder(self) -> None:
-        """Keep another study from the folder of the runs; ScriptError where one is at work."""
+        """Lock the folder of the runs; ScriptError if another study has locked it."""
         if self.folder.exists() and not self.folder.is_dir():
             expected = "a free name for the folder of the runs"
             raise ScriptError(f"{self.folder} is a file", expected=expected)

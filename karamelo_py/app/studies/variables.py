@@ -260,7 +260,7 @@ def add_axes(parser: Any) -> None:
     parser.add_argument(
         "-axes",
         metavar="X,Y",
-        help="labels of the axes: 'time (s),F (N)'; an empty label keeps the usual one, a label "
+        help="labels of the axes: 'time (s),F (N)'; an empty label leaves the usual one, a label "
         "with commas needs double quotes",
     )
 
@@ -274,7 +274,7 @@ def along(options: Any, x: str, y: str) -> tuple[str, str]:
 
 
 def split(text: str) -> list[str]:
-    """Part words at commas; one in double quotes may have commas of its own."""
+    """Part words at commas; one in double quotes may contain commas."""
     return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
