@@ -1,0 +1,246 @@
+"""Materials orthotropic and transverse: elasticity with directions, for wood, plies and slate."""
+
+from collections import namedtuple
+from itertools import combinations_with_replacement
+from math import cos, radians, sin
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.language.rules import known_failure
+from karamelo_py.language.signature import Positive
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import I, inner, total
+from karamelo_py.points.laws import LawTraits
+from karamelo_py.points.laws.elastic import OfDeformation
+from karamelo_py.script.errors import ScriptError
+
+# Components of symmetric tensors in the order of Voigt's notation.
+VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
+INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of a component in it
+PAIRS = tuple(combinations_with_replacement(range(6), 2))
+# Where the law stores the stiffness of two components.
+STIFFNESS = tuple(
+    tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)
+)
+COUPLED = 1e-9  # of the largest stiffness: shear out of the plane
+
+_Fields = namedtuple(
+    "_Fields", ("specific_volume", "fastest", *(f"c{a + 1}{b + 1}" for a, b in PAIRS))
+)
+
+
+class Directional(OfDeformation, _Fields):
+    """Law of a linear stiffness in the reference frame."""
+
+    __slots__ = ()
+    in_lanes = True
+    traits = LawTraits(rebounds=True)
+
+
+class Orthotropic(NamedTuple):
+    """Elastic solid with three perpendicular directions, for small strains.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    E1, E2, E3
+        Young's moduli along the three axes of the material.
+    nu12, nu13, nu23
+        Poisson's ratios: nu12 is the contraction along 2 over the stretch along 1.
+    G12, G13, G23
+        Shear moduli.
+    angle, tilt, spin
+        Rotation of the axes in degrees: by `angle` about z, by `tilt` about the new axis 1, and by
+        `spin` about the new axis 3. Without them, axes 1, 2 and 3 are x, y and z.
+
+    Example
+    -------
+    material(spruce, orthotropic, 450, 11e9, 0.6e9, 0.9e9, 0.4, 0.4, 0.3, 0.7e9, 0.6e9, 0.07e9)
+    material(ply, orthotropic, 1600, 140e9, 9e9, 9e9, 0.3, 0.3, 0.4, 5e9, 5e9, 3e9, 30)
+
+    Notes
+    -----
+    The second Piola-Kirchhoff stress is linear in the Green-Lagrange strain, S = C:E, with the
+    stiffness C of Lekhnitskii (1963, section 5). The axes belong to the undeformed body and rotate
+    with it. In axisymmetry, x, y and z are the directions of the radius, of the axis, and around
+    it. In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0): else the body would also shear
+    out of its plane.
+
+    See Also
+    --------
+    transverse, saint-venant-kirchhoff, plane_stress
+    """
+
+    rho: Annotated[float, Positive]
+    E1: Annotated[float, Positive]
+    E2: Annotated[float, Positive]
+    E3: Annotated[float, Positive]
+    nu12: float
+    nu13: float
+    nu23: float
+    G12: Annotated[float, Positive]
+    G13: Annotated[float, Positive]
+    G23: Annotated[float, Positive]
+    angle: float = 0.0
+    tilt: float = 0.0
+    spin: float = 0.0
+
+    def checked(self):
+        """Return the law; refuse constants with which some strain would release energy."""
+        moduli = (self.E1, self.E2, self.E3, self.G23, self.G13, self.G12)
+        compliance = np.diag([1 / modulus for modulus in moduli])
+        compliance[0, 1] = compliance[1, 0] = -self.nu12 / self.E1
+        compliance[0, 2] = compliance[2, 0] = -self.nu13 / self.E1
+        compliance[1, 2] = compliance[2, 1] = -self.nu23 / self.E2
+        least = np.linalg.eigvalsh(compliance[:3, :3] * min(moduli[:3])).min()
+        if not least > 1e-9:
+            raise ScriptError(
+                "with these Poisson's ratios some strain would release energy",
+                argument="nu12",
+                expected="nu12^2 < E1/E2, nu13^2 < E1/E3 and nu23^2 < E2/E3, with a margin",
+                hint="nu12 = nu21 E1/E2: the ratio is that of a pull along the first axis",
+            )
+        C = rotated(np.linalg.inv(compliance), axes(self.angle, self.tilt, self.spin))
+        numbers = [C[VOIGT[a] + VOIGT[b]] for a, b in PAIRS]
+        return Directional(1 / self.rho, fastest(C), *map(float, numbers))
+
+
+class Transverse(NamedTuple):
+    """Elastic solid with one direction: bedded rock, fibres in one direction, for small strains.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    E, nu
+        Young's modulus and Poisson's ratio in the plane across the direction.
+    E3, nu3
+        Young's modulus along the direction, and the contraction across over the stretch along it.
+    G3
+        Shear modulus of planes with the direction.
+    angle, tilt
+        Rotation of the direction in degrees. It is z without them; `tilt` turns it about x, then
+        `angle` about z. The normal of bedding that dips by 30 degrees in the plane xy has
+        angle 30 and tilt 90.
+
+    Example
+    -------
+    material(slate, transverse, 2700, 60e9, 0.25, 30e9, 0.15, 15e9, 30, 90)
+
+    Notes
+    -----
+    An orthotropic law with axis 3 along the direction and equal axes 1 and 2.
+
+    See Also
+    --------
+    orthotropic, linear
+    """
+
+    rho: Annotated[float, Positive]
+    E: Annotated[float, Positive]
+    nu: float
+    E3: Annotated[float, Positive]
+    nu3: float
+    G3: Annotated[float, Positive]
+    angle: float = 0.0
+    tilt: float = 0.0
+
+    def checked(self):
+        """Return the orthotropic law with equal axes 1 and 2."""
+        if not -1 < self.nu < 1 or not self.nu3**2 < self.E3 / self.E * (1 - self.nu) / 2:
+            raise ScriptError(
+                "with these Poisson's ratios some strain would release energy",
+                argument="nu3",
+                expected="nu above -1 and below 1, and nu3^2 < E3/E (1 - nu)/2",
+            )
+        across = self.nu3 * self.E / self.E3  # contraction along 3 over the stretch across
+        shear = 0.5 * self.E / (1 + self.nu), self.G3, self.G3
+        moduli, ratios = (self.E, self.E, self.E3), (self.nu, across, across)
+        return Orthotropic(self.rho, *moduli, *ratios, *shear, self.angle, self.tilt).checked()
+
+
+def axes(angle: float, tilt: float, spin: float) -> np.ndarray:
+    """Rotation (3, 3) whose columns are the axes of the material; angles in degrees."""
+
+    def about(axis: int, degrees: float) -> np.ndarray:
+        i, j = [k for k in range(3) if k != axis]
+        R, a = np.eye(3), radians(degrees)
+        R[i, i] = R[j, j] = cos(a)
+        R[i, j], R[j, i] = -sin(a), sin(a)
+        return R
+
+    return about(2, angle) @ about(0, tilt) @ about(2, spin)
+
+
+def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """Stiffness (3, 3, 3, 3) from a matrix (6, 6) by the axes R."""
+    full = np.array(
+        [[[[C[INDEX[i][j], INDEX[k][m]] for m in range(3)] for k in range(3)] for j in range(3)]
+         for i in range(3)]
+    )  # fmt: skip
+    return np.einsum("ia,jb,kc,md,abcd->ijkm", R, R, R, R, full, optimize=True)
+
+
+def fastest(C: np.ndarray) -> float:
+    """The largest rho c^2 of plane waves: eigenvalues of C_ijkl n_j n_l over all directions n."""
+    z, turn = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 2 * np.pi, 121))
+    r = np.sqrt(1 - z * z)
+    n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
+    acoustic = np.einsum("ijkl,nj,nl->nik", C, n, n)
+    # Between the directions that are tried, which are 3 degrees apart, it may be a little larger.
+    return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
+
+
+def couples(law: Any, scene: Any) -> bool:
+    """Return True if a body in 2D would shear out of its plane."""
+    shears = [law[STIFFNESS[a][b]] for a in (0, 1, 2, 5) for b in (3, 4)]
+    return scene.d == 2 and max(map(abs, shears)) > COUPLED * law.fastest
+
+
+known_failure(
+    Directional,
+    "directions out of the plane",
+    when=couples,
+    reason="no axis of material '{owner.id}' is z: the body would shear out of its plane, which a "
+    "2D scene prevents",
+    cure="a 3D scene, or tilt 0 or 90 with spin 0",
+)
+
+
+def stress_of(law, E):
+    """S = C:E, with the components of E."""
+    strain = E.at()
+
+    def component(i, j):
+        row = STIFFNESS[INDEX[i][j]]
+        return total([law[row[INDEX[k][m]]] * value for (k, m), value in strain.items()])
+
+    return E._make([component(i, j) for i, j in E.places])
+
+
+@laws.elastic_strain.on(Directional)
+def _elastic_strain_directional(law, kin, state):
+    """Green-Lagrange strain (F^T F - I) / 2."""
+    return 0.5 * state.F.right_cauchy_green() - 0.5 * I
+
+
+@laws.kirchhoff_stress.on(Directional)
+def _kirchhoff_stress_directional(law, kin, state):
+    S = stress_of(law, laws.elastic_strain(law, kin, state))
+    return S.carried(state.F - I)
+
+
+@laws.energy_density.on(Directional)
+def _energy_density_directional(law, kin, state):
+    E = laws.elastic_strain(law, kin, state)
+    return 0.5 * inner(stress_of(law, E), E)
+
+
+@laws.wave_speed_squared.on(Directional)
+def _wave_speed_squared_directional(law, kin, state):
+    # rho_0 c^2 = C_ijkl F_ai F_bk m_j m_l + S_jl m_j m_l with m = F^T n, at most x^2 C + |tau|.
+    x = state.F.left_cauchy_green().largest_row_sum()
+    tau = laws.kirchhoff_stress(law, kin, state).largest_row_sum()
+    return (x * x * law.fastest + tau) * law.specific_volume
