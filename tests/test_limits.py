@@ -15,7 +15,7 @@ STYLES = {
     "inflow, outflow": [("fix", "inflow"), ("fix", "outflow"), ("fix", "absorbing")],
     "rigid bodies": [("fix", "rigid_body"), ("fix", "rigid")],
     "terrain": [("region", "heights"), ("region", "raster")],
-    "anisotropic": [("material", "orthotropic"), ("material", "transverse")],
+    "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],
     "viscoelasticity": [("command", "viscosity"), ("material", "visco"), ("strength", "norton")],
     "explosives": [("eos", "jwl"), ("strength", "johnson-holmquist"), ("eos", "p-alpha")],
     "UMAT": [("material", "umat")],
