@@ -100,7 +100,7 @@ class Orthotropic(NamedTuple):
                 "with these Poisson's ratios some strain would release energy",
                 argument="nu12",
                 expected="nu12^2 < E1/E2, nu13^2 < E1/E3 and nu23^2 < E2/E3, with a margin",
-                hint="nu12 = nu21 E1/E2: the ratio is that of a pull along the first axis",
+                hint="nu12 = nu21 E1/E2: the ratio belongs to a pull along the first axis",
             )
         C = rotated(np.linalg.inv(compliance), axes(self.angle, self.tilt, self.spin))
         numbers = [C[VOIGT[a] + VOIGT[b]] for a, b in PAIRS]
@@ -115,14 +115,14 @@ class Transverse(NamedTuple):
     rho
         Density before deformation.
     E, nu
-        Young's modulus and Poisson's ratio in the plane across the direction.
+        Young's modulus and Poisson's ratio across the direction.
     E3, nu3
         Young's modulus along the direction, and the contraction across over the stretch along it.
     G3
         Shear modulus of planes with the direction.
     angle, tilt
-        Rotation of the direction in degrees. It is z without them; `tilt` turns it about x, then
-        `angle` about z. The normal of bedding that dips by 30 degrees in the plane xy has
+        Rotation of the direction in degrees. It is z without them; `tilt` rotates it about x, then
+        `angle` about z. The normal of bedding that dips by 30 degrees about z has
         angle 30 and tilt 90.
 
     Example
