@@ -21,6 +21,7 @@ from karamelo_py.points.transfers import flip_coefficient, stores_moment
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import motions
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import read_script
@@ -81,7 +82,7 @@ class SceneFacts:
         """Tell what the rules of the parts say, of one kind, or of laws and first states alone."""
         foreign = {part.kind: part for part in foreign_parts(self.hub)}
         for part, owner in self.parts():
-            if of_laws and owner is None and not getattr(part, "first_step_only", False):
+            if of_laws and owner is None and not (isinstance(part, Fix) and part.first_step_only):
                 continue
             with attributed(self.hub, foreign.get(type(part))):
                 said = list(rules.advice(kind, part, owner, self))

@@ -15,6 +15,7 @@ class Scene(Protocol):
     checking: bool
     interpreter: Any
     domain: Any
+    announced_dimension: int | None
     regions: Any
     materials: Any
     parts: Any

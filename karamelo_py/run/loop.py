@@ -20,7 +20,6 @@ from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
 
 PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
-HANG_UP = signal.SIGHUP if hasattr(signal, "SIGHUP") else None
 
 
 class Interrupted(Exception):
@@ -222,5 +221,5 @@ class RunLoop:
             raise KeyboardInterrupt
         self.signal = number
         self.tell(lambda to: to.signalled(number))
-        if number == HANG_UP:
+        if signal.Signals(number).name == "SIGHUP":  # not on all systems
             self.hub.console.leave()

@@ -79,7 +79,7 @@ def _around(hub: Scene, dimension: int) -> str | None:
 def require_domain(hub: Scene) -> Domain:
     """Return the domain; raise ScriptError if there is none yet."""
     if hub.domain is None:
-        if announced := getattr(hub, "announced_dimension", None):
+        if announced := hub.announced_dimension:
             ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
             raise ScriptError(
                 f"the domain has no size yet: dimension({announced}) only says how many "

@@ -41,7 +41,7 @@ class Catalogue(dict):
     def refuse(self, ID: str) -> None:
         """Raise ScriptError if an ID is in use."""
         if ID in self:
-            before = getattr(self[ID], "place", None)
+            before = self[ID].place
             where = f" (line {before.line})" if before else ""
             raise ScriptError(
                 f"ID '{ID}' is already used{where}",

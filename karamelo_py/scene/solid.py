@@ -199,7 +199,7 @@ def words_of_volumes(hub: Scene) -> str:
 
 def own_grids(hub: Scene) -> bool:
     """Tell whether the method uses a separate grid for each solid."""
-    return getattr(hub.update.method, "own_grids", False)
+    return hub.update.method is not None and hub.update.method.own_grids
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:

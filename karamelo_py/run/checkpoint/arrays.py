@@ -11,6 +11,7 @@ import numpy as np
 from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, rows_of_points
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
 from karamelo_py.run.boxes import numbers, used
@@ -258,7 +259,10 @@ def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
 
 
 def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
-    for kind, nodes in (("nodes", s.nodes), ("heat", getattr(s.heat, "nodes", None))):
+    for kind, nodes in (
+        ("nodes", s.nodes),
+        ("heat", s.heat.nodes if isinstance(s.heat, Conducting) else None),
+    ):
         if nodes is None:
             continue
         for name in Nodes._fields[:-1]:

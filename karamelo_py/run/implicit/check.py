@@ -41,7 +41,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         yield "knows no heat that flows beside rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
         yield "knows no heat that flows beside contact", f"mechanical, or {_EXPLICIT}", method.place
-    if method.fields_per_solid and getattr(update.scheme, "point_fields", ()):
+    if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "knows no rho beside contact", "beta and gamma, or rule=euler", None
     if update.boundary == "reflect":
         yield "knows no walls that points bounce from", "fix velocity_nodes", None
@@ -140,11 +140,7 @@ def _bears_shear(law: Any, kin: Any) -> bool:
 
 
 def _only_prescribes(fix: Fix) -> bool:
-    return (
-        (fix.prescribes_velocity or fix.first_step_only)
-        and not any(getattr(formula, "bound", "") for formula in fix.formulas)
-        and fix.wall_friction is None
-    )
+    return (fix.prescribes_velocity or fix.first_step_only) and fix.wall_friction is None
 
 
 def check(hub: Hub) -> None:

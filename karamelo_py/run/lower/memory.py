@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels import arrays
-from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels.arrays import Block, Hooks
 from karamelo_py.run.boxes import used
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, lower_points, part_of, point_kinds
@@ -39,7 +39,8 @@ def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
     moved = sum(of["x moved"] * n for of, n in zip(of_point, counts, strict=True))
     nodes = sum(bytes_in(used(s.spans)[1:], array) for _, array in node_fields(simulation.setup))
-    hooks = sum(getattr(simulation.hooks, name, np.empty(0)).nbytes for name in ("x0", "members"))
+    of_fixes = simulation.hooks
+    hooks = of_fixes.x0.nbytes + of_fixes.members.nbytes if isinstance(of_fixes, Hooks) else 0
     return MemoryTaken(points + nodes + boxes, points - moved, known(simulation.hub) + hooks)
 
 

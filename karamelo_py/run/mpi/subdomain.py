@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.compiler.loops import address_of_python
 from karamelo_py.kernels import ranks
-from karamelo_py.kernels.arrays import DT, TIMESTEP, Setup
+from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, Setup
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.boxes import numbers
@@ -233,5 +233,5 @@ class Subdomain:
 
 def reads_totals(hooks: Any) -> bool:
     """Tell whether formulas read within steps what fixes publish."""
-    code = getattr(hooks, "code", np.empty((0, 2), np.int64))
+    code = hooks.code if isinstance(hooks, Hooks) else np.empty((0, 2), np.int64)
     return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())
