@@ -41,7 +41,7 @@ class Listener:
         """Some steps were taken, all of them good."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
-        """Explain a `status`, DONE for a gain of energy; the step was `too_large` from the start."""
+        """Explain a `status`, DONE for a gain of energy; a step `too_large` from the start."""
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
         """The run is over: it began at `first_step` and has taken `wall` seconds."""

@@ -17,7 +17,7 @@ from karamelo_py.app.launch import rendered
 from karamelo_py.app.live import frames
 from karamelo_py.app.live.frames import Frame, KeptFrames, plain
 from karamelo_py.app.live.server import Server
-from karamelo_py.kernels.watch import FEW
+from karamelo_py.kernels.watch import FEW, WITHIN
 from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.run.energy import share_lost, unknown_work
 from karamelo_py.run.listening import Listener
@@ -174,7 +174,7 @@ class RunPage(Rhythmic, Listener):
                 "columns": self.hub.fields.particle_names(),
                 "column": self._column,
                 "method": self.hub.update.words,
-                "bounds": [-100 * energy.LOSS, 100 * energy.WITHIN],
+                "bounds": [-100 * energy.LOSS, 100 * WITHIN],
                 "steers": True,
             }
         return seen + len(new), told
