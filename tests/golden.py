@@ -118,7 +118,9 @@ def _texts(script):
     hub, simulation = begun(script)
     arguments = hub.update.scheme, simulation.visits, simulation.mode, simulation.setup
     hooks = simulation._acting
-    found, usual = [], (machine.compile_text, loops.cache.KernelFiles.kernel, gpu.text_of)
+    files = loops.cache
+    found = []
+    usual = machine.compile_text, files.machine_code, files.KernelFiles.kernel, gpu.text_of
 
     def keep(name, text):
         text = re.sub(r"[._][0-9a-f]{32}\b", "", text)
@@ -129,7 +131,7 @@ def _texts(script):
         found.append((name, _hash(text)))
 
     def text_of(*given):
-        name, text = usual[2](*given)
+        name, text = usual[-1](*given)
         keep(name.rpartition("_")[0], text)
         return name, ""
 
@@ -138,7 +140,8 @@ def _texts(script):
         return b""
 
     machine.compile_text = noted
-    loops.cache.KernelFiles.kernel = lambda self, kinds, result, compiled: compiled()[0]
+    files.KernelFiles.kernel = lambda self, kinds, result, compiled: compiled()
+    files.machine_code = lambda name, make: make()
     trace.outdate_kernels()
     try:
         if not simulation.implicit and hasattr(hooks, "_fields"):
@@ -156,7 +159,7 @@ def _texts(script):
             except (TypeError, AttributeError) as why:
                 found.append(("no card", type(why).__name__))
     finally:
-        machine.compile_text, loops.cache.KernelFiles.kernel, gpu.text_of = usual
+        machine.compile_text, files.machine_code, files.KernelFiles.kernel, gpu.text_of = usual
         trace.outdate_kernels()
     return sorted(found)
 

@@ -1,10 +1,14 @@
-"""Disk cache of compiled kernels; its errors never stop a run.
+"""Compiled kernels on disk, in two levels; never a reason to stop.
 
-A file holds one kernel for one list of argument types. Its name contains the fingerprint of all
-that the code depends on (:mod:`~karamelo_py.compiler.fingerprint`); a checksum shows whether it is
-complete. Since its content is executed, only files that nobody but this user or the administrator
-can write are read. If anything is wrong with a file or the folder, the kernel is compiled as
-without it, and the user is warned once.
+A file ``.kernel`` has what is known of a kernel: its name, its result, what it calls. It is found
+by a hash of the function, of the types of its arguments, and of the sources of all that write
+kernels: while no source changes, nothing is done again. Otherwise the kernel is traced, and its
+machine code found by a hash of its LLVM text, in a file ``.code``: what an edit leaves as it was is
+not compiled again.
+
+What is read becomes code: only files that this user or the administrator alone may write are read,
+and a checksum tells whether they are whole. Whatever is wrong with a file or the folder, the kernel
+is compiled as if it were not there, and the user told once.
 """
 
 import contextlib
@@ -17,7 +21,11 @@ import pickle
 import platform
 import re
 import stat
+import sys
+import sysconfig
 import tempfile
+import time
+import types as python
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,20 +35,27 @@ import llvmlite
 import numba
 import numpy as np
 import platformdirs
+from numba import types
 
-from karamelo_py.compiler import compile_lock, machine
-from karamelo_py.compiler.choices import WHOLE, Unknown, name_of
-from karamelo_py.compiler.fingerprint import describe, fingerprint
+from karamelo_py.compiler import choices, compile_lock, machine
+from karamelo_py.compiler.choices import name_of
 
-VARIANTS = 4  # of a kernel for the same types: source versions kept
-ROOM = 400e6  # bytes; above it, the least recently used files are deleted
+ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
 
-_ENDING, _LOCK = ".kernel", ".lock"
+_began = time.time()  # sources that are newer may not be what Python has read
+_VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
+_INSTALLED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
+_NAMED = (python.FunctionType, python.ModuleType, type)  # their sources say what they are
+_PLAIN = (type(None), bool, int, float, complex, str, bytes, np.number, np.bool_)
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _AS_IT_IS = (  # not a link, without waiting for a pipe
     getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 )
-_OURS = re.compile(r"[\w.]+-[0-9a-f]{24}-[0-9a-f]{24}\.kernel")
+_OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
+
+
+class Unknown(Exception):
+    """Tell that a kernel depends on what has no name that is the same in another run."""
 
 
 def folder() -> Path:
@@ -111,130 +126,267 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
         _told.set(before)
 
 
+# --- first level: by the sources ------------------------------------------------------------------
+
+
+def short_hash(*words: str) -> str:
+    """Hash texts to the 32 digits that names of files have."""
+    return hashlib.sha256("|".join(words).encode()).hexdigest()[:32]
+
+
+@functools.cache
+def target() -> str:
+    """Describe the machine that code is made for."""
+    return repr(machine.describe())
+
+
+def _source(path: Path) -> bytes:
+    """Read a source as Python has read it, which knows no later change."""
+    with contextlib.suppress(OSError):
+        about = path.stat()
+        if max(about.st_mtime, about.st_ctime) < _began:
+            return path.read_bytes()
+    raise Unknown(str(path))
+
+
+@functools.cache
+def _sources() -> str:
+    """Hash the sources of the rooms of this package that write kernels."""
+    package = Path(__file__).parents[1]
+    paths = sorted(path for room in choices.ROOMS for path in (package / room).rglob("*.py"))
+    digest = hashlib.sha256(repr([str(path.relative_to(package)) for path in paths]).encode())
+    for path in paths:
+        digest.update(_source(path))
+    return digest.hexdigest()
+
+
+@functools.cache
+def _text_of(file: str) -> str:
+    return hashlib.sha256(_source(Path(file))).hexdigest()
+
+
+def _stamp(name: str) -> str:
+    """Hash modules elsewhere: one, and those of its package or of no package that it names."""
+    words: dict[str, str] = {}
+    ahead = {name}
+    while ahead:
+        one = ahead.pop()
+        names = _names_in(one)
+        file = names.get("__file__")
+        if one == "__main__" or not file:
+            raise Unknown(one)
+        known = [(k, v) for k, v in names.items() if k[:2] != "__"]
+        values = [f"{k} = {_value(v)}" for k, v in known if not isinstance(v, _NAMED)]
+        words[one] = short_hash(one, _text_of(file), *values)
+        if not one.startswith(__package__.partition(".")[0]):  # its rooms import as they may
+            named = choices.modules_of(*(v for _, v in known if isinstance(v, _NAMED)))
+            ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
+    return short_hash(*(words[one] for one in sorted(words)))
+
+
+def _names_in(module: str) -> dict[str, Any]:
+    return vars(sys.modules[module]) if module in sys.modules else {}
+
+
+def _is_own(module: str, top: str) -> bool:
+    """Tell whether a module is of the package `top`, or of no package that is installed."""
+    file = _names_in(module).get("__file__") or _INSTALLED[0]
+    return module.partition(".")[0] == top or not file.startswith(_INSTALLED)
+
+
+def _value(thing: Any) -> str:
+    try:
+        return _words(thing)
+    except (Unknown, RecursionError):
+        return type(thing).__name__
+
+
+def _words(thing: Any) -> str:
+    """Describe what a function is made of, in words that mean the same in every process."""
+    if isinstance(thing, _PLAIN):
+        return f"{type(thing).__name__} {thing!r}"
+    if isinstance(thing, dict):
+        return f"dict{_words([*thing.items()])}"
+    if isinstance(thing, tuple | list):
+        return f"{name_of(type(thing))}({','.join(map(_words, thing))})"
+    if isinstance(thing, np.ndarray):
+        return f"array {thing.dtype} {thing.shape} {thing.tobytes().hex()}"
+    if isinstance(thing, type):
+        return _class(thing)
+    if hasattr(thing, "__module__") and hasattr(thing, "__name__"):
+        known = _names_in(thing.__module__).get(thing.__name__)
+        if known is thing or (hasattr(known, "function") and known.function is thing):
+            return f"{thing.__module__}:{thing.__name__}"  # the sources say what it is
+    function = thing.definition if hasattr(thing, "definition") else thing  # of an intrinsic
+    if not isinstance(function, python.FunctionType):
+        raise Unknown(repr(thing))
+    parts = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
+    for cell in function.__closure__ or ():
+        with contextlib.suppress(ValueError):  # it is empty as yet
+            parts.append(cell.cell_contents)
+    code = [
+        (c.co_firstlineno, c.co_code, c.co_names, [k for k in c.co_consts if isinstance(k, _PLAIN)])
+        for c in choices.codes_in(function.__code__)
+    ]
+    return f"{name_of(function)} {code}({','.join(map(_words, parts))})"
+
+
+def _class(one: type) -> str:
+    """Name a class that can be found by its name, with the plain attributes that it was given."""
+    first, *rest = one.__qualname__.split(".")
+    found = _names_in(one.__module__).get(first)
+    for name in rest:
+        found = vars(found).get(name) if isinstance(found, type) else None
+    if found is not one:
+        raise Unknown(name_of(one))
+    plain = [(k, v) for k, v in vars(one).items() if isinstance(v, _PLAIN) and k[:2] != "__"]
+    return f"{name_of(one)} {sorted(plain)}"
+
+
+def describe(numba_type: Any) -> str:
+    """Describe a type in words that mean the same in every process; tags with their fields."""
+    how = type(numba_type).__name__  # held or a value
+    if isinstance(numba_type, types.BaseTuple):
+        inner = ",".join(map(describe, numba_type))
+        one = choices.tag_class(numba_type)
+        return f"{how} {one and f'{_class(one)} {one._fields}'}({inner})"
+    if isinstance(numba_type, (types.Callable, types.Opaque)) and numba_type != types.none:
+        raise Unknown(str(numba_type))
+    return f"{how}:{numba_type}"
+
+
 class KernelFiles:
     """The cached kernels of one function; a kernel that `load` cannot load does not count.
 
-    `about` and the names of functions in its closure distinguish functions of one name (a function
-    may create several); `beside` are other functions that its kernels may call.
+    They are made for a `processor`, and `called` are functions that are written into them.
     """
 
     def __init__(
-        self, function: Callable, load: Callable[[Any], Any], about: str = "", beside: tuple = ()
+        self, function: Callable, load: Callable[[Any], Any], processor: str = "", *called: Callable
     ):
-        self._function, self._load, self._about = function, load, about
-        self._roots = [function, *beside]
+        self._function, self._load, self._processor = function, load, processor
+        self._called = called
 
-    def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], tuple[Any, Any]]) -> Any:
-        """Read a kernel, or compile it while other processes wait for the file."""
+    def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], Any]) -> Any:
+        """Read a kernel; where there is none, compile it, while others wait for the file."""
         try:
             key = self._key(kinds, result)
-        except Unknown as what:
-            self._tell_of_unknown(what)
-            return compiled()[0]
-        found = self._found(kinds, key)
+        except (Unknown, RecursionError):
+            return compiled()
+        found = self._found(key)
         if found is None:
-            with compile_lock.lock(folder() / f"{key}{_LOCK}"):
-                # Another process may have compiled it in the meantime.
-                found = self._found(kinds, key)
+            with compile_lock.lock(folder() / f"{key}.lock"):
+                # Another process may have compiled it since the first look.
+                found = self._found(key)
                 if found is None:
-                    found, codes = compiled()
-                    self._save(kinds, key, found, codes)
+                    found = compiled()
+                    self._save(key, found)
         return found
 
-    def _found(self, kinds: tuple, key: str) -> Any:
-        """Read the kernel in a file; report and delete an incomplete one."""
-        for path in self._files(key):
-            try:
-                choices, code = pickle.loads(read(path))
-                stamp = fingerprint(self._roots, kinds, frozenset(choices))
-                if stamp[:24] != path.stem.rpartition("-")[2]:
-                    continue
-                unit = pickle.loads(code)
-                self._load(unit)
-            except (FileNotFoundError, Unknown):  # deleted, or from sources that no longer exist
-                continue
-            except OSError as error:
-                _trouble(error)
-                continue
-            except Exception:
-                _told.get()(f"a file in {folder()} is damaged; the loop in it is compiled anew")
-                with contextlib.suppress(OSError):
-                    path.unlink()
-                continue
-            with contextlib.suppress(OSError):
-                os.utime(path)
-            return unit
-        return None
-
-    def _save(self, kinds: tuple, key: str, unit: Any, codes: Any) -> None:
-        try:
-            if isinstance(codes, Unknown):
-                raise codes
-            stamp = fingerprint(self._roots, kinds, unit.choices, codes)
-            content = pickle.dumps((tuple(sorted(unit.choices)), pickle.dumps(unit)))
-            path = folder() / f"{key}-{stamp[:24]}{_ENDING}"
-            write(path, content)
-            self._forget(key)
-        except Unknown as what:
-            self._tell_of_unknown(what)
-        except OSError as error:
-            _trouble(error)
-
-    def _tell_of_unknown(self, what: Unknown) -> None:
-        # Never silently: every run would compile it.
-        _told.get()(f"the loop {self._name()} is compiled in every run: {what} cannot be followed")
-
-    def _name(self) -> str:
-        return re.sub(r"[^\w.]", "", f"{self._function.__module__}.{self._function.__qualname__}")
-
     def _key(self, kinds: tuple, result: Any) -> str:
-        """Return the name of the function with a hash of the types and the machine."""
-        words = [name_of(self._function), *_closed_over(self._function), *map(describe, kinds)]
-        words += [describe(result) if result is not None else "", repr(machine.describe())]
-        words.append(self._about)
-        digest = hashlib.sha256("|".join([*words, _SETTING]).encode()).hexdigest()
-        return f"{self._name()}-{digest[:24]}"
+        """Name the file: by function, types, machine, and the sources that any kernel may have."""
+        function = self._function
+        of_types = {module for kind in kinds for module in _modules_in(kind)}
+        made = [function, *self._called, *choices.registered]
+        elsewhere = sorted(choices.modules_of(*made) | of_types)
+        words = [*map(_words, made), *map(describe, kinds)]
+        words += [describe(result) if result is not None else "", self._processor, target()]
+        words += [_sources(), repr(_VERSIONS), *(f"{one} {_stamp(one)}" for one in elsewhere)]
+        name = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")
+        return f"{name}.{short_hash(*words)}"
 
-    def _files(self, key: str) -> list[Path]:
+    def _found(self, key: str) -> Any:
+        path = folder() / f"{key}.kernel"
+        content = _content(path)
+        if content is None:
+            return None
         try:
-            names = [name for name in os.listdir(folder()) if name.startswith(key)]
-        except (FileNotFoundError, NotADirectoryError):  # reported when a file is written
-            return []
-        except OSError as error:
-            _trouble(error)
-            return []
-        return [folder() / name for name in names if _OURS.fullmatch(name)]
+            stamps, unit = pickle.loads(content)
+            if any(_stamp(name) != stamp for name, stamp in stamps.items()):
+                return None
+            self._load(unit)
+        except (Unknown, FileNotFoundError):  # code was taken away, or a module is not there
+            return None
+        except Exception:
+            _damaged(path)
+            return None
+        return unit
 
-    def _forget(self, key: str) -> None:
-        """Make room: delete old source versions of this kernel, and the oldest files."""
+    def _save(self, key: str, unit: Any) -> None:
+        with contextlib.suppress(Unknown):
+            stamps = {name: _stamp(name) for name in sorted(unit.modules)}
+            _keep(folder() / f"{key}.kernel", pickle.dumps((stamps, _without_code(unit))))
+
+
+def _modules_in(kind: Any) -> set[str]:
+    return choices.modules_of(*choices.classes_in(kind))
+
+
+def _without_code(unit: Any) -> Any:
+    return unit._replace(code=b"", needs=tuple(map(_without_code, unit.needs)))
+
+
+# --- second level: by the LLVM text --------------------------------------------------------------
+
+
+def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
+    """Read the code of a text, whose hash is in the `name`; where there is none, make it."""
+    path = folder() / f"{name}.code"
+    code = _content(path)
+    if code is None:
+        code = make()
+        _keep(path, code)
+    return code
+
+
+def code_of(name: str) -> bytes:
+    """Read code that was there when its kernel was kept; FileNotFoundError if it no longer is."""
+    code = _content(folder() / f"{name}.code")
+    if code is None:
+        raise FileNotFoundError(name)
+    return code
+
+
+def _content(path: Path) -> bytes | None:
+    """Read a file, if it can be read; one that is not whole is told of, and taken away."""
+    try:
+        content = read(path)
+    except (FileNotFoundError, NotADirectoryError):  # told of where a file is to be written
+        return None
+    except OSError as error:
+        _trouble(error)
+        return None
+    except ValueError:
+        _damaged(path)
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(path)
+    return content
+
+
+def _damaged(path: Path) -> None:
+    _told.get()(f"a file in {folder()} is damaged; the loop in it is compiled anew")
+    with contextlib.suppress(OSError):
+        path.unlink()
+
+
+def _keep(path: Path, content: bytes) -> None:
+    """Write a file; forget those that were used least recently where all take too much room."""
+    try:
+        write(path, content)
         ages = []
-        for path in folder().iterdir():
-            if _OURS.fullmatch(path.name):
+        for one in folder().iterdir():
+            if _OURS.fullmatch(one.name):
                 with contextlib.suppress(FileNotFoundError):
-                    about = path.stat()
-                    ages.append((about.st_mtime, about.st_size, path))
-        ages.sort(reverse=True, key=lambda item: item[0])
-        variants = [path for _, _, path in ages if path.name.startswith(key)]
-        old = set(variants[VARIANTS:])
+                    about = one.stat()
+                    ages.append((about.st_mtime, about.st_size, one))
         room = ROOM
-        for _, size, path in ages:
+        for _, size, one in sorted(ages, key=lambda item: item[0], reverse=True):
             room -= size
             if room < 0:
-                old.add(path)
-        for path in old:
-            path.unlink(missing_ok=True)
-
-
-def _closed_over(function: Callable) -> Iterator[str]:
-    """Yield the names of the functions in the closure of a function."""
-    for cell in getattr(function, "__closure__", None) or ():
-        with contextlib.suppress(ValueError):  # it is still empty
-            if hasattr(cell.cell_contents, "__qualname__"):
-                yield name_of(cell.cell_contents)
-
-
-_VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
-_SETTING = repr((_VERSIONS, [Path(file).read_bytes() for file in WHOLE]))  # common to all kernels
+                one.unlink(missing_ok=True)
+    except OSError as error:
+        _trouble(error)
 
 
 def write(path: Path, content: bytes) -> None:

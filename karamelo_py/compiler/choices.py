@@ -1,4 +1,8 @@
-"""Choices by type made in compiled code; the key of a kernel contains them."""
+"""Functions that choose by type, and the modules in which what they choose was written.
+
+The key of a kernel on disk has the sources of the modules that take part, but those of libraries,
+whose versions it has (`cache.py`).
+"""
 
 import contextvars
 import functools
@@ -7,37 +11,64 @@ import sys
 import types as python
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any
 
-from numba import config
+from numba import config, types
 
 INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
-# Identified by name: their versions are part of every key.
-_OPAQUE = {"numba", "llvmlite", "numpy", *sys.stdlib_module_names}
-# Code generators are in every key as a whole, and so are methods of tensors, which are found
-# through objects, not names.
-_HERE = Path(__file__).parent
-WHOLE = sorted(
-    map(str, [*_HERE.rglob("*.py"), _HERE.parent / "points" / "kinematics" / "__init__.py"])
-)
+_LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
+_PACKAGE = __package__.partition(".")[0]
+ROOMS = "compiler", "kernels", "points", "schemes", "styles"  # whose sources are in every key
+
+choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
+# What says what functions are in kernels, and is more than the sources of the rooms tell.
+registered: list[Callable] = []
+
+# Modules elsewhere that functions are made of that are compiled, innermost last; in each thread of
+# Python its own.
+_noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("noted", default=())
 
 
-class Unknown(Exception):
-    """Something that a kernel depends on cannot be hashed."""
+@functools.cache
+def is_elsewhere(module: str) -> bool:
+    """Tell whether a module is neither of a library nor of the rooms that every key has."""
+    top, _, rest = module.partition(".")
+    return top not in _LIBRARIES and not (top == _PACKAGE and rest.partition(".")[0] in ROOMS)
 
 
-class Choice(NamedTuple):
-    """A point function and the classes of tags it was selected for, all by name."""
+def modules_of(*things: Any) -> set[str]:
+    """List the modules elsewhere in which functions or classes were written."""
+    names = [one.__name__ if isinstance(one, python.ModuleType) else "" for one in things]
+    names += [one.__module__ for one in things if hasattr(one, "__module__")]
+    functions = (one for one in things if isinstance(one, python.FunctionType))
+    names += [one.__globals__.get("__name__") for one in functions]
+    return {name for name in names if name and is_elsewhere(name)}
 
-    point_function: str
-    classes: tuple[str, ...]
+
+def register(made: Callable) -> None:
+    """Note what a function is in kernels for some types: all keys have it."""
+    is_function = isinstance(made, python.FunctionType)
+    given = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
+    if given or modules_of(made):
+        registered.append(made)
 
 
-point_functions: dict[str, list[Callable]] = {}  # by name; they have `find(classes)` and `tags`
-choosers: dict[Callable, list[Callable]] = {}  # functions that kernels select by type
-of_numbers: dict[Callable, list[Callable]] = {}  # implementations of functions for number types
+def note(modules: Iterable[str]) -> None:
+    """Note modules elsewhere that the function consists of that is compiled now."""
+    if noted := _noted.get():
+        noted[-1].update(modules)
+
+
+@contextmanager
+def modules_noted() -> Iterator[set[str]]:
+    """Collect what is noted meanwhile."""
+    before, modules = _noted.get(), set()
+    _noted.set((*before, modules))
+    try:
+        yield modules
+    finally:
+        _noted.set(before)
 
 
 def name_of(thing: Any) -> str:
@@ -45,61 +76,18 @@ def name_of(thing: Any) -> str:
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
-# A selection of a point function, code of a function that was run, or a class that it names.
-Part: TypeAlias = "tuple[Callable, tuple] | Choice | python.CodeType | type"
-# Functions in progress, innermost last; separate for each Python thread.
-_noted: contextvars.ContextVar[tuple[set[Part], ...]] = contextvars.ContextVar("noted", default=())
-
-
-def note(parts: Iterable[Part]) -> None:
-    """Record parts of the function that is compiled now."""
-    if noted := _noted.get():
-        noted[-1].update(parts)
-
-
-@contextmanager
-def parts_noted() -> Iterator[set[Part]]:
-    """Collect the parts recorded within this context."""
-    before, parts = _noted.get(), set()
-    _noted.set((*before, parts))
-    try:
-        yield parts
-    finally:
-        _noted.set(before)
-
-
 def tag_class(numba_type: Any) -> Any:
     """Return the class of a tag, by which point functions are selected, from its type."""
     return getattr(numba_type, "instance_class", None)
 
 
-def found_by_name(name: str) -> Any:
-    """Return the object with this `name_of`."""
-    module, _, path = name.partition(":")
-    try:
-        return functools.reduce(getattr, path.split("."), sys.modules[module])
-    except (KeyError, AttributeError) as error:
-        raise Unknown(name) from error
-
-
-def class_name(tag: type | None) -> str:
-    if tag is None:
-        return ""
-    name = name_of(tag)
-    if found_by_name(name) is not tag:
-        raise Unknown(name)
-    return name
-
-
-def contents(parts: Iterable[Part]) -> tuple[frozenset[Choice], frozenset[python.CodeType]]:
-    """Separate parts into choices and the Python functions that were compiled."""
-    codes = {part for part in parts if isinstance(part, python.CodeType)}
-    choices = {
-        part if isinstance(part, Choice) else Choice(name_of(part[0]), (*map(class_name, part[1]),))
-        for part in {*parts} - codes
-        if not isinstance(part, type)
-    }
-    return frozenset(choices), frozenset(c for c in codes if c.co_filename not in WHOLE)
+def classes_in(numba_type: Any) -> Iterator[type]:
+    """Yield the classes of the tags in a type."""
+    if tag_class(numba_type):
+        yield numba_type.instance_class
+    if isinstance(numba_type, types.BaseTuple):
+        for item in numba_type:
+            yield from classes_in(item)
 
 
 def codes_in(code: python.CodeType) -> list[python.CodeType]:
@@ -114,4 +102,4 @@ def is_opaque(thing: Any) -> bool:
     module = thing.__name__ if is_module else getattr(thing, "__module__", None)
     if module is None:
         return not isinstance(thing, python.FunctionType)
-    return module.partition(".")[0] in _OPAQUE
+    return module.partition(".")[0] in _LIBRARIES

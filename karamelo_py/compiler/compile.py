@@ -7,7 +7,6 @@ A function of numbers is defined first, then its version for lanes
 import math
 import operator
 from collections.abc import Callable
-from itertools import product
 from typing import Any, NamedTuple
 
 from llvmlite import ir
@@ -18,16 +17,14 @@ from karamelo_py.compiler.arithmetic import common
 from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of
 from karamelo_py.compiler.trace import (
     INSTEAD,
-    Undefined,
+    PointFunction,
     forget,
     outdate_kernels,
-    run_for_kernel,
 )
 from karamelo_py.compiler.values import (
     OF_REALS,
     Untraceable,
     Value,
-    at_work,
     in_kernels,
     intrinsic,
     mapped,
@@ -54,7 +51,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
             if "implements" not in vars(one):
                 one.implements = {}
             one.implements[function] = made
-            choices.of_numbers.setdefault(function, []).append(made)
+        choices.register(made)
         if by_type:
             known.insert(0, made)
         elif not numbers:
@@ -70,7 +67,9 @@ def shared(function: Callable) -> Callable:
     return implements(function)(function)
 
 
-def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Callable], Any]:
+def point_function(
+    *, tags: int = 1, otherwise: bool = False
+) -> Callable[[Callable], PointFunction]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. ``name.on(Class, ...)`` adds
@@ -82,63 +81,18 @@ def point_function(*, tags: int = 1, otherwise: bool = False) -> Callable[[Calla
     Functions named in ``scalarised`` of a class, because they branch, are called point by point.
     """
 
-    def declare(stub: Callable) -> Callable:
-        table: dict[tuple[type, ...], Callable] = {}
-        fallback = stub if otherwise else None
-        nearest: dict[tuple[type, ...], Callable | None] = {}
-
-        def find(classes: tuple) -> Callable | None:
-            known = nearest  # another thread may add implementations
-            if classes not in known:
-                ways = product(*(getattr(one, "__mro__", (one,)) for one in classes))
-                known[classes] = next((table[way] for way in ways if way in table), fallback)
-            return known[classes]
-
-        def plain(*arguments: Any) -> Any:
-            first = arguments[0].__class__
-            classes = (first,) if tags == 1 else tuple([a.__class__ for a in arguments[:tags]])
-            known = nearest
-            chosen = known[classes] if classes in known else find(classes)
-            if chosen is None:
-                raise Undefined(stub.__name__, classes)
-            return chosen(*arguments)
-
-        def watched(*arguments: Any) -> Any:
-            return run_for_kernel(dispatch, arguments) if at_work() else plain(*arguments)
-
-        dispatch = plain if choices.INTERPRETED else watched
-        for name in ("__name__", "__qualname__", "__module__", "__doc__"):
-            setattr(dispatch, name, getattr(stub, name))
+    def declare(stub: Callable) -> PointFunction:
+        made = PointFunction(stub, tags, otherwise)
 
         def choose(*arguments: Any) -> Callable | None:
             classes = tuple(choices.tag_class(a) for a in arguments[:tags])
-            found = find(classes)
             apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
             if apart and lanes_of(arguments):
-                return lambda *given: lane_by_lane(dispatch, False, given)
-            return found
+                return lambda *given: lane_by_lane(made, False, given)
+            return made.find(classes)
 
-        implements(dispatch, by_type=True)(choose)
-
-        def on(*classes: type) -> Callable[[Callable], Callable]:
-            def register(implementation: Callable) -> Callable:
-                nonlocal nearest
-                table[classes] = implementation
-                before, nearest = nearest, {}
-                forget()
-                if any(find(asked) is not found for asked, found in before.items()):
-                    outdate_kernels()
-                return implementation
-
-            return register
-
-        def defined(*classes: type) -> bool:
-            choices.note([(dispatch, classes)])
-            return find(classes) is not fallback
-
-        dispatch.tags, dispatch.find, dispatch.on, dispatch.defined = tags, find, on, defined
-        choices.point_functions.setdefault(choices.name_of(dispatch), []).append(dispatch)
-        return dispatch
+        choices.choosers[made] = [choose]
+        return made
 
     return declare
 

@@ -80,7 +80,6 @@ class Field(NamedTuple):
     array: Any
 
     shape = scalar
-    is_followed = True  # functions of the kinematics are part of kernel keys
 
 
 class StepField(Field):

@@ -1,6 +1,7 @@
 """Control flow of a function that is written: branches, merges and loops."""
 
 import operator
+import types as python
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -329,4 +330,7 @@ class Flow:
             return emit(len, arguments[0])
         if function is range and any(map(is_value, arguments)):
             return Range(*arguments)
+        own = isinstance(getattr(function, "__self__", None), tuple) and function.__name__[0] != "_"
+        if own and isinstance(function, python.MethodType) and not hasattr(function, "__wrapped__"):
+            return self.lowering.seen(function.__func__)(function.__self__, *arguments, **keywords)
         return function(*arguments, **keywords)

@@ -19,13 +19,11 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code, machine, trace
+from karamelo_py.compiler import cache, code, machine, trace
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
-from karamelo_py.compiler.cache import KernelFiles
-from karamelo_py.compiler.choices import INTERPRETED, Unknown, contents, parts_noted
+from karamelo_py.compiler.choices import INTERPRETED, modules_noted, modules_of, note
 from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements
-from karamelo_py.compiler.fingerprint import fingerprint
 from karamelo_py.compiler.loops import ENTRY, NAME, compilation, items_at, written
 from karamelo_py.compiler.trace import formula
 from karamelo_py.compiler.values import in_one, intrinsic
@@ -228,8 +226,10 @@ class Code(NamedTuple):
     """Code of a thread function, like :class:`~karamelo_py.compiler.loops.Unit`."""
 
     name: str
-    content: bytes
-    choices: frozenset
+    code: bytes  # empty if it is to be read from the disk
+    file: str
+    needs: tuple
+    modules: frozenset[str]
 
 
 class _Coded:
@@ -258,27 +258,22 @@ class _Coded:
         return self._known[key]
 
     def _found(self, function: Callable, kinds: tuple, called: dict) -> Code:
-        """Read code from disk, or make it and write it there."""
-        beside = tuple(called.values())
-        try:  # dependencies without choices by type
-            own = fingerprint([function, *beside], kinds, frozenset())
-        except Unknown:
-            return self._compiled(function, kinds, called)[0]
-        files = KernelFiles(function, lambda code: code, f"{self.processor} {own}", beside)
-        return files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
+        """Read code from the disk, or make it and write it there."""
+        files = cache.KernelFiles(function, self._with_content, self.processor, *called.values())
+        found = files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
+        return self._with_content(found)
 
-    def _compiled(
-        self, function: Callable, kinds: tuple, called: dict
-    ) -> tuple[Code, frozenset | Unknown]:
-        """Make code; also return the Python functions compiled."""
-        with compilation(function.__name__), parts_noted() as parts:
+    def _with_content(self, code: Code) -> Code:
+        return code if code.code else code._replace(code=cache.code_of(code.file))
+
+    def _compiled(self, function: Callable, kinds: tuple, called: dict) -> Code:
+        """Trace a function, and make the code that no file has."""
+        with compilation(function.__name__), modules_noted() as modules:
+            note(modules_of(function, *called.values()))
             name, text = text_of(function, kinds, self.on_card, called)
-            code = Code(f"{name}_entry", self.made(text), frozenset())
-        try:
-            choices, codes = contents(parts)
-        except Unknown as what:
-            return code, what
-        return code._replace(choices=choices), codes
+            file = f"{name}.{cache.short_hash(text, self.processor, cache.target())}"
+            code = cache.machine_code(file, lambda: self.made(text))
+        return Code(f"{name}_entry", code, file, (), frozenset(modules))
 
 
 class Emulator(_Coded):
@@ -314,8 +309,8 @@ class Emulator(_Coded):
     copy = copy_from = copy_to  # the first argument is the destination
 
     def loaded(self, code: Code) -> Callable:
-        """Make code launchable."""
-        (address,) = machine.load(code.content, code.name)
+        """Make code one that can be launched."""
+        (address,) = machine.load(code.code, code.name)
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
@@ -448,8 +443,8 @@ class Card(_Coded):
         return assembled(text, self.processor).encode() + b"\0"
 
     def loaded(self, code: Code) -> Any:
-        """Make code launchable."""
-        room = ctypes.create_string_buffer(code.content)
+        """Make code one that can be launched."""
+        room = ctypes.create_string_buffer(code.code)
         module = self._do("cuModuleLoadData", ctypes.addressof(room))
         return self._do("cuModuleGetFunction", module, code.name.encode())
 

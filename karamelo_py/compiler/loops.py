@@ -9,7 +9,6 @@ import contextvars
 import ctypes
 import functools
 import gc
-import hashlib
 import itertools
 import re
 from collections.abc import Callable, Iterator
@@ -22,7 +21,6 @@ from numba import types
 
 from karamelo_py.compiler import cache, choices, code, compile_lock, machine, trace
 from karamelo_py.compiler.argument_buffer import Address, ArgumentBuffer, plan_for, reader
-from karamelo_py.compiler.choices import Choice
 from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import Failure, failure_at, noting
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
@@ -46,10 +44,10 @@ class Unit(NamedTuple):
 
     name: str  # its entry for Python has this name plus ENTRY
     result: types.Type
-    code: bytes  # an object file
-    needs: tuple  # units that it calls
-    choices: frozenset[Choice]  # selections of point functions, including its needs
-    raises: bool  # whether it may raise exceptions
+    code: bytes  # an object file; empty if it is to be read from the disk
+    needs: tuple  # the units that it calls
+    modules: frozenset[str]  # elsewhere that it consists of, also its needs
+    raises: bool  # whether something in it raises exceptions
 
 
 _loaded: dict[str, list[int]] = {}
@@ -61,7 +59,8 @@ def load(unit: Unit) -> list[int]:
         if unit.name not in _loaded:
             for needed in unit.needs:
                 load(needed)
-            found = machine.load(unit.code, unit.name, unit.name + ENTRY)
+            content = unit.code or cache.code_of(unit.name)
+            found = machine.load(content, unit.name, unit.name + ENTRY)
             machine.publish(unit.name, found[0])
             _loaded[unit.name] = found
         return _loaded[unit.name]
@@ -151,20 +150,17 @@ def written(
         return module, result
 
 
-def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> tuple[Unit, Any]:
-    """Compile a function; return the unit, and the Python functions compiled."""
-    with compilation(function.__name__), _no_collections(), choices.parts_noted() as parts:
+def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> Unit:
+    """Trace a function, and compile what no file has."""
+    with compilation(function.__name__), _no_collections(), choices.modules_noted() as modules:
+        choices.note(choices.modules_of(function))
         module, result = written(function, kinds, result)
         text = str(module)
         readable = re.sub(r"[^\w.]", "_", function.__qualname__, flags=re.ASCII)
-        name = f"{readable}.{hashlib.sha256(text.encode()).hexdigest()[:32]}"
-        made = machine.compile_text(text.replace(NAME, name))
-    unit = Unit(name, result, made, tuple(module.needs.values()), frozenset(), module.raises)
-    try:
-        found, codes = choices.contents(parts)
-    except choices.Unknown as what:
-        return unit, what
-    return unit._replace(choices=found), codes
+        name = f"{readable}.{cache.short_hash(text, cache.target())}"
+        made = cache.machine_code(name, lambda: machine.compile_text(text.replace(NAME, name)))
+    needs = tuple(module.needs.values())
+    return Unit(name, result, made, needs, frozenset(modules), module.raises)
 
 
 def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
@@ -203,11 +199,6 @@ class Kernel:
         self._plans: dict[tuple, tuple] = {}
         self._changes = trace.changes
         builtin(self)(self.in_kernel)
-
-    @property
-    def made_of(self) -> tuple:
-        """Dependencies of code that calls it (:mod:`karamelo_py.compiler.fingerprint`)."""
-        return (self.function,)
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Return the machine code for arguments of these types."""
@@ -262,8 +253,7 @@ class Kernel:
             own = formula(self.function, kinds)
             return lowering.call_own(own.name, own.run, kinds, own.result, held)
         unit = self.unit(kinds)
-        choices.note(unit.choices)
-        choices.note([self.function.__code__])
+        choices.note(unit.modules)
         if lowering.builder is None:
             return lowering.wrapped(unit.result, None)
         module = lowering.builder.module

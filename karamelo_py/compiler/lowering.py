@@ -34,7 +34,6 @@ class Lowering:
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
-        self.classes: set[type] = set()  # of the tuples encountered
         self.operations = 0
         self.regardless = False  # whether it continues when a called function raises
         self.read: dict[tuple, Any] = {}  # items already read from held tuples in this branch
@@ -47,8 +46,6 @@ class Lowering:
             return kind.literal_value
         if isinstance(kind, types.NoneType):
             return None
-        if isinstance(kind, types.BaseTuple) and hasattr(kind, "instance_class"):
-            self.classes.add(kind.instance_class)
         if isinstance(kind, HeldTuple):
             return traced.HeldValue(kind, value)
         if isinstance(kind, types.BaseTuple):
@@ -72,10 +69,9 @@ class Lowering:
             return types.literal(thing)
         if isinstance(thing, tuple):
             kinds = tuple(types.unliteral(self.kind_of(item)) for item in thing)
-            made = type(thing) if hasattr(thing, "_fields") else None
-            if made:
-                self.classes.add(made)
-            return types.BaseTuple.from_types(kinds, made)
+            return types.BaseTuple.from_types(
+                kinds, type(thing) if hasattr(thing, "_fields") else None
+            )
         if thing is None or isinstance(thing, float | np.generic):
             return typeof(thing)
         if isinstance(thing, traced.Emitted):

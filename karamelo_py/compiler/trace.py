@@ -1,16 +1,14 @@
 """Select functions by argument types, and compile them where they are called.
 
-Each number is a :class:`~karamelo_py.compiler.values.Value`; every operation on one is lowered at
-once, into the calling function. Tuples and classes are Python's and cost nothing. Statements are
-compiled in :mod:`~karamelo_py.compiler.statements`. Only functions that the cache key follows may
-be called (:mod:`karamelo_py.compiler.fingerprint`): methods of classes of tuples are refused.
+Each number is a :class:`~karamelo_py.compiler.values.Value`; every operation that meets one is
+lowered at once, into the function that calls. Tuples and classes are Python's: what only takes them
+apart costs nothing. The walk through the text is in :mod:`~karamelo_py.compiler.statements`.
 """
 
 import functools
 import itertools
 import threading
 import types as python
-from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from traceback import walk_tb
 from typing import Any, NamedTuple
@@ -18,9 +16,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler import values
+from karamelo_py.compiler import choices, values
 from karamelo_py.compiler.arithmetic import OPERATIONS
-from karamelo_py.compiler.choices import choosers, codes_in, note, parts_noted, tag_class
+from karamelo_py.compiler.choices import (
+    INTERPRETED,
+    choosers,
+    modules_noted,
+    modules_of,
+    note,
+    tag_class,
+)
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
 from karamelo_py.compiler.statements import AstFunction
 
@@ -56,7 +61,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
-    yield from getattr(error, "places", ())  # in compiled text
+    yield from vars(error).get("places", ())  # in the text that was walked
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
 
@@ -72,6 +77,7 @@ class Module:
         self._module, self._seen = module, seen
 
     def __getattr__(self, name: str) -> Any:
+        note(modules_of(self._module))
         return self._seen(getattr(self._module, name))
 
 
@@ -130,14 +136,9 @@ def _seen(thing: Any) -> Any:
     if not isinstance(thing, Hashable):
         raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
     if thing not in _copies:
-        with parts_noted() as parts:  # including those in closures
-            made = _copy(thing)
-            if isinstance(made, AstFunction | type):
-                note([getattr(made, "__code__", made)])
-        _copies[thing] = made, parts
-    made, parts = _copies[thing]
-    note(parts)
-    return made
+        _copies[thing] = _copy(thing)
+    note(modules_of(thing))
+    return _copies[thing]
 
 
 def _copy(thing: Any) -> Any:
@@ -163,31 +164,6 @@ def _copied(function: Callable) -> AstFunction:
     return _walked[function]
 
 
-_GENERATED = {*vars(namedtuple("_", ())), "__orig_bases__", "__annotations__", "__annotate_func__"}
-_METHODS = python.FunctionType | property | classmethod | staticmethod
-
-
-@functools.cache
-def _methods_of(one: type) -> frozenset[str]:
-    """List the functions defined in a class of tuples."""
-    if not getattr(one, "_fields", ()) or getattr(one, "is_followed", False):
-        return frozenset()
-    own = {name: value for base in one.__mro__[:-2] for name, value in vars(base).items()}
-    return frozenset(name for name in own.keys() - _GENERATED if isinstance(own[name], _METHODS))
-
-
-def _refuse_methods(codes: Iterable[python.CodeType], classes: set[type]) -> None:
-    """Refuse methods of tuples, because cache keys do not follow them."""
-    functions = frozenset().union(*map(_methods_of, classes))
-    inner = itertools.chain.from_iterable(map(codes_in, codes))
-    named = functions & {name for code in inner for name in code.co_names}
-    for name in sorted(name for name in functions if name.startswith("__") or name in named):
-        raise values.Untraceable(
-            f"'{name}' is a method of a class of tuples, which kernels cannot call: "
-            "write a function, or mark the class with `algebra`"
-        )
-
-
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
     """Call a point function for one that is opaque, as methods do."""
     return _seen(dispatch)(*arguments)
@@ -198,8 +174,8 @@ class _Formula(NamedTuple):
 
     run: Callable
     result: types.Type
-    parts: frozenset
-    plain: bool  # whether the type determines the result
+    modules: frozenset[str]
+    plain: bool  # whether the type says all that is known of the result
     name: str
 
 
@@ -222,21 +198,15 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
     try:
         lowering = Lowering(_seen)
         lowering.key = key
-        with values.writing(lowering), parts_noted() as parts:
+        with values.writing(lowering), modules_noted() as modules:
             chosen = _chosen(dispatch, kinds)
             if chosen is None:
                 return None
             run = _seen(chosen) if isinstance(chosen, values.Intrinsic) else _copied(chosen)
-            note([run.__code__] if hasattr(run, "__code__") else ())
+            note(modules_of(chosen))
             found = run(*(lowering.wrapped(kind, None) for kind in kinds))
             result = types.unliteral(lowering.kind_of(found))
-        codes = {part for part in parts if isinstance(part, python.CodeType)}
-        classes = {part for part in parts if isinstance(part, type)}
-        parts -= classes
-        _refuse_methods(codes, lowering.classes | classes)
-        if hasattr(dispatch, "tags"):
-            parts.add((dispatch, tuple(map(tag_class, kinds[: dispatch.tags]))))
-        return _Formula(run, result, frozenset(parts), _is_plain(found), dispatch.__qualname__)
+        return _Formula(run, result, frozenset(modules), _is_plain(found), dispatch.__qualname__)
     except (CannotCompile, Undefined):
         raise
     except (Exception, values.Untraceable) as why:
@@ -263,7 +233,7 @@ def _formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
         _formulas[key] = _written(key, dispatch, kinds)
     found = _formulas[key]
     if found is not None:
-        note(found.parts)
+        note(found.modules)
     return found
 
 
@@ -283,6 +253,60 @@ def outdate_kernels() -> None:
     """Let kernels be looked up again: some of their functions have changed."""
     global changes
     changes += 1
+
+
+class PointFunction:
+    """Function of one point, implemented for classes of its first `tags` arguments.
+
+    Called as plain Python, it chooses by the classes of the arguments; in kernels, by their types.
+    """
+
+    def __init__(self, stub: Callable, tags: int, otherwise: bool):
+        functools.update_wrapper(self, stub)
+        self.tags = tags
+        self._fallback = stub if otherwise else None
+        self._table: dict[tuple[type, ...], Callable] = {}
+        self._nearest: dict[tuple[type, ...], Callable | None] = {}
+
+    def find(self, classes: tuple) -> Callable | None:
+        """Find the implementation for these classes: their own, or the nearest of their bases."""
+        known = self._nearest  # another thread of Python may add implementations meanwhile
+        if classes not in known:
+            ways = itertools.product(*(getattr(one, "__mro__", (one,)) for one in classes))
+            found = (self._table[way] for way in ways if way in self._table)
+            known[classes] = next(found, self._fallback)
+        return known[classes]
+
+    def _plain(self, *arguments: Any) -> Any:
+        classes = tuple([a.__class__ for a in arguments[: self.tags]])
+        known = self._nearest
+        chosen = known[classes] if classes in known else self.find(classes)
+        if chosen is None:
+            raise Undefined(self.__name__, classes)
+        return chosen(*arguments)
+
+    def _watched(self, *arguments: Any) -> Any:
+        return _seen(self)(*arguments) if values.at_work() else self._plain(*arguments)
+
+    __call__ = _plain if INTERPRETED else _watched
+
+    def on(self, *classes: type) -> Callable[[Callable], Callable]:
+        """Decorate the implementation for these classes, and for classes derived from them."""
+
+        def register(implementation: Callable) -> Callable:
+            self._table[classes] = implementation
+            choices.register(implementation)
+            before, self._nearest = self._nearest, {}
+            forget()
+            if any(self.find(asked) is not found for asked, found in before.items()):
+                outdate_kernels()
+            return implementation
+
+        return register
+
+    def defined(self, *classes: type) -> bool:
+        """Tell whether there is an implementation for these classes."""
+        return self.find(classes) is not self._fallback
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
@@ -306,7 +330,7 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
         found = chooser(*kinds)
         if found is not None:
             return found
-    if hasattr(dispatch, "tags"):
+    if isinstance(dispatch, PointFunction):
         classes = [tag_class(kind) or values.words(kind) for kind in kinds[: dispatch.tags]]
         raise Undefined(dispatch.__name__, tuple(classes))
     return None

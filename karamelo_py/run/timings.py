@@ -43,6 +43,7 @@ class Timings:
     @contextmanager
     def telling_of_compilation(self) -> Iterator[None]:
         """Say so when kernels are compiled, and count the time."""
+        self._told = False
         telling = cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
         with compilation.told_to(self), telling:
             yield
