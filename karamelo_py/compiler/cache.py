@@ -166,7 +166,7 @@ def _text_of(file: str) -> str:
 
 
 def _stamp(name: str) -> str:
-    """Hash modules elsewhere: one, and those of its package or of no package that it names."""
+    """Hash a module elsewhere with the modules that it names, but of other installed packages."""
     words: dict[str, str] = {}
     ahead = {name}
     while ahead:
@@ -348,7 +348,7 @@ def code_of(name: str) -> bytes:
 
 
 def _content(path: Path) -> bytes | None:
-    """Read a file, if it can be read; one that is not whole is told of, and taken away."""
+    """Read a file; warn of a damaged one and delete it. None if nothing can be read."""
     try:
         content = read(path)
     except (FileNotFoundError, NotADirectoryError):  # told of where a file is to be written

@@ -1,7 +1,7 @@
 """Functions that choose by type, and the modules in which what they choose was written.
 
-The key of a kernel on disk has the sources of the modules that take part, but those of libraries,
-whose versions it has (`cache.py`).
+The key of a kernel on disk contains the sources of these modules, and the versions of libraries
+(`cache.py`).
 """
 
 import contextvars
