@@ -114,10 +114,11 @@ def test_a_page_answers_only_behind_its_secret_word(simulation):
 
 
 def ask(page, text):
-    """What the server answers to some bytes, until it closes or has no more to say."""
+    """What the server answers to some bytes, after which nothing more is sent."""
     port, path = re.match(r"http://127\.0\.0\.1:(\d+)(/\S+/)", page.address).groups()
     with socket.create_connection(("127.0.0.1", int(port)), timeout=1) as link:
         link.sendall(text.replace("PAGE", path).replace("PORT", port).encode())
+        link.shutdown(socket.SHUT_WR)  # or the server would wait for a further request
         found = b""
         with suppress(TimeoutError):
             while part := link.recv(1 << 16):
