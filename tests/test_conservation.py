@@ -276,10 +276,10 @@ def test_what_turns_in_the_total_frame_keeps_its_angular_momentum(run_interprete
     """
     log = run_interpreted(f"""
         method(tlmpm, {transfer}, linear{", 1" * (transfer == "AFLIP")})
-        dimension(2, -1, 1, -1, 1, 0.25)
+        dimension(2, -1, 1, -1, 1, 0.5)
         region(square, block, -0.5, 0.5, -0.5, 0.5)
         material(rubber, {law}, 1, 100, 0.3)
-        solid(square, region, square, 2, rubber, 0.25)
+        solid(square, region, square, 2, rubber, 0.5)
         fix(spin, initial_velocity_particles, all, -y0, x0)
         compute(L, angular_momentum, all)
         set_output(time(PI/8))

@@ -48,13 +48,13 @@ def last(result, name="d"):
 
 
 @pytest.mark.parametrize("kind", ["ulmpm", pytest.param("tlmpm", marks=pytest.mark.full)])
-def test_slab(run_script, kind):
+def test_slab(run_interpreted, kind):
     """Half space whose face is heated at once (Carslaw & Jaeger 1959, 2.4): second order."""
     errors = []
     for N in (10, 20):
         text = slab(HOT.format(301), ", hot_s")
         words = ("-var", "N", str(N), "-var", "kind", kind)
-        result = run_script(text, *words, folder=f"run{N}")
+        result = run_interpreted(text, *words, folder=f"run{N}")
         points = last(result)
         exact = [300 + erfc(x / (2 * sqrt(0.02))) for x in points.x]
         errors.append(sqrt(np.mean((points["T"] - exact) ** 2)))

@@ -218,9 +218,9 @@ DRAINED = """
 """
 
 
-def test_drained_triaxial(run_script):
+def test_drained_triaxial(run_interpreted):
     """dq = 3 dp from p0: q = M p at p = 3 p0/(3 - M), the critical state."""
-    result = run_script(DRAINED)
+    result = run_interpreted(DRAINED)
     table = read_log(result.folder / "element_drained.txt")
     assert table["p"][-1] == pytest.approx(3 * 100e3 / (3 - 1.2), rel=2e-3)
     assert table["q"][-1] == pytest.approx(1.2 * table["p"][-1], rel=2e-3)
