@@ -81,11 +81,11 @@ def older(path: Path) -> None:
 @pytest.mark.parametrize(
     ("ruin", "said"),
     [
-        (cut, "r.2.h5 is no file that this program can go on from: "),
-        (overwritten, "r.2.h5 is no file that this program can go on from: "),
-        (of_another, "r.2.h5 is no file that this program can go on from\nexpected: a file that"),
-        (of_another_kind, "r.2.h5 is no file that this program can go on from: list indices"),
-        (spoilt, "r.2.h5 is no file that this program can go on from: "),
+        (cut, "r.2.h5 is not a restart file of this program: "),
+        (overwritten, "r.2.h5 is not a restart file of this program: "),
+        (of_another, "r.2.h5 is not a restart file of this program\nexpected: a file that"),
+        (of_another_kind, "r.2.h5 is not a restart file of this program: list indices"),
+        (spoilt, "r.2.h5 is not a restart file of this program: "),
         (spoilt_numbers, "r.2.h5: the file is damaged: "),
         (incomplete, "r.2.h5: its state is not one of this scene: v of points"),
         (older, "r.2.h5 has format 4, of an older karamelo-py"),

@@ -245,7 +245,7 @@ def test_what_is_refused_is_said_before_the_run(run_interpreted):
     assert "a GPU takes no steps of scheme quasi-static" in said
     assert "    7 | scheme(quasi-static)" in said
     said = run_interpreted(squares("run(1)"), "--gpu", "--ranks", "2", status=1).err
-    assert said.startswith("error: --gpu: one GPU has all of a scene, and 2 processes would share")
+    assert said.startswith("error: --gpu: one GPU has all of a scene, and 2 processes would divide")
 
 
 def test_check_says_what_a_scene_takes_there(run_interpreted):

@@ -525,7 +525,7 @@ def test_who_stops_a_study_on_its_page_interrupts_it(tmp_path, monkeypatch, caps
         studies.run(parsed(words))
     said = capsys.readouterr()
     assert "live: http://127.0.0.1" in said.out
-    assert "1 of 3 runs are in sweep.csv; the same command goes on" in said.err
+    assert "1 of 3 runs are in sweep.csv; the same command continues" in said.err
 
 
 def parsed(words):

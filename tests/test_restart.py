@@ -431,7 +431,7 @@ def test_no_file_to_go_on_from(run_interpreted, content):
         4: "bad.h5 has format 4, of an older karamelo-py",
         99: "without this file, or go on with the newer karamelo-py that wrote it",
     }
-    assert says.get(content, "is no file that this program can go on") in result.err
+    assert says.get(content, "is not a restart file of this program") in result.err
     assert result.err.count("error:") == 1
     assert (folder / "log.mpm").read_text().count("\n") == 6  # nothing was begun anew
 

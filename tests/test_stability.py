@@ -107,7 +107,7 @@ def test_an_interrupted_map_is_drawn_and_goes_on(folder, monkeypatch, capsys):
 
     monkeypatch.setattr(Launch, "run", interrupted)
     assert main(["stability", "in.bar", *words]) == 130
-    assert "1 of at most 2 runs are kept; the same command goes on" in capsys.readouterr().err
+    assert "1 of at most 2 runs are kept; the same command continues" in capsys.readouterr().err
     assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable"]
     assert (folder / "map.svg").exists()
     monkeypatch.setattr(Launch, "run", run)

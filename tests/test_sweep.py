@@ -173,7 +173,7 @@ def test_a_sweep_that_is_interrupted_amid_a_run_goes_on(folder, monkeypatch, cap
 
     monkeypatch.setattr(Launch, "run", counted)
     assert main(["sweep", *words]) == 130
-    assert "1 of 2 runs are in sweep.csv; the same command goes on" in capsys.readouterr().err
+    assert "1 of 2 runs are in sweep.csv; the same command continues" in capsys.readouterr().err
     assert main(["sweep", *words, "-limit", "0.3"]) == 0
     assert begun == ["3", "4", "4"]
     assert [row["status"] for row in records.read(folder / "sweep.csv")] == ["done", "too long"]
@@ -203,7 +203,7 @@ def test_an_interrupted_sweep_goes_on(folder, capsys):
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "1 of 2 runs are in sweep.csv; the same command goes on" in said
+    assert "1 of 2 runs are in sweep.csv; the same command continues" in said
     # The run that was in progress has ended, too: its log does not grow any more.
     size = second.stat().st_size
     time.sleep(0.3)

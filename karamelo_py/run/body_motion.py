@@ -13,7 +13,7 @@ from karamelo_py.run.boxes import unique
 class BodyMotion(NamedTuple):
     """Motion of a solid with points."""
 
-    number: int  # of the solid among those of the scene
+    number: int  # of the solid in the scene
     mass: float
     centre: np.ndarray  # (d,) of mass
     velocity: np.ndarray  # (d,) of the centre

@@ -141,7 +141,7 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
 
 
 def room_of(rows: int, like: np.ndarray) -> np.ndarray:
-    """Make `rows` zero rows like those of the array; with none it can grow."""
+    """Make `rows` zero rows like the array's; with none it can grow."""
     width, kind = like.shape[1], like.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 

@@ -37,7 +37,7 @@ class LoadPath(Named):
     stress: Mapping[str, float]
     shear: Sequence[str] = ()  # components of `strain` that are simple shear, not pure
     volumetric: float | None = None  # sum of normal strains, reached by those that are not named
-    turn: float = 0.0  # angle about z by which the point turns meanwhile
+    turn: float = 0.0  # angle about z by which the point rotates
 
     catalogue = "load_paths"
 
@@ -56,13 +56,13 @@ class LoadPath(Named):
             raise ScriptError(
                 f"the volume is prescribed, and s{normal[0]} needs it free",
                 argument="volumetric",
-                expected="normal strains beside volumetric, no normal stresses",
+                expected="normal strains with volumetric, no normal stresses",
             )
         if set(NORMAL) <= set(self.strain):
             raise ScriptError(
                 "all normal strains are prescribed: the volume follows from them",
                 argument="volumetric",
-                expected="two normal strains at most beside volumetric",
+                expected="two normal strains at most with volumetric",
             )
 
     def strain_at_end(self, strain: np.ndarray, free: Sequence[str]) -> np.ndarray:
@@ -281,7 +281,7 @@ class Point:
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
-        """Return dt grad v (3, 3) of a strain increment, pure, or simple in those of `shear`."""
+        """Return dt grad v (3, 3) of a strain increment, pure, or simple in `shear`."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():
             simple = k in shear
@@ -290,7 +290,7 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """Return dt grad v (3, 3) of a turn about z, in the form that the law takes for rigid.
+        """Return dt grad v (3, 3) of a rotation about z, in the form that is rigid for the law.
 
         To first order that is a skew tensor. To second order a law takes its strain from the
         symmetric part, its volume from det F, or all from F, and the three disagree.
@@ -316,7 +316,7 @@ class Point:
         return tensor(self.kin, [float(gradient[place]) for place in GRADIENT[type(self.kin)]])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
-        """Take the new state; the work is that of the mean Kirchhoff stress."""
+        """Take the new state; the work is computed with the mean Kirchhoff stress."""
         weights = np.where(np.arange(6) < 3, 1, 2)
         before = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.state = state

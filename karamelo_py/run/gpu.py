@@ -73,7 +73,7 @@ def _no_formula(*_):
 class StepsOnCard:
     """Take the steps of a lowered scene on a card.
 
-    `functions` are those of the compiled hooks, in the order of their table.
+    `functions` belong to the compiled hooks, in the order of their table.
     """
 
     def __init__(
@@ -454,7 +454,7 @@ class StepsOnCard:
         self.ordered = -np.inf
 
     def fetch(self) -> None:
-        """Copy it back, but for nodes; clock and values are those of the last step already."""
+        """Copy it back, but for nodes; clock and values are up to date already."""
         here = arrays_in(self.s._replace(control=()))
         nodes = set(map(id, self._of_nodes()))
         self.images.fetch([array for array in here if id(array) not in nodes])

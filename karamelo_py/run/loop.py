@@ -196,7 +196,7 @@ class RunLoop:
         if isnan(holds):
             lost = sorted(name for name in self.condition.names if isnan(values.get(name)))
             raise ScriptError(
-                f"step {self.hub.update.step}: nobody can tell whether the condition holds: "
+                f"step {self.hub.update.step}: the run condition is not a number: "
                 + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
                 place=self.place,
                 expected="values that are numbers at every step",

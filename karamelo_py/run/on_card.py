@@ -32,7 +32,7 @@ class SimulationOnCard(Simulation):
 
     `setup` brings the arrays back where steps have been taken since. What changes them here says so
     by `changed` or `sort`; they are sent again before the next steps. The order of the points is
-    that of the card then, and tiles know nothing of it: who needs these sorts first.
+    the GPU's then, and tiles are out of date: users of tiles sort first.
     """
 
     states_every = 1000  # what is kept has to be brought back

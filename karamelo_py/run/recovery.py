@@ -251,7 +251,7 @@ class RollBack:
 
     @contextmanager
     def _as_warnings(self) -> Iterator[None]:
-        """Turn errors in writing into warnings: another error is about to be raised."""
+        """Turn errors in writing into warnings: a further error is about to be raised."""
         try:
             yield
         except ScriptError as error:

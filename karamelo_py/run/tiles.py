@@ -24,7 +24,7 @@ TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # times, along the rows of nodes in 3D, if cells have one point: otherwise boxes have
 #             more nodes than points, and many tiles have few points
-SHARES = 64  # of the points of a block, nearly equal: threads share them out
+SHARES = 64  # parts of the points of a block, nearly equal, divided among threads
 # Times the nodes: boxes that cannot have more rows are allocated at once, aligned with cache lines;
 # untouched pages cost no memory. Larger ones grow.
 AT_ONCE = 8
@@ -56,7 +56,7 @@ class Tiles:
             self.node_size[:] = 1, 1, self.size[-1]
         self.per_cell = basis.traits.nodes_per_cell
         self.least_nodes = basis.traits.least_nodes
-        self.beyond = basis.traits.cells // 2  # nodes that points see beyond those of their cell
+        self.beyond = basis.traits.cells // 2  # nodes seen beyond the nodes of a cell
         self.sorts = self.sets = 0  # number of sorts; sets of buffers
         self.rows = 0  # of the buffers, for the boxes of all tiles
         self.occupied = 0  # tiles that hold points
@@ -67,7 +67,7 @@ class Tiles:
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # Points without a domain reach no further than two cells from those of their tile; contact
+        # Points without a domain reach at most two cells beyond their tile; contact
         # adds one.
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
@@ -225,7 +225,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """As `_parts_to_sum`, for few points: one share, a part for each span."""
+        """As `_parts_to_sum`, for few points: one set, a part for each span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -237,9 +237,9 @@ class Tiles:
         return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """Find spans and ranges of nodes in tiles that boxes reach; first of each share, and parts.
+        """Find spans and ranges of nodes in tiles that boxes reach; first of each set, and parts.
 
-        Nodes are in the order of the shares of points with most of them: the contributions of a
+        Nodes are in the order of the sets of points that see most of them: the contributions of a
         thread are in its caches, and fetching them from another thread's takes longer than the sum.
         """
         boxes, reached = self._reached(self._boxes(s))
@@ -272,10 +272,10 @@ class Tiles:
         return grid_boxes.joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """Find the first of the tiles of nodes (n,) that belong to one share with each.
+        """Find the first of the tiles of nodes (n,) that belong to one set with each.
 
         Memory access with gaps of some thousand bytes takes twice as long. So one thread has one
-        share, and long tiles share with those in the same rows of nodes.
+        set, and long tiles join tiles in the same rows of nodes.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -285,7 +285,7 @@ class Tiles:
         return tile - (tile - first) % along
 
     def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
-        """Return for each own tile the share of the points of its block."""
+        """Return for each own tile its set of the points of its block."""
         found = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count
@@ -379,11 +379,11 @@ def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Return the share of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
+    """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
-    `parts` (n, 10) are the parts of all nodes of a tile in use (see `Buffers`). A share gets the
+    `parts` (n, 10) are the parts of all nodes of a tile in use (see `Buffers`). A set gets the
     tiles whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the
-    same number in `beside` (n,) get the share of the first of them.
+    same number in `beside` (n,) get the set of the first of them.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -400,7 +400,7 @@ def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Find where shares of tiles with these points (T, 2) begin, nearly equal, and end: (size,)."""
+    """Find where sets of tiles with these points (T, 2) begin, nearly equal, and end: (size,)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:

@@ -21,7 +21,7 @@ def _clocks() -> np.ndarray:
 
 
 class Timings:
-    """Seconds that a run spends: (2,) those that have passed, and those of all threads."""
+    """Seconds of a run: (2,) elapsed time, and processor time of all threads."""
 
     def __init__(self, hub: Hub):
         self.hub = hub

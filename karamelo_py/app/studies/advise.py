@@ -48,10 +48,10 @@ target at the least cost, how sure that is, and what to write.
 
 One variable, the number with the most values, makes a scene finer; the others are choices. Where
 all numbers have one value, words are compared at that size. Runs go one at a time, since their
-times count, unless another cost is named. What an earlier call has run is used. A run that meets
-the target by chance is not advised: where the sign of its error changes, its order exceeds that of
-its functions, or a finer run is worse; a finer run is made to see it. With -run the variant is run,
-and it is told whether it met the target."""
+times count, unless another cost is named. Runs of an earlier call are used. A run that meets the
+target by chance is not advised: if the sign of its error changes, its order exceeds the order of
+the basis, or a finer run is worse; finer runs are made to check. With -run the variant is run and
+checked against the target."""
 
 
 # Functions whose gradients jump between cells, and methods whose points cross these.
@@ -82,7 +82,7 @@ def forecast(
     order that has fallen may fall by as much again, and one that has not yet reached 2 may. Errors
     that chance has made small count as large as they may be (`credible`, with the order `highest`
     of the functions). The time is steps times (a + b points), fitted to the runs; any other cost
-    goes on as between the last two. None where fewer than two runs have an error, or the last one
+    continues as between the last two. None where fewer than two runs have an error, or the last one
     got worse.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
@@ -100,7 +100,7 @@ def forecast(
         return None
     expected = -fall[-1]
     rates = [-f for f in fall if f < 0]
-    # An order that falls may go on falling.
+    # A decreasing order may decrease further.
     drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
     slow = max(min(*rates, expected / 2, expected - drop), 0.0)
     fast = max(*rates, 4 / 3 * expected, min(highest, SECOND) if drop == 0 else 0.0)
@@ -216,7 +216,7 @@ class Adviser:
                 self.go_on(choice)
 
     def _met(self, choice: ChoiceRuns) -> list[Candidate]:
-        """Find those of its runs that meet the target."""
+        """Find the runs of it that meet the target."""
         signed = errors(choice.rows, self.accuracy)
         costs = column(choice.rows, self.cost)
         why = by_chance(self.xs[: len(signed)], signed, choice.highest)
@@ -237,7 +237,7 @@ class Adviser:
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
         """Tell whether gradients of its functions jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
-        stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN: nobody knows
+        stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN: unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
 
     def candidate(
@@ -267,7 +267,7 @@ class Adviser:
         return min(found, key=lambda c: c.cost, default=None)
 
     def candidates(self, hope: bool = False) -> list[Candidate]:
-        """Find those of all choices, the cheapest first."""
+        """Find the runs of all choices that meet it, the cheapest first."""
         found = filter(None, (self.candidate(choice, hope) for choice in self.choices))
         return sorted(found, key=lambda c: c.cost)
 
@@ -408,7 +408,7 @@ def run(options: Any) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Put values in the order of the work they make: `karamelo-py check` tells that of the ends."""
+    """Put values in the order of the work they make: `karamelo-py check` measures the ends."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
@@ -473,7 +473,7 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
         return f"sure: it was run ({said}){alone}"
     # What is known of its kind may end the fall: its orders tell no bound then.
     if doubts := adviser.doubts(best):
-        return "\n  ".join([f"not sure: expected {said}, if the error goes on to fall", *doubts])
+        return "\n  ".join([f"not sure: expected {said}, if the error continues to fall", *doubts])
     low, high = best.forecast.low, best.forecast.high
     word = "almost sure"
     if high > adviser.target:
@@ -509,7 +509,7 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised; where it misses the target, go on with what is known then.
+    """Run what is advised; if it misses the target, continue with the new result.
 
     Where nothing is expected to meet it, what may is tried.
     """

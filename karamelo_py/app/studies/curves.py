@@ -103,7 +103,7 @@ def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.
     """Find sizes of errors that a forecast may begin with: never less than chance lets them be.
 
     An error is at least what the step from the one before it leaves with the order `highest`, and
-    at least that of each finer run.
+    at least each finer run's.
     """
     values = np.asarray(values, float)
     size = np.abs(values)

@@ -86,7 +86,7 @@ class NoDerivatives(ScriptError):
 
 @dataclass
 class End:
-    """Hold where a search ended: shares of the ranges, differences that remain, slopes there."""
+    """End of a search: positions in the ranges (0 to 1), remaining differences, slopes."""
 
     share: np.ndarray
     off: np.ndarray
@@ -99,7 +99,7 @@ class End:
 
 
 class Search:
-    """Runs of a script by the shares of the ranges of its variables, from 0 to 1."""
+    """Runs of a script by the positions of its variables in their ranges, from 0 to 1."""
 
     def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
@@ -113,12 +113,12 @@ class Search:
         self.low, self.high = (np.array([end(given) for given in numbers]) for end in (min, max))
 
     def case(self, share: np.ndarray) -> dict[str, str]:
-        """Name the values at these shares of the ranges."""
+        """Return the values at these positions in the ranges."""
         at = self.low + share * (self.high - self.low)
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *shares: np.ndarray) -> list[np.ndarray]:
-        """Compare the logs of runs at these shares with what is measured: inf where one failed."""
+        """Compare the logs of runs at these positions with measurements; inf if one failed."""
         cases, found = [self.case(share) for share in shares], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:

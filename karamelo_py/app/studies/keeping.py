@@ -26,7 +26,7 @@ class Kept(NamedTuple):
     """
 
     word: str
-    number: float  # mean of the last part over that of the first; of a run that breaks, when
+    number: float  # mean of the last part over the mean of the first; for a run that breaks, when
     said: tuple[str, ...]  # warnings, and the error that ended it: known causes where it named them
     warned: bool  # or the error that ended it names a known cause
 
@@ -39,7 +39,7 @@ class Kept(NamedTuple):
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
     """Find the word for a column `y` over `x`, and its mean over the last part over that at first.
 
-    The parts are shares of the way along `x`.
+    The parts are fractions of the range of `x`.
     """
     span = SHARE * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())

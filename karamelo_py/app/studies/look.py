@@ -54,8 +54,8 @@ def place(word: str, others: Sequence[str] = ()) -> int:
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
     """Colour, number of the marker and number of the dashes of each line of a chart.
 
-    The first variable gives colour and marker, the others the dashes: those of their words, or the
-    next that no line of this colour has.
+    The first variable gives colour and marker, the others the dashes: fixed ones for known words,
+    or the next that no line of this colour has.
     """
     names = list(choices[0]) if choices else []
     if not names:
@@ -97,7 +97,7 @@ def readable(colour: str) -> str:
 
 
 def contrast(rgb: Any) -> float:
-    """Divide the luminance of white by that of a colour (sRGB, 0 to 1), as WCAG 2.1 defines it."""
+    """Contrast of white to a colour (sRGB, 0 to 1) as defined by WCAG 2.1."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
@@ -109,7 +109,7 @@ def label(name: str) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every so many decades.
+    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every few decades.
 
     At more leading digits where a short axis would have fewer than three; never so near to each
     other that their numbers would touch.
@@ -130,7 +130,7 @@ def log_ticks(low: float, high: float) -> list[float]:
 
 
 def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
-    """Those of ascending ticks that are a `PART` of a logarithmic axis behind the one before."""
+    """Select ascending ticks at least a `PART` of a logarithmic axis apart."""
     found: list[float] = []
     for tick in ticks:
         if not found or tick >= found[-1] * (high / low) ** PART:
@@ -202,7 +202,7 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
     """Write names of lines next to the axes, by x and y of their ends, names and colours.
 
-    Lines of a colour that end at one place share a name: "linear, usf / usavg".
+    Lines of a colour that end at one place get one name: "linear, usf / usavg".
     """
     if not ends:
         return

@@ -295,7 +295,7 @@ class Pair:
 
     @property
     def cost_ratio(self) -> float:
-        """The cost of the second over that of the first."""
+        """Ratio of the second's cost to the first's."""
         return self.cost[1] / self.cost[0]
 
 

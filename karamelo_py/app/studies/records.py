@@ -32,7 +32,7 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _PART = re.compile(rf"\b([^\W\d]\w*):([^\W\d]\w*)(?::({_NUMBER}))?")
 _NAME = re.compile(r"\b([^\W\d]\w*)\b(?!\s*\()")
 _SIZE = re.compile(r"\s*abs\s*\((.*)\)\s*", re.DOTALL)
-SIGNED = "_signed"  # behind the name of a size: the column of the value that it is the size of
+SIGNED = "_signed"  # suffix of a magnitude: the column of its signed value
 
 
 class Reduction:
@@ -164,8 +164,8 @@ def row(
 ) -> dict[str, Any]:
     """Make the row of a run; what is not known of it is left empty.
 
-    A run that did not end well has no recorded values: those of its last moments say nothing. The
-    reason of one that is done is that of the first value that it lacks.
+    A failed run has no recorded values, because its last moments mean nothing. The
+    reason of a finished run is that of the first missing value.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)

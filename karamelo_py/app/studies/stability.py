@@ -44,7 +44,7 @@ UNKNOWN = -1
 GAINED = "spurious energy gain"
 LOST = "spurious energy loss"
 CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
-BORNE = ("stable", "damped")  # classes of steps that are borne
+BORNE = ("stable", "damped")  # classes of tolerable steps
 UNTOLD = ("left", "short")  # of steps that nothing is known of
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program looks often enough at energies
@@ -143,7 +143,7 @@ def run(options: Any) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Find the largest mean of an energy over that of its first tenth; infinite for NaN.
+    """Find the largest mean of an energy over the mean of its first tenth; infinite for NaN.
 
     Means are over a tenth of the rows. From rest the median replaces the first mean.
     """
@@ -179,7 +179,7 @@ def in_short(row: Mapping[str, Any], code: str) -> str:
 class Map:
     """The plane of a stability map.
 
-    Of all variables in `values` the one or two `axes` vary. Growth is that of the log column
+    Of all variables in `values` the one or two `axes` vary. Growth is measured by the log column
     `energy` by more than the factor `bound`, or, where none is named, what the program finds. The
     column `error` shades what is stable. Variables go in step with their `leaders`.
     """
@@ -290,7 +290,7 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Find in each row where the first step is that of this column; None where none is.
+        """Find in each row where the first step equals this column; None if nowhere.
 
         Beyond the runs of a row the ratio of the steps continues as a power of the first variable.
         Rows of numbers with fewer than two runs lie between their neighbours.
@@ -422,7 +422,7 @@ class Map:
         savefig(figure, path)
 
     def _shade(self, figure: Any, axes: Any) -> None:
-        """Shade stable cells by their errors; those of cells that were not run lie between."""
+        """Shade stable cells by their errors, interpolated for cells that were not run."""
         from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
         stable = [cell for cell, kind in self.classes.items() if kind == "stable"]
@@ -482,7 +482,7 @@ def explore(
     `classify` gives the classes of cells; it is asked for several at once, none of which tells
     another. Returns the classes of those cells, and of the others.
     """
-    classes: list[Hashable] = []  # those of the numbers in the planes
+    classes: list[Hashable] = []  # of the numbers in the planes
     known = np.full(shape, UNKNOWN)
     first = [_cuts(n, 1 if words else stride) for n, words in zip(shape, apart, strict=True)]
     cells = [(i, j) for i in first[0] for j in first[1]]

@@ -99,7 +99,7 @@ class Study:
         """Give the rows of these cases, in order; runs what is not known yet.
 
         When the user interrupts, runs in progress are taken down, finished ones are kept, and it is
-        told how to go on.
+        told how to continue.
         """
         waiting = []
         for case in cases:
@@ -123,7 +123,7 @@ class Study:
                 kept = f"in {self.out}" if self.writes else "kept"
                 of = f"at most {self.most}" if self.most else str(len(cases))
                 said = f"{len(self.rows)} of {of} runs are {kept}"
-                print(f"{said}; the same command goes on with the others", file=sys.stderr)
+                print(f"{said}; the same command continues with the rest", file=sys.stderr)
                 raise
         return [self.rows[tuple(case.values())] for case in cases]
 
@@ -204,7 +204,7 @@ class _Display:
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
         if self.bar.disable:
             return
-        # Nobody knows how many more a study by and by asks for.
+        # The number of further runs of an adaptive study is unknown.
         left = None if self.study.most else self.left(queue, running)
         done, of = self.progress
         said = f"{done} of {'at most ' if self.study.most else ''}{of} runs"

@@ -106,7 +106,7 @@ def cases(
 
 
 class NamesOfCase:
-    """The names in a formula of an option: those of `known` values, and words without quotes."""
+    """The names in a formula of an option: `known` values, and words without quotes."""
 
     def __init__(self, option: str, known: Mapping[str, Any], words: Iterable[str] = ()):
         self.option, self.known, self.words = option, {**CONSTANTS, **known}, words
@@ -251,7 +251,7 @@ def add_family(parser: Any) -> None:
     )
     parser.add_argument("-again", action="store_true", help="repeat runs of earlier studies, too")
     parser.add_argument(
-        *LIVE, action="store_true", help="show the study on a page in a browser, while it goes on"
+        *LIVE, action="store_true", help="show the running study on a page in a browser"
     )
 
 

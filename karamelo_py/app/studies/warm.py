@@ -1,7 +1,7 @@
 """Begin runs as copies (forks) of a process that has imported the program.
 
 A run is a process like any other: the study waits for it, and nothing that happens to it affects
-others. On Linux, where the study can adopt what its child leaves behind; elsewhere, and where any
+others. On Linux, where the study can adopt orphaned processes; elsewhere, and where any
 of this fails, a run starts from nothing.
 """
 

@@ -76,7 +76,7 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
 
 
 def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield what a file to go on from holds of the present state, or of the one that is `kept`.
+    """Yield the content of a restart file for the present state, or for the `kept` one.
 
     All processes go through this together; the first gets the arrays, with the bits and in the
     order of one process.
@@ -151,7 +151,7 @@ class InFile:
 
 @contextmanager
 def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
-    """Open a file to go on from: its arrays by name; they are read when they are looked at."""
+    """Open a restart file: its arrays by name, read on access."""
     import h5py
 
     found: dict[str, InFile] = {}
@@ -302,7 +302,7 @@ def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> T
 
 
 def take_points(points: Points, found: Mapping[str, Any], stem: str) -> Points:
-    """Return points in the order and number of the arrays, which they keep where these fit."""
+    """Return points in the order and number of the arrays, reusing arrays that fit."""
     check_points(points, found, stem)
     own: dict[str, Any] = {
         name: None if array is None else as_rows_of_points(found[stem + name])
@@ -318,7 +318,7 @@ def take_points(points: Points, found: Mapping[str, Any], stem: str) -> Points:
 
 
 def check_points(points: Points, found: Mapping[str, Any], stem: str) -> None:
-    """Refuse arrays that are none of such points; places may be those of now alone."""
+    """Refuse arrays that do not fit such points; positions may be only the present ones."""
     likes = dict(arrays_of(points))
     there = {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
     for name in likes.keys() ^ there.keys():
@@ -376,7 +376,7 @@ def _misfit(what: str) -> ScriptError:
 
 
 def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state of which each process has its `own` part, so many points at a time."""
+    """Yield a state of which each process has its `own` part, in pieces."""
     s, comm = simulation.setup, simulation.comm
     parts = comm.gather(
         {

@@ -1,6 +1,6 @@
 """States of the parts of a scene: what they remember, to go back to and to write.
 
-A part names the attributes in which it keeps what it has seen or added up::
+A part names the attributes that store what it has seen or summed::
 
     class Dose(Compute):
         remembers = ("total",)
@@ -54,7 +54,7 @@ class PartStates(NamedTuple):
         return cls(parts, arrays, {name: hub.values.get(name) for name in names})
 
     def give(self, hub: Hub, *, cut: bool = False, anew: bool = False) -> None:
-        """Let all parts remember that; with `cut` outputs go on in their files, or `anew`."""
+        """Restore all parts; with `cut`, outputs continue in their files, or start `anew`."""
         for name, value in self.values.items():
             if name in hub.values:
                 hub.values.set(name, value)
@@ -253,7 +253,7 @@ class RollbackPoint:
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: Any, *, cut: bool = False) -> None:
-        """Go back there; with `cut` outputs go on from there in their files, for good."""
+        """Go back to that state; with `cut`, outputs are cut there and continue."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
         if cut:

@@ -1,4 +1,4 @@
-"""Files to go on from: the whole scene at one moment, in HDF5.
+"""Restart files: the whole scene at one time, in HDF5.
 
 Everything in them follows from what the parts of a scene declare: the arrays from their fields, the
 rest from what they remember (:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not in them:
@@ -169,7 +169,7 @@ def _put(group: Any, found: Iterator[Stored]) -> None:
 
 
 def is_restart(path: Path) -> bool:
-    """Tell whether a file is one to go on from."""
+    """Tell whether a file is a restart file."""
     import h5py
 
     try:
@@ -188,7 +188,7 @@ class Restart:
         self.path = path = _latest(path, out)
         if not path.is_file():
             raise _no_file(path, out)
-        what = f"{path} is no file that this program can go on from"
+        what = f"{path} is not a restart file of this program"
         try:
             with h5py.File(path, "r", locking=False) as root:
                 if root.attrs.get("format") != FORMAT:
@@ -201,7 +201,7 @@ class Restart:
                         f"({root.attrs['program']}), and this one ({__version__}) reads format "
                         f"{VERSION} alone",
                         argument="file",
-                        hint="run the script from its beginning, without this file, or go on with "
+                        hint="run the script from its beginning, without this file, or with "
                         f"the {age.split()[1]} karamelo-py that wrote it",
                     )
                 refuse_altered(path, large=False)
@@ -219,7 +219,7 @@ class Restart:
                 was = f"-var {name} {before[name]}" if name in before else f"no -var {name}"
                 raise ScriptError(
                     f"{self.path} was written with {was}; now it is -var {name} {text}",
-                    expected="the same variables; those of the file are taken where none are given",
+                    expected="the same variables; by default they are taken from the file",
                     hint="leave it out; how long the last run is may be changed in its own line, "
                     "as a number",
                 )
@@ -236,7 +236,7 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Put the scene into the state of the file; with `outputs` they go on in their files.
+        """Put the scene into the state of the file; with `outputs`, these continue in their files.
 
         Within a run `point` becomes the last good state that the file holds.
         """

@@ -1,4 +1,4 @@
-"""Averaged volumes (F-bar) in the equations of an implicit step."""
+"""F-bar in the equations of an implicit step."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ class AveragedVolumes:
     Parameters
     ----------
     equations
-        Those of a step, with the points that nodes are seen by.
+        For one step, with the points around each node.
     """
 
     def __init__(self, equations: Any):

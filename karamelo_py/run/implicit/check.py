@@ -16,7 +16,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 
-# Moments of fixes in implicit steps; those of plug-ins may be called more than once per step.
+# Hooks of fixes in implicit steps; hooks of plug-ins may be called more than once per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
@@ -32,13 +32,13 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     if Moment in declared([transfer], "point_fields") or name not in ("FLIP", "PIC"):
         yield (
             f"moves points by increments, which transfer {name} has no part in",
-            "FLIP, with an alpha of 1 behind the basis, in its place",
+            "FLIP instead, with an alpha of 1 after the basis",
             method.place,
         )
     if update.thermal and any(
         can(solid.material.law, constrained_velocity) for solid in hub.solids.values()
     ):
-        yield "knows no heat that flows beside rigid solids", f"mechanical, or {_EXPLICIT}", None
+        yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
         yield "knows no heat that flows beside contact", f"mechanical, or {_EXPLICIT}", method.place
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
@@ -48,7 +48,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     if hub.settings.precision != "double":
         yield "needs double precision", "no precision(single)", None
     if hub.settings.comm.size > 1:
-        yield "runs in one process", "no --ranks; --threads shares out points", None
+        yield "runs in one process", "no --ranks; --threads divides the points", None
     kin = method.kinematics(hub)
     for solid in hub.solids.values():
         law = solid.material.law
@@ -65,7 +65,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             continue
         if not bears and not update.scheme.traits.inertia:
             yield (
-                f"finds no equilibrium of '{solid.id}', which bears no shear: a gas or fluid",
+                f"finds no equilibrium of '{solid.id}', which sustains no shear: a gas or fluid",
                 f"scheme(newmark), or {_EXPLICIT}",
                 solid.place,
             )
@@ -169,7 +169,7 @@ def check(hub: Hub) -> None:
         raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)
     if update.scheme.traits.inertia and not update.fixed_dt:
         raise ScriptError(
-            f"{name} has no step of its own",
+            f"{name} has no default step",
             place=update.scheme_place,
-            hint="set_dt(...): vibrations that last twenty steps keep their period within 1 %",
+            hint="set_dt(...): with twenty steps per vibration the period is right within 1 %",
         )

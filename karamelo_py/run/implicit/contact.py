@@ -1,12 +1,12 @@
-"""Contact between solids with fields of their own, within Newton's method.
+"""Contact between solids with separate fields, within Newton's method.
 
 Where two bodies meet at a node, the displacement u of the first as the second sees it may close the
 gap g between them along their common normal N, and not more. What goes further meets a stiff
 spring: the pressing force is p = max(0, k (N u - g)). Along the surface the bodies stick by another
-one, as long as it bears less than friction, |k s| <= mu p for the slip s of the step; then they
+one, as long as it sustains less than friction, |k s| <= mu p for the slip s of the step; then they
 slide, and the force is mu p against the slip (Coulomb; Wriggers 2006, "Computational Contact
 Mechanics", chapter 10). Both derivatives are exact. Normals and gaps are
-those of the beginning of the step.
+taken from the beginning of the step.
 """
 
 from typing import Any
@@ -66,7 +66,7 @@ class Contact:
         self.gap = np.maximum(gap[chosen], 0.0)
         self.first, self.second = (equations.number_of(one) for one in self.pairs.T)
         self.a, self.b = (equations.grid[one] for one in (self.first, self.second))
-        # Their drag would turn with each correction, and Newton's method would not end.
+        # Their drag would rotate with each correction, and Newton's method would not converge.
         mu = tag.friction[self.a, self.b]
         self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
@@ -212,7 +212,7 @@ class Contact:
         return -(rows.T @ np.atleast_1d(spsolve(W.tocsc(), seen))).reshape(v.shape)
 
     def _across(self) -> sp.csr_matrix:
-        """Give the relative displacement along the normal by that of the nodes, (c, m d)."""
+        """Matrix of relative normal displacements from nodal displacements, (c, m d)."""
         c, d = self.normal.shape
         at = np.repeat(np.arange(c), d), np.arange(c * d)
         return (sp.csr_matrix((self.normal.ravel(), at), (c, c * d)) @ self.jumps).tocsr()

@@ -49,7 +49,7 @@ class Moduli(NamedTuple):
 
     mean: float  # by volume; 0 if nothing deforms
     of_grids: np.ndarray  # (g,) the means of each grid, 0 where nothing deforms
-    of_laws: list[np.ndarray]  # (2, k) those of the laws of each block; their specific volumes
+    of_laws: list[np.ndarray]  # (2, k) numbers of the laws of each block; their specific volumes
 
     def alike(self) -> bool:
         """Tell whether all bodies have the same modulus."""
@@ -67,7 +67,7 @@ class Equations:
     mode
         One thread, or several.
     known
-        What those of the step before give (`known`), or nothing.
+        From the step before (`known`), or nothing.
     stabilised
         Whether there is a ghost stabilisation.
 
@@ -154,7 +154,7 @@ class Equations:
         return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
 
     def _numbered(self, seen: loops.Seen) -> loops.Seen:
-        """Put numbers of nodes among the unknown ones in the place of those in the grid."""
+        """Replace numbers of nodes in the grid by numbers among the unknowns."""
         most = int(seen.count.max(initial=1))
         number = self.number_of(seen.nodes[:, :most])
         own = valid(seen)[:, :most] & (number >= 0)
@@ -173,7 +173,7 @@ class Equations:
     def _find_pairs(self, stabilised: bool) -> None:
         """Find the pairs of nodes that points see both of, and lay out K, a block for each.
 
-        Those of the ghost stabilisation are among them, and each node with itself.
+        Pairs of the ghost stabilisation are included, and each node with itself.
         """
         d, m = self.d, len(self.nodes)
         reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
@@ -241,7 +241,7 @@ class Equations:
     def furthest_into(self, u: np.ndarray, held: np.ndarray) -> float:
         """Find how many cells a node goes at most to where it may meet what goes elsewhere.
 
-        It is there beside nodes whose displacements (m, d) are others, by more than bodies turn or
+        It is next to nodes whose displacements (m, d) are others, by more than bodies rotate or
         strain in a step, or which nothing saw, and which fixes hold (nodes, d).
         """
         cells = u / self.s.grids.spacing[self.grid][:, None]
@@ -291,18 +291,18 @@ class Equations:
         return rigid_motions(self.positions, isinstance(self.s.kin, Axisymmetric))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:
-        """Make of a matrix (m, m) that of all components (m d, m d), each by itself."""
+        """Expand a matrix (m, m) to all components (m d, m d), uncoupled."""
         blocks = matrix.data[:, None, None] * np.eye(self.d)
         shape = tuple(self.d * size for size in matrix.shape)
         return sp.bsr_matrix((blocks, matrix.indices, matrix.indptr), shape)
 
     def linearise(self, dt: float, ghost: sp.csr_matrix | None = None) -> None:
-        """Assemble the derivatives of the last forces, and of those of a stabilisation (m, m)."""
+        """Assemble the derivatives of the last forces, plus a stabilisation (m, m)."""
         d, t, kin = self.d, self.s.kin.tensor_size, self.s.kin
         blocks = self.K.data
         blocks[:] = 0
         alone = ~self.deforming[self.pairs[0]] & (self.pairs[0] == self.pairs[1])
-        blocks[alone] = np.eye(d)  # sums of matrices keep no blocks of zeros
+        blocks[alone] = np.eye(d)  # sums of matrices drop blocks of zeros
         into = self.layout, blocks.reshape(-1, d * d)
         for k, (block, (seen, response)) in enumerate(zip(self.blocks, self.parts, strict=True)):
             n, done = block.points.mass.size, np.zeros(len(self.nodes), np.int64)
@@ -365,7 +365,7 @@ class Equations:
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
         """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
 
-        It is in units of the mean modulus. That of a node is the mean by volume of what it sees, of
+        It is in units of the mean modulus. At a node it is the mean by volume over its points, of
         a difference the smallest of its nodes.
         """
         lines, size, D = self.differences
@@ -388,7 +388,7 @@ class Equations:
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
         """Find second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
-        Linear functions have them across faces between cells, of which one lies at the border
+        A linear basis has them across faces between cells, of which one lies at the border
         (Coombs 2023): second differences of the nodes on both sides. Splines have no such jumps;
         the differences hold their nodes at the border all the same.
         """

@@ -176,7 +176,7 @@ class LoadSteps:
     def _part(self, hooks: Any, dt: float) -> tuple[int, float]:
         """Take a part of a step: find its equilibrium, and let the points follow.
 
-        Loads are those of its end. Returns the number of corrections, and the residual that is
+        Loads are taken at its end. Returns the number of corrections, and the residual that is
         left.
 
         Raises
@@ -203,7 +203,7 @@ class LoadSteps:
                 self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
-                # Their work is that of the mean of both, as Newmark's velocities are.
+                # Their work uses the mean of both, like Newmark's velocities.
                 own.loads[:] = 0.5 * (loads + own.loads)
             found = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
             self._tell_of_long_way(found)
@@ -223,7 +223,7 @@ class LoadSteps:
         return found.iterations, found.residual
 
     def _conduct(self, hooks: Any, dt: float) -> None:
-        """Let heat flow, before the equilibrium: that of the temperatures of the end."""
+        """Conduct heat before the equilibrium, which uses the temperatures at the end."""
         s, mode = self.simulation.setup, self.simulation.mode
         try:
             conduct(Equations(s, mode, self.known, False), hooks, self.simulation.acting, dt)
@@ -386,7 +386,7 @@ class LoadSteps:
             loose = [
                 x for x, h in zip("xyz"[free:], given[own].any(0)[free:], strict=False) if not h
             ]
-            how = f"is not held along {loose[0]}" if loose else "can turn"
+            how = f"is not held along {loose[0]}" if loose else "can rotate"
             how = how if len(held) else "is held by nothing"
             raise self._loose(self._solid_at(equations, own), how)
 

@@ -75,7 +75,7 @@ class Newton:
     pushing
         What pushes by where bodies are: contact, tools.
     external
-        (m, d) forces that are not those of stress.
+        (m, d) forces other than internal forces.
     dt
         The step.
     seconds
@@ -108,14 +108,14 @@ class Newton:
             self.inner = equations.respond(np.zeros_like(external), dt)
 
     def scale(self, moduli: Moduli, stabilisation: float) -> None:
-        """Tell the stiffness of the bodies, a share of which penalises jumps at their border."""
+        """Stiffness of the bodies, a fraction of which penalises jumps at their border."""
         if stabilisation * moduli.mean:
             self.ghost = stabilisation * moduli.mean * self.equations.ghost(moduli)
 
     def solve(
         self, jump: np.ndarray, interrupted: Callable[[int, float], bool]
     ) -> tuple[np.ndarray, int, float]:
-        """Find displacements (m, d); `jump` (m, d) are those of the components that are given.
+        """Find displacements (m, d); `jump` (m, d) has the prescribed components.
 
         Returns the number of corrections, too, and the residual that is left.
 

@@ -25,7 +25,7 @@ class Unconverged(Exception):
 
 
 def hold(A: sp.bsr_matrix, given: np.ndarray, more: np.ndarray) -> None:
-    """Make the given components (m, d) of a matrix stand alone; add `more` (m,) to the others."""
+    """Decouple the given components (m, d) of a matrix; add `more` (m,) to the others."""
     rows = np.repeat(np.arange(len(given)), np.diff(A.indptr))
     some = np.any(given, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
@@ -87,9 +87,9 @@ def amg(
 ) -> np.ndarray:
     """Solve by conjugate gradients (GMRES where A is not symmetric) with algebraic multigrid.
 
-    `rigid` are the rigid motions (n, k) of the unknowns, 0 of what stands alone: smoothed
+    `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: smoothed
     aggregation takes them for what hardly meets a resistance (Vanek, Mandel & Brezina 1996).
-    `accuracy` is the residual that is left, as a share of b. The coarse equations are `kept` for
+    `accuracy` is the remaining residual, relative to b. The coarse equations are `kept` for
     matrices to come, which differ little, as long as these are solved in a few iterations: to make
     them takes most of the time.
     """

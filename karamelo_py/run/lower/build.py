@@ -124,7 +124,7 @@ def stable_conduction(hub: Hub) -> float:
     """Find the stable step of conduction in undeformed bodies, of the worst.
 
     h^2 / (4 d) times capacity over conductivity: half of the bound of lumped finite elements, since
-    points stand anywhere in a cell.
+    points are anywhere in a cell.
     """
     if not hub.update.thermal:
         return np.inf
@@ -145,7 +145,7 @@ def lower(
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
     """Make the arrays of a run from the scene, taking over the state of points that exist.
 
-    With `ids`, from and to before, only with those points; tiles are those of a process of `comm`.
+    With `ids`, from and to before, only with those points; tiles of a process of `comm`.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -201,7 +201,7 @@ def lower(
 
 
 def node_kinds(hub: Hub, basis: NamedTuple, contact: NamedTuple) -> list[type]:
-    """List the fields that nodes have beside sums, update and velocity."""
+    """List the nodal fields other than sums, update and velocity."""
     declared = fields.declared(owners_of_fields(hub, contact), "node_fields")
     kinds = [kind for kind in declared if getattr(kind, "needed", lambda basis: True)(basis)]
     return kinds + [EnergyLoss] * returns_loss(hub) + [FrictionalHeat] * warms_by_friction(hub)
@@ -219,7 +219,7 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 def returns_loss(hub: Hub) -> bool:
     """Check that kinetic energy that the transfer takes heats points of the scene.
 
-    FLIP with a share of 1 takes none that does not vanish with the step, unless it keeps moments.
+    FLIP 1 takes none that does not vanish with the step, unless it stores moments.
     XPIC has its own way (`kernels.loss.reflect`).
     """
     transfer = hub.update.transfer
@@ -291,7 +291,7 @@ def lower_points(
     def joined(values: Iterable, dtype: type) -> np.ndarray:
         """(n,) or (k, n): of the values of each solid, a number or column, or one for each point.
 
-        Nothing of the length of all points is made beside it.
+        No further array of the length of all points is made.
         """
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):

@@ -24,7 +24,7 @@ def use_card(hub: Hub) -> None:
     settings = hub.settings
     if settings.ranks > 1:
         raise ScriptError(
-            f"--gpu: one GPU has all of a scene, and {settings.ranks} processes would share it",
+            f"--gpu: one GPU has all of a scene, and {settings.ranks} processes would divide it",
             hint="--gpu by one process, or leave it out",
         )
     settings.engine, settings.card = "gpu", Counted()

@@ -1,6 +1,6 @@
 """Parts of plug-ins are tried on some points, in plain Python, before loops are compiled with them.
 
-What is missing, of the wrong length, or no number that a step can go on with so ends in a message
+What is missing, of the wrong length, or not a usable number so ends in a message
 about the part, not about a loop.
 """
 
@@ -113,7 +113,7 @@ def _one(setup: Setup) -> Any:
 
 @contextmanager
 def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
-    """Tell of faults; numbers that one point happens not to stand are not what this is about."""
+    """Report faults, except numbers that are invalid for the sample point only."""
     with attributed(hub, part), np.errstate(all="ignore"):
         try:
             yield

@@ -54,7 +54,7 @@ def lower_hooks(
         loads=np.zeros((builder.loaded_nodes, dimension)),
         told=builder.told,
         mode=mode or Serial(),
-        # What threads have of their own, with space between the values of two.
+        # Values per thread, with padding in between.
         apart=arrays.Apart(
             chosen=np.zeros((own, BLOCK), np.int64),
             scratch=np.zeros((own, STACK + ROWS + 1, BLOCK)),
@@ -100,7 +100,7 @@ class _Builder:
         begin, end = self._members(fix, hook)
         slot = -1
         if hook.publishes and fix.published:
-            # Components lie one after another, from x on; a total without direction stands alone.
+            # Components lie one after another, from x on; a total without direction is separate.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         if hook.tag is not None:
@@ -212,7 +212,7 @@ def _call(simulation: Any, fix: Fix, hook: Callable, view: Any) -> None:
     """Call a hook; of one that each process calls for its own, see that all agree.
 
     All have to have asked for the same, else one would wait for the others for ever, and to have
-    published the same, else the values would be those of a part.
+    published the same, else the values would be partial sums.
     """
     try:
         hook(view)
@@ -296,7 +296,7 @@ def _at_heated_points_python_hooks(hooks, s):
 
 
 def view_of(simulation: Any, fix: Fix, *, then: bool) -> PointsView:
-    """Show the points of a fix, or those of them that are at hand."""
+    """Show the points of a fix, or the local ones."""
     if fix.point_by_point:
         return PieceView(
             simulation, list(simulation.points.rows_of(fix.group)), then, in_steps=True

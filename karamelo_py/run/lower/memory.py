@@ -1,4 +1,4 @@
-"""Memory that a scene, or the share of a process, takes; scenes that no memory holds are refused.
+"""Memory that a scene, or a process's part of it, takes; too large scenes are refused.
 
 What is compared is the least that a run has to hold: of what would run nothing is refused.
 """
@@ -33,7 +33,7 @@ class MemoryTaken(NamedTuple):
 
 
 def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
-    """Count what points in the tiles of `s`, nodes in use, and boxes of so many bytes take."""
+    """Count what points in the tiles of `s`, nodes in use, and boxes of this many bytes take."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
@@ -148,7 +148,7 @@ def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
     single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)
     if hub.settings.precision == "double" and single < there:
         ways.append(f"precision(single), which needs at least {in_words(single)}")
-    ways.append("processes on several machines (mpiexec), which share the points out")
+    ways.append("processes on several machines (mpiexec), which divide the points")
     return "; ".join(ways)
 
 

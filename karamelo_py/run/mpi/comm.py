@@ -29,7 +29,7 @@ LAUNCHED = (
 # Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
-# Words of processes beside those of runs, which are above zero.
+# Words of processes other than step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
 PAUSE = 0.005  # seconds between two looks whether the others have come
 
@@ -43,7 +43,7 @@ def handled_signals(
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    # Whoever started the program may have it go on when the terminal is closed (nohup).
+    # The program may be meant to continue when the terminal is closed (nohup).
     heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
     for number in heeded:
         signal.signal(number, handler)

@@ -1,6 +1,6 @@
 """The tiles of a scene shared out among processes: who has which, and what they pass on.
 
-Each process has the points of tiles that lie beside each other. Nodes that several reach are summed
+Each process has the points of neighbouring tiles. Nodes that several reach are summed
 by each of them, from the same boxes in the same order.
 """
 
@@ -203,7 +203,7 @@ class SharedTiles(Tiles):
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     def _boxes(self, s: Setup) -> Boxes:
-        """List the own boxes, then those of others that may contain the same nodes."""
+        """List the own boxes, then other processes' boxes that may contain the same nodes."""
         own, me = self.own_boxes(s), self.comm.rank
         self._looks_beyond = getattr(type(s.contact), "looks_beyond", 0) > 0
         of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
@@ -333,7 +333,7 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
-        """List those of `nodes` that others count: of those that know what is beside, the first."""
+        """List the `nodes` that other processes count: the first process that has them."""
         count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
         place = nodes % count
         for rank, boxes in sorted(self._inner.items()):
@@ -371,7 +371,7 @@ class SharedTiles(Tiles):
 
 
 def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
-    """Sum the cost (tiles,) of points and nodes in whole numbers, of so many (k, tiles) each."""
+    """Sum the integer cost (tiles,) of points and nodes, with counts (k, tiles)."""
     return np.rint(FINE * (costs @ loads)).astype(np.int64)
 
 
@@ -449,7 +449,7 @@ def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
 
 
 def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
-    """Find the order of tiles for points that stand one process after another."""
+    """Find the order of tiles for points ordered by process."""
     ranges = one_after_another(_joint(tilings, "range"))
     return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
 

@@ -21,7 +21,7 @@ MAY_CHANGE = 1.25  # largest number of points over the mean that is acceptable
 
 
 class ProcessShare(NamedTuple):
-    """Share of one process."""
+    """Part of one process."""
 
     points: int
     tiles: int  # of points, that are occupied
@@ -124,7 +124,7 @@ def _part(s: Setup, own: np.ndarray) -> Setup:
 
 
 def report_lines(simulation: Simulation, ranks: int) -> list[str]:
-    """Say in lines what so many processes would have, and pass on."""
+    """Format, in lines, what each of several processes would have."""
     columns = np.array(plan(simulation, ranks))
     mean = columns[:, 0].mean()
     lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
@@ -138,11 +138,11 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
         for word, low, high in zip(words, columns.min(axis=0), columns.max(axis=0), strict=True)
     ]
     over = columns[:, 0].max() / mean if mean else 1.0
-    lines.append(f"  {'largest share over the mean':<30}{'':>8} {over:>11.2f}")
+    lines.append(f"  {'largest part over the mean':<30}{'':>8} {over:>11.2f}")
     if simulation.tiles.direct:
         lines.append("  so few points are not shared out: the first process has them all")
     elif over > MAY_CHANGE:
-        lines.append("  tiles are not cut: fewer processes would wait less for the largest share")
+        lines.append("  tiles are not cut: fewer processes would wait less for the largest part")
     acting = (fix for pairs in simulation.python.by_stage.values() for fix, _ in pairs)
     if fix := next((fix for fix in acting if not fix.point_by_point), None):
         blocks = simulation.setup.blocks

@@ -44,11 +44,11 @@ class Load:
         self._since = time.perf_counter_ns()
 
     def next_block(self) -> None:
-        """Go on with the next block, from the last with the first."""
+        """Advance to the next block, cyclically."""
         self.resume((self._at + 1) % self._rest)
 
     def done(self, counts: list[int], steps: int) -> None:
-        """Take note of so many steps with these numbers of points, and of nodes."""
+        """Record a number of steps with these numbers of points and nodes."""
         self._spent[1] += np.array(counts) * steps
 
     def learn(self, comm: SerialComm) -> None:
@@ -60,7 +60,7 @@ class Load:
 
 
 class Subdomain:
-    """Keeps the share of this process in balance with those of others, and answers kernels.
+    """Balances the part of this process with the other parts, and answers kernels.
 
     Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
     """
@@ -84,7 +84,7 @@ class Subdomain:
         return self.tiles.migrate(s, self.learn())
 
     def put(self, shares: list[dict[str, np.ndarray]]) -> None:
-        """Take the points and tiles of these shares in the place of the own ones."""
+        """Replace the own points and tiles by these parts."""
         simulation, tiles = self.simulation, self.tiles
         s, blocks = simulation.setup, []
         tiles.empty_nodes(s)

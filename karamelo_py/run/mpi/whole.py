@@ -67,7 +67,7 @@ class Whole:
 
     @contextmanager
     def _in_place(self) -> Iterator[None]:
-        """Let the simulation be that of the whole, of one process."""
+        """Make the simulation one of the whole scene, on one process."""
         simulation = self.simulation
         own = simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain
         simulation.setup, simulation.tiles = self.setup, self.tiles
