@@ -106,7 +106,7 @@ def test_all_that_the_content_of_a_file_has_must_be_there(run_interpreted):
     whole = Restart(path).content
     for missing in whole:
         put_content(path, {name: part for name, part in whole.items() if name != missing})
-        with pytest.raises(ScriptError, match=f"can go on from: '{missing}'"):
+        with pytest.raises(ScriptError, match=f"of this program: '{missing}'"):
             Restart(path)
     put_content(path, whole)
     assert Restart(path).content == whole
