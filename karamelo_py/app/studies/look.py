@@ -26,7 +26,7 @@ PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
     "triangle-left", "triangle-right",
 )  # fmt: skip
-NEAR = 0.02  # share of the axes within which ends of lines are at one place
+NEAR = 0.02  # fraction of the axes within which line ends coincide
 PART = 0.105  # of a logarithmic axis, that a number of six digits covers
 FAMILIES = (
     ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),

@@ -48,8 +48,8 @@ BORNE = ("stable", "damped")  # classes of tolerable steps
 UNTOLD = ("left", "short")  # of steps that nothing is known of
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program looks often enough at energies
-SURE = 3 * watch.LOOKS * watch.LOOK  # steps, from which on slow growth is told
-FIRST = 0.1  # of the rows of a log: energies are means over so many
+SURE = 3 * watch.LOOKS * watch.LOOK  # steps from which slow growth is recognised
+FIRST = 0.1  # fraction of the rows of a log over which energies are averaged
 FEW = 9  # values of a variable that all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",

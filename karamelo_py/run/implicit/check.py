@@ -40,9 +40,9 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     ):
         yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
-        yield "knows no heat that flows beside contact", f"mechanical, or {_EXPLICIT}", method.place
+        yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.place
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
-        yield "knows no rho beside contact", "beta and gamma, or rule=euler", None
+        yield "does not support rho with contact", "beta and gamma, or rule=euler", None
     if update.boundary == "reflect":
         yield "knows no walls that points bounce from", "fix velocity_nodes", None
     if hub.settings.precision != "double":
