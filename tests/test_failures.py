@@ -90,7 +90,7 @@ def test_the_last_good_state_is_written_once(run_interpreted, tmp_path):
     lines = ("fix(v, initial_velocity_particles, all, 10)", "set_dt(0.001)")
     script = block(1, *lines, *OUTPUT, "restart(40, r.*.h5)", "run(200)")
     result = run_interpreted(script, folder="a", status=1)
-    assert "in.script -restart last_good.62.h5  # with a smaller time step" in result.err
+    assert "in.script -restart last_good.62.h5  # with boundary(delete)" in result.err
     assert {path.name for path in result.folder.glob("*.h5")} == {"last_good.62.h5", "r.40.h5"}
     (result.folder / "last_good.62.h5").write_text("mine")
     again = run_interpreted(script, folder="a", status=1)

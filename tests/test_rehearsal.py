@@ -41,6 +41,8 @@ plot(curve, 1, time, E)
 # Of each command a call, and what comes before it: that which `element` or `run` rehearses.
 CALLS = {
     "anti_volumetric_locking": (SCENE, "anti_volumetric_locking(true)"),
+    "plane_stress": (BARE, "create_domain(0, 1, 0, 1)\nplane_stress(false)"),
+    "uniaxial_stress": (BARE, "dimension(1, 0, 1, 0.1)\nuniaxial_stress(false)"),
     "axisymmetric": (BARE, "create_domain(0, 1, 0, 1)\naxisymmetric(true)"),
     "boundary": (SCENE, "boundary(delete)"),
     "compute": (SCENE, "compute(Es, strain_energy, all)"),
