@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from conftest import INPUTS
 from scenes import block
+from walked import MODULES, PACKAGE, walked
 
 from karamelo_py.advice.energy import cause_of_gain
 from karamelo_py.advice.known_failures import warn
@@ -416,20 +417,21 @@ def test_runs_that_are_over_count_from_the_last_fix():
     assert not told
 
 
+@pytest.mark.xdist_group("house")
 def test_rules_that_ask_for_concrete_styles_stand_beside_these():
     """Above points/ and styles/ nothing looks for the class of a part."""
-    package, found = INPUTS.parent / "karamelo_py", []
-    for path in (p for room in ABOVE for p in (package / room).rglob("*.py")):
-        tree = ast.parse(path.read_text("utf-8"))
+    found = []
+    for path in (module for module in MODULES if module.relative_to(PACKAGE).parts[0] in ABOVE):
+        tree = walked(path)
         concrete = {
             alias.asname or alias.name
-            for node in ast.walk(tree)
+            for node in tree
             if isinstance(node, ast.ImportFrom)
             and PART.match(node.module or "")
             and not node.module.endswith(".traits")
             for alias in node.names
         }
-        asked = (n.args[1] for n in ast.walk(tree) if isinstance(n, ast.Call) and is_query(n))
+        asked = (n.args[1] for n in tree if isinstance(n, ast.Call) and is_query(n))
         names = {n.id for one in asked for n in ast.walk(one) if isinstance(n, ast.Name)}
         found += [f"{path.name}: {name}" for name in names & concrete]
     assert not found

@@ -223,13 +223,14 @@ def _often_from_python(mode, out, factor, times):
 @pytest.mark.parametrize("threads", [1, 2, 5])
 def test_a_team_does_each_number_of_each_loop_once(threads):
     """Also where a thread of the team never begins, since there are fewer than it has."""
+    times = 60
     team = new_team(threads)
     for mode in (Threaded(team.ctypes.data), Threaded(), Serial()):
         out = Pair(np.zeros(500), np.zeros(1))
         for _ in range(2):
-            assert _often_from_python(mode, out, 2.0, 300) == 300
-        more = [sum(k < n % 7 for n in range(300)) for k in range(500)]
-        assert out.a.tolist() == [2 * (300 + more[k]) * 2.0 * k for k in range(500)]
+            assert _often_from_python(mode, out, 2.0, times) == times
+        more = [sum(k < n % 7 for n in range(times)) for k in range(500)]
+        assert out.a.tolist() == [2 * (times + more[k]) * 2.0 * k for k in range(500)]
 
 
 @kernel

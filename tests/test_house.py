@@ -3,13 +3,12 @@
 import ast
 import re
 from collections import Counter, defaultdict
-from functools import cache
 from pathlib import Path
 
 import pytest
+from walked import MODULES, PACKAGE, walked
 
 ROOT = Path(__file__).parent.parent
-PACKAGE = ROOT / "karamelo_py"
 PAGE = (ROOT / "docs" / "house-numbers.md").read_text("utf-8")
 LIMITS = {name: int(n) for name, n in re.findall(r"^\| ([^|]+) \| (\d+) \|$", PAGE, re.M)}
 # They read the package once, in one process.
@@ -17,19 +16,13 @@ pytestmark = pytest.mark.xdist_group("house")
 RIDDLE = re.compile(r"(What|Who|Whether|How|That|Where|Which)\b")
 
 
-@cache
 def trees() -> dict[Path, ast.Module]:
-    return {path: ast.parse(path.read_text("utf-8")) for path in sorted(PACKAGE.rglob("*.py"))}
+    return {path: walked(path)[0] for path in MODULES}
 
 
 def nodes(*kinds: type):
     """All nodes of these kinds in the package, with their files."""
-    return (
-        (path, node)
-        for path, tree in trees().items()
-        for node in ast.walk(tree)
-        if isinstance(node, kinds)
-    )
+    return ((path, node) for path in MODULES for node in walked(path) if isinstance(node, kinds))
 
 
 def room_of(path: Path) -> str:

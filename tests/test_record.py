@@ -5,7 +5,9 @@ import json
 import re
 from pathlib import Path
 
-from karamelo_py.advice import known_failures
+import pytest
+from walked import MODULES, walked
+
 from karamelo_py.advice.explain import DOUBTED_UNITS
 from karamelo_py.language import rules
 from karamelo_py.output.console import show
@@ -148,8 +150,8 @@ def test_three_scenes_fit_the_schema_and_the_page_has_its_fields(run_interpreted
 def codes_in_the_code() -> set[str]:
     """Codes that are given to errors and warnings, as constants: keyword, or third of a Trouble."""
     found = set()
-    for path in Path(known_failures.__file__).parents[1].rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for path in MODULES:
+        for node in walked(path):
             given = []
             if isinstance(node, ast.Call):
                 given = [word.value for word in node.keywords if word.arg == "code"]
@@ -167,6 +169,7 @@ def codes_in_the_code() -> set[str]:
     return found - {""}
 
 
+@pytest.mark.xdist_group("house")
 def test_every_code_is_explained():
     assert {*codes()} == codes_in_the_code()
     assert all(words["title"] and words["text"] for words in codes().values())

@@ -8,12 +8,13 @@ import re
 from pathlib import Path
 
 import pytest
+from walked import MODULES, PACKAGE, walked
 
+pytestmark = pytest.mark.xdist_group("house")
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES += [*sorted((ROOT / "docs" / "howto").glob("*.md"))]
 PAGES += [*sorted((ROOT / "docs" / "house").glob("*.md"))]
-PACKAGE = ROOT / "karamelo_py"
 CODE = re.compile(r"^ *```.*?^ *```|`[^`\n]+`|\]\([^)]*\)", re.S | re.M)
 
 CODE_IN_TEXT = re.compile(r"``[^`]+``|`[^`\n]+`")
@@ -57,7 +58,7 @@ def sentences(module):
     source = module.read_text("utf-8")
     found = [
         (node.lineno, CODE_IN_TEXT.sub("", node.value))
-        for node in ast.walk(ast.parse(source))
+        for node in walked(module)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value
     ]
     comments = re.finditer(r"(?:^ *|  )# (.*)$", source, re.M)
@@ -70,7 +71,7 @@ def texts():
     pages = [(page.relative_to(ROOT), 1, prose(page)) for page in PAGES]
     package = [
         (module.relative_to(ROOT), line, text)
-        for module in sorted(PACKAGE.rglob("*.py"))
+        for module in MODULES
         for line, text in sentences(module)
     ]
     tables = [(table.relative_to(ROOT), 1, prose(table)) for table in PACKAGE.rglob("*.toml")]
