@@ -251,3 +251,21 @@ def test_an_energy_that_loses_convexity_is_reported(run_interpreted):
     line = "material(m, saint-venant-kirchhoff, 1000, 2e7, 4e5)\nelement(e, m, p)\n"
     said = run_interpreted("load_path(p, 1, exx=0.01)\n" + line).err
     assert "loses its stiffness in swelling at a stretch of 0." in said
+
+
+def test_principal_stretches_in_single_precision(run_script):
+    """The strain out of the plane is a literal: it takes the precision of the run."""
+    script = """
+        precision(single)
+        method(tlmpm, FLIP, linear, 1)
+        dimension(2, 0, 1, 0, 1, 0.5)
+        region(box, block, 0, 1, 0, 1)
+        material(m, ogden, 1000, 2e6, 6.3e5, 1.3)
+        solid(s, region, box, 1, m, 0.5, 0)
+        group(s, particles, region, box, solid, s)
+        fix(v, initial_velocity_particles, s, x, 0)
+        compute(Es, strain_energy, s)
+        log_modify(custom, Es)
+        run(2)
+    """
+    assert run_script(script).log["Es"][-1] > 0

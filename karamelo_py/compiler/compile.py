@@ -377,7 +377,14 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
     """Apply a function of numbers to each lane of its arguments."""
     builder = lowering.builder
     width = lanes_of(tuple(map(lowering.kind_of, arguments)))
-    stored = _lanes_changed(arguments, lambda value: _in_memory(builder, value))
+    kinds: set[types.Type] = set()
+
+    def kept(value: Value) -> Value:
+        kinds.add(value._kind.scalar)
+        return _in_memory(builder, value)
+
+    stored = _lanes_changed(arguments, kept)
+    single = types.float32 in kinds and types.float64 not in kinds
 
     def run(k: Any) -> Any:
         def of_lane(value: Value) -> Value:
@@ -387,6 +394,8 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
+            if single and scalar == types.float64:  # it follows from literals alone
+                scalar = types.float32
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))
             if builder:
