@@ -11,6 +11,7 @@ from karamelo_py.compiler import argument_buffer, code, machine
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
 from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.session import current
 from karamelo_py.compiler.threads import (
     Serial,
     Threaded,
@@ -155,10 +156,10 @@ def test_an_array_in_the_place_of_another():
         assert out[6] == k
         del out
     assert len(numbers) < 50  # Python has used numbers again
-    assert not numbers & argument_buffer._arrays.keys()
+    assert not numbers & current().arrays.keys()
     one, other = np.zeros(8), np.zeros(8)
     _of_python(mixed, 1, one)
-    argument_buffer._arrays[id(other)] = argument_buffer._arrays[id(one)]  # as if nobody had told
+    current().arrays[id(other)] = current().arrays[id(one)]  # as if nobody had told
     _of_python(mixed, 2, other)
     assert (one[6], other[6]) == (1, 2)
     known = len(_of_python.units)

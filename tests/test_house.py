@@ -97,7 +97,41 @@ def untyped_in_run() -> int:
     return sum(name == "Any" and room_of(path) == "run" for path, name in names)
 
 
+CHANGES = {"append", "add", "update", "setdefault", "clear", "pop", "insert", "extend", "discard"}
+
+
+def changing_containers() -> set[tuple[str, str]]:
+    """Globals of modules in compiler/ that functions of the room change while the program works."""
+    room = {path.stem: tree for path, tree in trees().items() if room_of(path) == "compiler"}
+    own = {
+        (module, name.id)
+        for module, tree in room.items()
+        for node in tree.body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        for name in ast.walk(node)
+        if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)
+    }
+    found = set()
+    for module, tree in room.items():
+        functions = (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef))
+        for node in (node for function in functions for node in ast.walk(function)):
+            changed = []
+            if isinstance(node, ast.Global):
+                found |= {(module, name) for name in node.names}
+            elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
+                changed = [node.value]
+            elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") in CHANGES:
+                changed = [node.func.value]
+            for one in changed:
+                if isinstance(one, ast.Name):
+                    found.add((module, one.id))
+                elif isinstance(one, ast.Attribute) and isinstance(one.value, ast.Name):
+                    found.add((one.value.id, one.attr))
+    return found & own
+
+
 COUNTS = {
+    "containers of the process that change in compiler/": lambda: len(changing_containers()),
     "functions of kernels and points with more than five parameters": long_signatures,
     "getattr with a default": guesses,
     "Any in run/": untyped_in_run,

@@ -5,7 +5,6 @@ The memory has the layout of held tuples (:mod:`karamelo_py.compiler.held`).
 
 import ctypes
 import functools
-import itertools
 import struct
 import weakref
 from collections.abc import Callable, Iterator
@@ -17,6 +16,7 @@ from numba import typeof, types
 
 from karamelo_py.compiler import code
 from karamelo_py.compiler.held import HeldTuple, held_type, is_held
+from karamelo_py.compiler.session import current
 
 
 class _Array(NamedTuple):
@@ -29,14 +29,9 @@ class _Array(NamedTuple):
     words: tuple[int, ...]  # as kernels have them
 
 
-_arrays: dict[int, _Array] = {}
-_kinds: dict[tuple, int] = {}
-_numbers = itertools.count()  # thread-safe ids
-
-
 def _array(array: np.ndarray) -> _Array:
-    number = id(array)
-    known = _arrays.get(number)
+    number, session = id(array), current()
+    known = session.arrays.get(number)
     if (
         known is None
         or known.alive() is not array
@@ -49,23 +44,24 @@ def _array(array: np.ndarray) -> _Array:
             flags.writeable,
         )  # fmt: skip
         words = (array.ctypes.data, *array.shape, *array.strides)
-        kept = _kinds[kind] if kind in _kinds else _kinds.setdefault(kind, next(_numbers))
+        kinds = session.array_types
+        kept = kinds[kind] if kind in kinds else kinds.setdefault(kind, next(session.numbers))
         alive = weakref.ref(array, functools.partial(_drop, number))
         known = _Array(alive, array.shape, flags.writeable, kept, words)
-        _arrays[number] = known
+        session.arrays[number] = known
     return known
 
 
 def _drop(number: int, alive: weakref.ref) -> None:
     """Remove a deleted array, unless another one has its id."""
-    known = _arrays.get(number)
+    known = current().arrays.get(number)
     if known is not None and known.alive is alive:
-        _arrays.pop(number, None)
+        current().arrays.pop(number, None)
 
 
 def forget(array: np.ndarray) -> None:
     """Remove an array before it is resized in place."""
-    _arrays.pop(id(array), None)
+    current().arrays.pop(id(array), None)
 
 
 class Address(int):

@@ -140,12 +140,13 @@ def target() -> str:
     return repr(machine.describe())
 
 
-def _source(path: Path) -> bytes:
-    """Read a source as Python has read it, which knows no later change."""
+@functools.cache
+def _source(path: Path) -> str:
+    """Hash a source as Python has read it; of a later state, nothing is known."""
     with contextlib.suppress(OSError):
         about = path.stat()
         if max(about.st_mtime, about.st_ctime) < _began:
-            return path.read_bytes()
+            return hashlib.sha256(path.read_bytes()).hexdigest()
     raise Unknown(str(path))
 
 
@@ -154,15 +155,7 @@ def _sources() -> str:
     """Hash the sources of the rooms of this package that write kernels."""
     package = Path(__file__).parents[1]
     paths = sorted(path for room in choices.ROOMS for path in (package / room).rglob("*.py"))
-    digest = hashlib.sha256(repr([str(path.relative_to(package)) for path in paths]).encode())
-    for path in paths:
-        digest.update(_source(path))
-    return digest.hexdigest()
-
-
-@functools.cache
-def _text_of(file: str) -> str:
-    return hashlib.sha256(_source(Path(file))).hexdigest()
+    return short_hash(*(f"{path.relative_to(package)} {_source(path)}" for path in paths))
 
 
 def _stamp(name: str) -> str:
@@ -177,7 +170,7 @@ def _stamp(name: str) -> str:
             raise Unknown(one)
         known = [(k, v) for k, v in names.items() if k[:2] != "__"]
         values = [f"{k} = {_value(v)}" for k, v in known if not isinstance(v, _NAMED)]
-        words[one] = short_hash(one, _text_of(file), *values)
+        words[one] = short_hash(one, _source(Path(file)), *values)
         if not one.startswith(__package__.partition(".")[0]):  # its rooms import as they may
             named = choices.modules_of(*(v for _, v in known if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
@@ -286,9 +279,9 @@ class KernelFiles:
     def _key(self, kinds: tuple, result: Any) -> str:
         """Name the file: by function, types, machine, and the sources that any kernel may have."""
         function = self._function
-        of_types = {module for kind in kinds for module in _modules_in(kind)}
+        classes = (one for kind in kinds for one in choices.classes_in(kind))
         made = [function, *self._called, *choices.registered]
-        elsewhere = sorted(choices.modules_of(*made) | of_types)
+        elsewhere = sorted(choices.modules_of(*made, *classes))
         words = [*map(_words, made), *map(describe, kinds)]
         words += [describe(result) if result is not None else "", self._processor, target()]
         words += [_sources(), repr(_VERSIONS), *(f"{one} {_stamp(one)}" for one in elsewhere)]
@@ -316,10 +309,6 @@ class KernelFiles:
         with contextlib.suppress(Unknown):
             stamps = {name: _stamp(name) for name in sorted(unit.modules)}
             _keep(folder() / f"{key}.kernel", pickle.dumps((stamps, _without_code(unit))))
-
-
-def _modules_in(kind: Any) -> set[str]:
-    return choices.modules_of(*choices.classes_in(kind))
 
 
 def _without_code(unit: Any) -> Any:

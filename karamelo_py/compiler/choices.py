@@ -17,7 +17,7 @@ from numba import config, types
 
 INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
-_LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
+LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
 ROOMS = "compiler", "kernels", "points", "schemes", "styles"  # whose sources are in every key
 
@@ -34,7 +34,7 @@ _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("n
 def is_elsewhere(module: str) -> bool:
     """Tell whether a module is neither of a library nor of the rooms that every key has."""
     top, _, rest = module.partition(".")
-    return top not in _LIBRARIES and not (top == _PACKAGE and rest.partition(".")[0] in ROOMS)
+    return top not in LIBRARIES and not (top == _PACKAGE and rest.partition(".")[0] in ROOMS)
 
 
 def modules_of(*things: Any) -> set[str]:
@@ -94,12 +94,3 @@ def codes_in(code: python.CodeType) -> list[python.CodeType]:
     """List code objects, including nested functions."""
     inner = (codes_in(c) for c in code.co_consts if isinstance(c, python.CodeType))
     return [code, *itertools.chain.from_iterable(inner)]
-
-
-def is_opaque(thing: Any) -> bool:
-    """Tell whether a thing is identified by name because it belongs to a library."""
-    is_module = isinstance(thing, python.ModuleType)
-    module = thing.__name__ if is_module else getattr(thing, "__module__", None)
-    if module is None:
-        return not isinstance(thing, python.FunctionType)
-    return module.partition(".")[0] in _LIBRARIES

@@ -11,6 +11,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from karamelo_py.compiler.session import current
+
 try:
     import fcntl
 except ImportError:  # Windows
@@ -19,7 +21,6 @@ except ImportError:  # Windows
 PATIENCE = 120.0  # seconds; a process that holds a lock longer is probably stopped
 PAUSE = 0.02  # seconds between two attempts
 
-waits = True  # False after a timeout
 waiting = contextlib.nullcontext  # context while a process waits, reported as compilation
 
 
@@ -34,18 +35,18 @@ def lock(path: Path) -> Iterator[None]:
 
 def _take(path: Path, held: contextlib.ExitStack) -> None:
     """Take the lock; `held` releases it."""
-    global waits
+    session = current()
     if fcntl is None:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     held.callback(os.close, file)
     if not _locked(file, 0.0):
-        if not waits:
+        if not session.waits:
             return
         with waiting():
-            waits = _locked(file, PATIENCE)
-        if not waits:
+            session.waits = _locked(file, PATIENCE)
+        if not session.waits:
             return
     held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked in the meantime
     # Waiting processes have this file open, and find the kernel when they get the lock.

@@ -19,12 +19,13 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import cache, code, machine, trace
+from karamelo_py.compiler import cache, code, machine
 from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
 from karamelo_py.compiler.choices import INTERPRETED, modules_noted, modules_of, note
 from karamelo_py.compiler.code import I32, I64
 from karamelo_py.compiler.compile import implements
 from karamelo_py.compiler.loops import ENTRY, NAME, compilation, items_at, written
+from karamelo_py.compiler.session import current
 from karamelo_py.compiler.trace import formula
 from karamelo_py.compiler.values import in_one, intrinsic
 
@@ -247,7 +248,7 @@ class _Coded:
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
         """Prepare the function for launches with arguments of these types."""
         called = called or {}
-        key = function, kinds, trace.changes, *called.values()
+        key = function, kinds, current().changes, *called.values()
         if key not in self._known:
             code = self._found(function, kinds, called)
             if code.name not in self._entries:

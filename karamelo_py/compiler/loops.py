@@ -9,12 +9,10 @@ import contextvars
 import ctypes
 import functools
 import gc
-import itertools
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
-from weakref import WeakValueDictionary
 
 from llvmlite import ir
 from numba import types
@@ -25,7 +23,8 @@ from karamelo_py.compiler.compile import shared
 from karamelo_py.compiler.failing import Failure, failure_at, noting
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
 from karamelo_py.compiler.lowering import function_type, new_function
-from karamelo_py.compiler.trace import alone, formula, one_at_a_time, write_into
+from karamelo_py.compiler.session import current, one_at_a_time
+from karamelo_py.compiler.trace import alone, formula, write_into
 from karamelo_py.compiler.values import (
     Untraceable,
     builtin,
@@ -50,20 +49,18 @@ class Unit(NamedTuple):
     raises: bool  # whether something in it raises exceptions
 
 
-_loaded: dict[str, list[int]] = {}
-
-
 def load(unit: Unit) -> list[int]:
     """Load a unit; return the addresses of its function and its entry."""
     with one_at_a_time:
-        if unit.name not in _loaded:
+        loaded = current().loaded
+        if unit.name not in loaded:
             for needed in unit.needs:
                 load(needed)
             content = unit.code or cache.code_of(unit.name)
             found = machine.load(content, unit.name, unit.name + ENTRY)
             machine.publish(unit.name, found[0])
-            _loaded[unit.name] = found
-        return _loaded[unit.name]
+            loaded[unit.name] = found
+        return loaded[unit.name]
 
 
 class Compilation:
@@ -197,13 +194,13 @@ class Kernel:
         self.files = cache.KernelFiles(function, load)
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
-        self._changes = trace.changes
+        self._changes = current().changes
         builtin(self)(self.in_kernel)
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Return the machine code for arguments of these types."""
         with one_at_a_time:
-            if self._changes != trace.changes:
+            if self._changes != current().changes:
                 self._find_anew()
             if kinds not in self.units:
                 self.units[kinds] = self.files.kernel(
@@ -214,7 +211,7 @@ class Kernel:
     def _find_anew(self) -> None:
         """Drop compiled code, because implementations have changed."""
         with one_at_a_time:
-            self._changes = trace.changes
+            self._changes = current().changes
             self.units, self._plans = {}, {}
 
     def __call__(self, *arguments: Any) -> Any:
@@ -236,7 +233,7 @@ class Kernel:
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
         """Return how arguments are passed, the entry, and size and reader of the result."""
         kinds = tuple(written.kinds)
-        if self._changes != trace.changes:
+        if self._changes != current().changes:
             self._find_anew()
         plans = self._plans
         if kinds not in plans:
@@ -283,11 +280,6 @@ def noinline(function: Callable) -> Callable:
 
 # --- functions called by address ------------------------------------------------------------------
 
-# Interpreted; an `Address` keeps the function alive.
-_interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
-_numbers = itertools.count()  # of these
-_addresses: dict[tuple[Callable, types.Type, int], int] = {}
-
 
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
@@ -295,13 +287,14 @@ def address_of(function: Callable, signature: types.Type) -> int:
     Callers do not contain it: they need not be compiled again for another function, and it is
     compiled once for all of them.
     """
-    key = function, signature, trace.changes
-    if key not in _addresses:
+    key = function, signature, current().changes
+    addresses = current().addresses
+    if key not in addresses:
         if choices.INTERPRETED:
-            _addresses[key] = address_of_python(function, signature)
+            addresses[key] = address_of_python(function, signature)
         else:
-            _addresses[key] = load(Kernel(function).unit(signature.args, signature.return_type))[0]
-    return _addresses[key]
+            addresses[key] = load(Kernel(function).unit(signature.args, signature.return_type))[0]
+    return addresses[key]
 
 
 def address_of_python(function: Callable, signature: types.Type) -> Address:
@@ -312,8 +305,8 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
     """
     if choices.INTERPRETED:
         callback: Any = functools.partial(function)  # a bound method would be freed at once
-        address = Address(next(_numbers))
-        _interpreted[int(address)] = callback
+        address = Address(next(current().numbers))
+        current().interpreted[int(address)] = callback
     else:
         count = len(signature.args) + 1  # the last one is for exceptions
         callback = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
@@ -327,7 +320,7 @@ def caller_of(signature: Any) -> Callable:
     result, parameters = signature.return_type, signature.args
 
     if choices.INTERPRETED:
-        return lambda address, *arguments: _interpreted[address](*arguments)
+        return lambda address, *arguments: current().interpreted[address](*arguments)
 
     @intrinsic
     def by_address(address, *arguments):

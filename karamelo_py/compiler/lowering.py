@@ -11,6 +11,7 @@ from numba import typeof, types
 from karamelo_py.compiler import arithmetic, code, failing, indexing
 from karamelo_py.compiler import values as traced
 from karamelo_py.compiler.held import HeldTuple, item_of
+from karamelo_py.compiler.session import current
 
 MOST_OPERATIONS = 10_000  # of one formula; above it, a loop is better left to LLVM
 
@@ -139,12 +140,13 @@ class Lowering:
     def operation(self, function: Callable, kinds: tuple) -> arithmetic.Operation | None:
         """Return the operation of a function for arguments of these types."""
         key = function, numbers_of(kinds)
-        if key not in _operations:
+        known = current().operations
+        if key not in known:
             if isinstance(function, traced.Intrinsic):
-                _operations[key] = _of_intrinsic(function, kinds)
+                known[key] = _of_intrinsic(function, kinds)
             else:
-                _operations[key] = arithmetic.operation(function, kinds)
-        return _operations[key]
+                known[key] = arithmetic.operation(function, kinds)
+        return known[key]
 
     def other(self, function: Callable, arguments: tuple, kinds: tuple) -> Any:
         """Return the result of a function that is not an operation on numbers."""
@@ -249,7 +251,6 @@ def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str)
 
 
 _OF_ITEMS = {operator.getitem, operator.setitem}
-_operations: dict[tuple, arithmetic.Operation | None] = {}
 
 
 def _has_slice(place: Any) -> bool:

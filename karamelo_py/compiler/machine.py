@@ -119,10 +119,8 @@ def is_known(name: str) -> bool:
     return sys.platform == "win32" or hasattr(ctypes.CDLL(None), name)
 
 
-_callbacks: list = []  # may be called until the process ends
-
-
 def publish_python(name: str, kind: type, function: Callable) -> None:
     """Make a Python function callable by code; it must not raise."""
-    _callbacks.append(kind(function))
-    publish(name, ctypes.cast(_callbacks[-1], ctypes.c_void_p).value)
+    callback = kind(function)
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(callback))  # code may call it until the end
+    publish(name, ctypes.cast(callback, ctypes.c_void_p).value)

@@ -7,7 +7,6 @@ apart costs nothing. The walk through the text is in :mod:`~karamelo_py.compiler
 
 import functools
 import itertools
-import threading
 import types as python
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from traceback import walk_tb
@@ -27,6 +26,7 @@ from karamelo_py.compiler.choices import (
     tag_class,
 )
 from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
+from karamelo_py.compiler.session import current, one_at_a_time
 from karamelo_py.compiler.statements import AstFunction
 
 
@@ -64,10 +64,6 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
     yield from vars(error).get("places", ())  # in the text that was walked
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
-
-
-_walked: dict[Callable, AstFunction] = {}
-_copies: dict[Any, Any] = {}
 
 
 class Module:
@@ -135,10 +131,11 @@ def _seen(thing: Any) -> Any:
         return values.now().constant(thing)
     if not isinstance(thing, Hashable):
         raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
-    if thing not in _copies:
-        _copies[thing] = _copy(thing)
+    known = current().seen
+    if thing not in known:
+        known[thing] = _copy(thing)
     note(modules_of(thing))
-    return _copies[thing]
+    return known[thing]
 
 
 def _copy(thing: Any) -> Any:
@@ -159,9 +156,10 @@ def _copy(thing: Any) -> Any:
 
 def _copied(function: Callable) -> AstFunction:
     """Return the compiler of a function's text."""
-    if function not in _walked:
-        _walked[function] = AstFunction(function, _seen)
-    return _walked[function]
+    walked = current().walked
+    if function not in walked:
+        walked[function] = AstFunction(function, _seen)
+    return walked[function]
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
@@ -179,11 +177,8 @@ class _Formula(NamedTuple):
     name: str
 
 
-_formulas: dict[tuple, _Formula | None] = {}
 MOST_FORMULAS = 4000  # cached: about 12 kB each, 800 for a scene with contact
 _own: set[Callable] = set()  # functions that are not inlined
-# One Python thread compiles at a time, because this cache is shared.
-one_at_a_time = threading.RLock()
 
 
 def _is_plain(thing: Any) -> bool:
@@ -218,41 +213,38 @@ def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     if values.at_work():
         return _formula(dispatch, kinds)
     with one_at_a_time:
-        if _outdated.is_set() or len(_formulas) > MOST_FORMULAS:
-            _outdated.clear()
-            for known in (_formulas, _copies, _walked):
+        session = current()
+        if session.outdated or len(session.functions) > MOST_FORMULAS:
+            session.outdated = False
+            for known in (session.functions, session.seen, session.walked):
                 known.clear()
         return _formula(dispatch, kinds)
 
 
 def _formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
-    if key not in _formulas:
+    known = current().functions
+    if key not in known:
         if values.is_begun(key):
             raise CannotCompile("it calls itself", dispatch)
-        _formulas[key] = _written(key, dispatch, kinds)
-    found = _formulas[key]
+        known[key] = _written(key, dispatch, kinds)
+    found = known[key]
     if found is not None:
         note(found.modules)
     return found
 
 
-_outdated = threading.Event()  # invalidates the cache
-changes = 0  # of implementations that compiled kernels may contain
-
-
 def forget() -> None:
     """Drop cached selections: a point function has a new implementation."""
     if values.at_work():
-        _formulas.clear()
+        current().functions.clear()
     else:  # another Python thread may be compiling
-        _outdated.set()
+        current().outdated = True
 
 
 def outdate_kernels() -> None:
     """Let kernels be looked up again: some of their functions have changed."""
-    global changes
-    changes += 1
+    current().changes += 1
 
 
 class PointFunction:

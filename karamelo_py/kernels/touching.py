@@ -12,7 +12,7 @@ from numba import types
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field, load_vector, store
 from karamelo_py.compiler.loops import caller_of, noinline
-from karamelo_py.compiler.trace import one_at_a_time
+from karamelo_py.compiler.session import one_at_a_time
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.surfaces import depth, slopes
