@@ -76,6 +76,9 @@ OWN = {
     "gas": GAS.format(method="FLIP, linear, 0.9"),
     "gas APIC": GAS.format(method="APIC, quadratic-spline"),
     "gas XPIC": GAS.format(method="XPIC, quadratic-spline, 3"),
+    "single MLS": "precision(single)\n" + _block(2, transfer="MLS", scheme="usl"),
+    "MLS at a wall": _block(2, transfer="MLS", scheme="usl").replace(
+        "0.3, 0.5, 0.3, 0.4", "0, 0.2, 0, 0.1"),
     "per time": _method(_block(2), "ulmpm, FLIP/per-time, linear, 0.9"),
 }  # fmt: skip
 ALL = {**OWN, **SCENES, **SERIAL}
@@ -89,22 +92,30 @@ def _hash(text):
 
 
 def _operations(text):
-    """Hash the set of operations of a module, each with all that leads to its operands."""
-    lines = [line.strip().split(", !dbg")[0] for line in text.splitlines()]
-    given = {}
-    for line in lines:
-        name, equals, what = line.partition(" = ")
-        if equals and NAMED.fullmatch(name):
-            given.setdefault(name, NAMED.findall(what)), given.setdefault((name,), what)
-    known = {name: _hash(NAMED.sub("?", given[name,])) for name in given if isinstance(name, str)}
-    for _ in range(9):
-        known = {
-            name: _hash(NAMED.sub("?", given[name,]) + "".join(
-                known.get(one, one if one[0] == "@" else "") for one in given[name]))
-            for name in known
-        }  # fmt: skip
-    rest = {NAMED.sub(lambda m: known.get(m[0], "?"), line) for line in lines if line}
-    return _hash("".join(sorted(set(known.values()) | rest)))
+    """Hash the set of stores, calls and branches of a module, each with all that leads to it."""
+    known, phis, found = {}, {}, set()
+
+    def told(name):
+        return known.get(name[0], "?")
+
+    for line in text.splitlines():
+        if line.startswith("define"):
+            known.clear(), phis.clear()
+            continue
+        name, equals, what = line.strip().partition(" = ")
+        named = equals and NAMED.fullmatch(name)
+        own = NAMED.sub(told, what if named else line.strip())
+        if named and what.startswith("phi "):  # where ways meet does not matter
+            values = {m[1].strip() for m in re.finditer(r"\[([^,\]]*),", what)}
+            phis[name] = set().union(
+                *(phis.get(v, {known.get(v, "?" if v[0] == "%" else v)}) for v in values)
+            )
+            own = "phi " + " ".join(sorted(phis[name]))
+        if named:
+            known[name] = _hash(own)
+        if not line.endswith(":") and (not named or "call" in own):
+            found.add(own)
+    return _hash("".join(sorted(found)))
 
 
 def _texts(script):
@@ -157,7 +168,7 @@ def _texts(script):
                                     type(simulation.visits), *own)  # fmt: skip
                 assert steps.step
             except (TypeError, AttributeError) as why:
-                found.append(("no card", type(why).__name__))
+                found.append(("no card", str(why)[:200]))
     finally:
         machine.compile_text, files.machine_code, files.KernelFiles.kernel, gpu.text_of = usual
         trace.outdate_kernels()
@@ -182,14 +193,15 @@ def _bits(script):
 
 @functools.cache
 def _operations_of(name):
-    return _operations(gzip.decompress((TEXTS / f"{name}.ll.gz").read_bytes()).decode())
+    file = TEXTS / f"{name}.ll.gz"
+    return _operations(gzip.decompress(file.read_bytes()).decode()) if file.exists() else name
 
 
 def _difference(a, b):
     if isinstance(a, dict) and isinstance(b, dict):
         return [key for key in a.keys() | b.keys() if a.get(key) != b.get(key)]
     if not (isinstance(a, list) and isinstance(b, list)):
-        return [a, b]
+        return [str(one)[:60] for one in (a, b)]
     a, b = ({*map(tuple, one)} for one in (a, b))
     rest = [sorted((n, _operations_of(h)) for n, h in one) for one in (a - b, b - a)]
     if rest[0] == rest[1]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import scalar
-from karamelo_py.kernels.p2g import Force, WorkOfForces
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.table import ACCELERATE, SUMS
 from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.linear import Linear

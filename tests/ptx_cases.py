@@ -13,9 +13,8 @@ from combinations import BASES, MESHED, fits, scene, write_mesh
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import NoCard, library
 from karamelo_py.kernels import nodes
+from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat, KeepLoss
 from karamelo_py.kernels.hooks import CompiledHook
-from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
-from karamelo_py.kernels.nodes import KeepLoss
 from karamelo_py.language import registry
 from karamelo_py.language.help import sections_of
 

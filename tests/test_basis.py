@@ -418,7 +418,7 @@ def test_box_between_carried_corners(kin, fraction, size):
     for corner in range(carried(b, kin)):
         by = carrier(b, kin, grid, stencil, corner)
         u = np.array(by.weights) @ displacements[np.array(by.rows, int)]
-        new = carry(b, kin, new, old, corner, tuple(u))
+        new = carry(b, kin, new, corner, tuple(u))
     assert new[:d] == old[:d]
     expected = box_of(kin, old) * (1 + np.diag(gradient))
     assert box_of(kin, new) == pytest.approx(expected, rel=1e-12)
@@ -454,7 +454,7 @@ def moved_box(basis, kin, grid, place, dl):
         for corner in range(carried(basis, kin)):
             for weight in carrier(basis, kin, grid, stencil, corner).weights:
                 u = weight * dl.diagonal()
-                new = carry(basis, kin, new, place, corner, u)
+                new = carry(basis, kin, new, corner, u)
     return new
 
 

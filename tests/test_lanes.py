@@ -1,7 +1,6 @@
 """Several points at once: each lane gives the bits of a point alone; nothing is beyond the last."""
 
 from math import log1p, sin
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -24,11 +23,12 @@ from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_o
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.compiler.trace import CannotCompile
 from karamelo_py.compiler.tuples import flat, nested_as, row
-from karamelo_py.kernels.arrays import arrays_of, with_items_of
-from karamelo_py.kernels.g2p import empty, gathered, updated
-from karamelo_py.kernels.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
+from karamelo_py.kernels.arrays import arrays_of, with_items
+from karamelo_py.kernels.equations import Task
+from karamelo_py.kernels.equations.fbar import NodalMean
+from karamelo_py.kernels.equations.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.sweep import OldWeights, Visit, context_of, sweep_points
-from karamelo_py.kernels.visit import NodalMean, place_at
+from karamelo_py.kernels.views import place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import (
@@ -343,7 +343,7 @@ def _grown(basis, grid, stencil, here, seen):
     new = deformed(basis, KIN, here, dl)
     for corner in range(carried(basis, KIN)):
         u = vector(KIN, row(seen, carrier(basis, KIN, grid, stencil, corner), 0, here[:2]))
-        new = carry(basis, KIN, new, here, corner, 1e-3 * u)
+        new = carry(basis, KIN, new, corner, 1e-3 * u)
     return (*new, extent(basis, KIN, grid, new) + real(0, here[0]))
 
 
@@ -571,13 +571,21 @@ def test_parameters_of_one_material_and_of_several():
     assert out[0].tolist() == table[material].tolist()
 
 
-class Alone(NamedTuple):
+class Alone(Task):
     """A task that does nothing and knows no lanes."""
 
+    in_lanes = False
 
-empty.on(Alone)(lambda task, w, x: ())
-gathered.on(Alone)(lambda task, w, stencil, k, total: total)
-updated.on(Alone)(lambda task, w, stencil, p, dt, total, totals, fastest: (real(0, dt), fastest))
+    def empty(task, w, x):
+        return ()
+
+    def gathered(task, node, total):
+        return total
+
+    def updated(task, pt, total, totals, fastest):
+        return real(0, pt.dt), fastest
+
+
 WARM_DISK = """
 method(tlmpm, FLIP, linear, 1, thermo-mechanical)
 dimension(2, 0, 1, 0, 1, 0.2)
@@ -597,7 +605,7 @@ def _visited(*more):
     heat = setup.heat
     mean = NodalMean(np.zeros_like(field(heat.nodes.fields, NodalMean)))
     to = heat.buffers.nodes._replace(sums=np.zeros_like(heat.nodes.sums), fields=(mean,))
-    s = with_items_of(setup, heat._replace(buffers=heat.buffers._replace(nodes=to)))
+    s = with_items(setup, nodes=heat.nodes, buffers=heat.buffers._replace(nodes=to))
     rng = np.random.default_rng(5)
     points = s.blocks[0].points
     given = [one.array for one in (*points.fields, *s.nodes.fields)]

@@ -21,9 +21,9 @@ from karamelo_py.compiler import cache
 from karamelo_py.compiler.choices import classes_in
 from karamelo_py.compiler.fields import name_of, rows_of_points, some_points
 from karamelo_py.compiler.trace import PointFunction, forget, outdate_kernels
+from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
-from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.implicit.load_steps import LoadSteps

@@ -2,9 +2,16 @@
 
 import pytest
 
-from karamelo_py.kernels.g2p import Move, SecondStrain, Strain, StrainInMove, StrainOfLastStep
-from karamelo_py.kernels.nodes import NodalUpdate
-from karamelo_py.kernels.p2g import InternalForce, MassMomentum
+from karamelo_py.kernels.equations.internal_force import InternalForce
+from karamelo_py.kernels.equations.mass_momentum import MassMomentum
+from karamelo_py.kernels.equations.move import Move
+from karamelo_py.kernels.equations.node_updates import NodalUpdate
+from karamelo_py.kernels.equations.strain import (
+    SecondStrain,
+    Strain,
+    StrainInMove,
+    StrainOfLastStep,
+)
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights
 from karamelo_py.kernels.table import (
     FORCE,

@@ -1,6 +1,7 @@
 """Transfers of velocity: definitions, and what they conserve when a point meets the grid."""
 
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,18 +10,18 @@ from hypothesis import strategies as st
 from scenes import block
 from tensors import ALL_KINEMATICS, numbers, tensors, vectors
 
+from karamelo_py.kernels.views import node_of
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import evenly, inverse_spread
 from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
-from karamelo_py.points.kinematics import PlaneStrain, Space, gradient, planar, vector
+from karamelo_py.points.kinematics import PlaneStrain, Space, planar, vector
 from karamelo_py.points.transfers import (
     Moment,
     add_moment,
     affine_velocity,
     by_arms,
     displacing_velocity,
-    gradient_weight,
     nodal_momentum,
     terms,
     updated_velocity,
@@ -98,29 +99,24 @@ class Met:
     def given(self, transfer, mass, v, moment):
         """Momentum (n, d) that the nodes get."""
         v = vector(self.kin, v)
-        return np.array(
-            [
-                nodal_momentum(
-                    transfer, self.kin, self.basis, self.grid, self.stencil, k, self.weights[k],
-                    mass, v, moment,
-                )
-                for k in self.count
-            ]
-        )  # fmt: skip
+        pt = SimpleNamespace(mass=mass, v=v, moment=moment)
+        return np.array([nodal_momentum(transfer, pt, self.node(transfer, k)) for k in self.count])
+
+    def node(self, transfer, k):
+        """The view of the k-th node."""
+        w = SimpleNamespace(basis=self.basis, kin=self.kin, grid=self.grid, transfer=transfer)
+        return node_of(w, self.stencil, k)
 
     def gradient(self, transfer, k):
         """What stands for the gradient of the k-th node."""
-        own = gradient(self.kin, self.gradients[k])
-        return gradient_weight(transfer, self.basis, self.kin, self.grid, self.stencil, k, own)
+        return self.node(transfer, k).strain_N
 
     def taken(self, transfer, field):
         """What the point keeps of the nodal velocity `field` (n, d)."""
         moment = zero_moment(transfer, self.kin, 1.0)
         for k in self.count:
-            moment = add_moment(
-                transfer, self.kin, self.basis, self.grid, self.stencil, k, self.weights[k],
-                self.gradient(transfer, k), vector(self.kin, field[k]), moment,
-            )  # fmt: skip
+            v = vector(self.kin, field[k])
+            moment = add_moment(transfer, self.node(transfer, k), v, moment)
         return moment
 
 

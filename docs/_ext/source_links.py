@@ -1,4 +1,4 @@
-"""Links from equations to the functions that compute them: {src}`kernels/p2g.py:function`.
+"""Links from equations to the functions that compute them: {src}`kernels/sweep.py:function`.
 
 One page shows the source of all functions that are named so in docs/formulas.md.
 """

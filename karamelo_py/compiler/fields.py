@@ -17,7 +17,7 @@ shape
         component;
     summed
         whether points contribute to this nodal field (default `False`): contributions are summed
-        tile by tile (:mod:`karamelo_py.kernels.p2g`);
+        tile by tile (:mod:`karamelo_py.kernels.sums`);
     columns
         names of its components in dumps, the log, plots and pictures.
 

@@ -392,11 +392,10 @@ class Setup(NamedTuple):
     control: Control
 
 
-def with_items_of(values, others):
-    """Replace items by the items with the same names in another NamedTuple."""
-    new = dict(zip(others._fields, others, strict=True))
-    items = zip(values._fields, values, strict=True)
-    return type(values)(*[new.get(name, item) for name, item in items])
+def with_items(of, /, **items):
+    """Replace items of a NamedTuple, which may be held, by their names."""
+    pairs = zip(of._fields, of, strict=True)
+    return type(of)(*[items.get(name, item) for name, item in pairs])
 
 
 @noinline

@@ -11,9 +11,9 @@ from numba import types
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points, clear_forces
-from karamelo_py.kernels.p2g import Force
 
 CALL = types.int64(types.int64)
 
@@ -43,21 +43,5 @@ def _at_points_called(hooks, stage, then, s):
         _act(hooks.address, stage)
 
 
-@at_nodes.on(CalledHooks)
-def _at_nodes_called(hooks, stage, target, s):
-    at_nodes(hooks.compiled, stage, target, s)
-
-
-@add_work.on(CalledHooks)
-def _add_work_called(hooks, s):
-    add_work(hooks.compiled, s)
-
-
-@at_heat_nodes.on(CalledHooks)
-def _at_heat_nodes_called(hooks, stage, target, s):
-    at_heat_nodes(hooks.compiled, stage, target, s)
-
-
-@at_heated_points.on(CalledHooks)
-def _at_heated_points_called(hooks, s):
-    at_heated_points(hooks.compiled, s)
+for _function in (at_nodes, add_work, at_heat_nodes, at_heated_points):
+    _function.on(CalledHooks)(lambda hooks, *rest, act=_function: act(hooks.compiled, *rest))

@@ -32,16 +32,9 @@ import numpy as np
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import (
-    DT,
-    MASS,
-    TIMESTEP,
-    of_change,
-    of_momentum,
-    vector_at,
-)
-from karamelo_py.kernels.loss import FrictionalHeat, warm_node
-from karamelo_py.kernels.p2g import Centre, Normal
+from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum, vector_at
+from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
+from karamelo_py.kernels.equations.mass_momentum import Centre, Normal
 from karamelo_py.kernels.table import Once, each_node
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
@@ -80,14 +73,6 @@ class SeparateFields(NamedTuple):
     meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a position
     partners: np.ndarray  # (F,) int64 scratch: number of contacts of each of them
     change: np.ndarray  # (F, d) scratch: velocity change of each of them
-
-
-class Scratch(NamedTuple):
-    """Private scratch of a thread: the last fields of `SeparateFields`."""
-
-    meeting: np.ndarray
-    partners: np.ndarray
-    change: np.ndarray
 
 
 # --- two bodies at a position -----------------------------------------------------------------

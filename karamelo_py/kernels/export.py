@@ -7,7 +7,7 @@ from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import put_at, record, row
-from karamelo_py.kernels.visit import deformation_of, place_at, state_at
+from karamelo_py.kernels.views import deformation_of, place_at, state_at
 from karamelo_py.points import laws as law_functions
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import outer, planar, zero
@@ -123,6 +123,6 @@ def move_moments(frame, kin, points, laws, moments):
     flat = planar(kin)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
-        f: Any = deformation_of(frame, kin, law, state, points, p)
+        f: Any = deformation_of(frame, kin, points, (law, state), p)
         moment = load(moments, p, zero(flat, points.mass[p]))
         store(moments, p, moment @ f.planar().transposed())

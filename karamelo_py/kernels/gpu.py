@@ -16,21 +16,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.compile import index, real, where
-from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels import sweep
-from karamelo_py.kernels.arrays import DT, TIME, Nodes, of_force
+from karamelo_py.kernels.arrays import DT, TIME, Nodes
 from karamelo_py.kernels.clock import finish, kick, last_step_size, step_size
-from karamelo_py.kernels.g2p import updated_all
+from karamelo_py.kernels.equations import found, load_all, scattered_all, updated_all
+from karamelo_py.kernels.equations.node_updates import at_node
 from karamelo_py.kernels.lanes import OneByOne
-from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import RigidSums, adds, columns_of, load_all, scattered_all
 from karamelo_py.kernels.stencils import gathered_by
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, PATIENCE, SHRUNK, SMALLEST, STOPPED
-from karamelo_py.kernels.visit import place_at
-from karamelo_py.points import basis as bases
+from karamelo_py.kernels.sums import columns_in_turn
+from karamelo_py.kernels.views import PointView, node_of, place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
@@ -82,27 +80,6 @@ class CellLists(NamedTuple):
     boxes: np.ndarray  # (columns, boxes): what cells give to some of the nodes their points see
 
 
-class InCell(NamedTuple):
-    """Replaces a basis: the nodes of a point are numbered 0, 1, ... as in its stencil."""
-
-    basis: NamedTuple
-
-
-bases.support.on(InCell)(lambda basis, kin: bases.support(basis.basis, kin))
-bases.locate.on(InCell)(lambda basis, kin, grid, place: bases.locate(basis.basis, kin, grid, place))
-bases.reach.on(InCell)(
-    lambda basis, kin, grid, stencil, k: bases.reach(basis.basis, kin, grid, stencil, k)
-)
-bases.affine_weight.on(InCell)(
-    lambda basis, kin, grid, stencil, k: bases.affine_weight(basis.basis, kin, grid, stencil, k)
-)
-
-
-@bases.entry.on(InCell)
-def _entry_in_cell(basis, kin, grid, stencil, k):
-    return index(k), *bases.entry(basis.basis, kin, grid, stencil, k)[1:]
-
-
 def nodes_in_cell(basis: Any, kin: Any) -> int:
     """Count the nodes that all points of a cell, or corners in it, see."""
     return basis.line_nodes**kin.dimension
@@ -144,138 +121,87 @@ def is_last(s):
     return values[TIME] + values[DT] >= s.control.clock[0].end_time
 
 
-def _is_filled(name: Any, column: int, kin: Any) -> bool:
-    """Tell whether a column of the nodes' records has a number, and is no gap."""
-    if name == "velocity":
-        return column < kin.dimension
-    force = column - of_force(kin)
-    return name not in ("sums", RigidSums) or (
-        column <= kin.dimension if force < 0 else force < kin.dimension
-    )
-
-
-def _as_it_is(s):
-    return s
-
-
 class Stage:
-    """A visit of the points in a step, as functions of threads: `row` is one of its scheme's."""
+    """A visit of the points in a step, as functions of threads: `row` is one of its scheme's.
 
-    def __init__(self, row: Any, basis: Any, kin: Any, present: list, parts: int = 1):
-        share, of_last_step = row.share, row.of_last_step
-        self.row, self.parts = row, parts
-        self.lists = isinstance(
-            row.visit.weights, sweep.PresentWeights
-        )  # points by their cells anew
-        quantities = row.visit.quantities
-        self.columns = [
-            (name, column, add)
-            for add in (False, True)
-            for name, first, end in columns_of(tuple(q for q in quantities if adds(q) == add), kin)
-            if name in present
-            for column in range(first, end)
-            if _is_filled(name, column, kin)
-        ]
+    `columns` are those of the nodes that it fills, (array, column, whether it adds), of the arrays
+    that are `present`. The nodes that the points of a cell see are summed in `parts`.
+    """
+
+    def __init__(self, row: Any, s: Any, present: list):
+        basis, kin, quantities = s.basis, s.kin, row.visit.quantities
+        self.row, self.parts, self.at = row, 1, row.at or (lambda s: s)
+        self.lists = isinstance(row.visit.weights, sweep.PresentWeights)  # points by cells, anew
+        self.columns = columns_in_turn(quantities, kin, present)
         self.support = nodes_in_cell(basis, kin)
         self.corners = int(support(basis, kin)) // self.support  # that are listed of a point
         self.scatters = bool((row.scatters or row.only_if_more) and quantities)
+        self._point_functions()
 
-        self.at = at = row.at or _as_it_is
+    def _point_functions(self) -> None:
+        """Make what a point does: gather and update, find its load, be counted."""
+        row, at, lists, corners, count = self.row, self.at, self.lists, self.corners, self.support
+        tasks, quantities, keeps = row.visit.tasks, row.visit.quantities, self.scatters
 
         def context(s):
-            whole = last_step_size(s) if of_last_step else step_size(s)
-            dt = whole if share == 1 else real(share, whole) * whole
+            whole = last_step_size(s) if row.of_last_step else step_size(s)
+            dt = whole if row.share == 1 else real(row.share, whole) * whole
             return sweep.context_of(at(s), dt, row.gathers, row.scatters, row.moves)
 
-        def at_point(s, block, p):
+        def point(s, block, p):
             c, points = context(s), block.points
             grid = record(c.grids, index(points.grid[p]))
             places = sweep.places_of(c.frame, points, c.now, c.then)
-            return c, sweep.work_of(c, grid, c.nodes, block, places)
+            return c, PointView(sweep.work_of(c, grid, c.nodes, block, places), (), p, c.dt)
 
-        self.at_point = at_point  # the context of the visit, and the work at a point
+        def place(pt):
+            w = pt.w
+            places = w.places.y if lists and w.frame.moves else w.places.where
+            return place_at(w.basis, w.kin, places, pt.p)
 
-    def _keep(self) -> Callable:
-        """Make the function that stores the load of a point."""
-        quantities, scatters = self.row.visit.quantities, self.scatters
-
-        def keep(w, p, dt, cells):
-            if scatters:
-                for k, number in enumerate(flat(load_all(quantities, w, p, dt))):
-                    cells.loads[k, p] = number
-
-        return keep
-
-    def load(self) -> Callable:
-        """Make what a point gives."""
-        at_point, quantities = self.at_point, self.row.visit.quantities
+        def keep(pt, cells):
+            if keeps:
+                for k, number in enumerate(flat(load_all(quantities, pt))):
+                    cells.loads[k, pt.p] = number
 
         def load_of_point(s, block, i):
-            c, w = at_point(s, block, index(i))
-            return flat(load_all(quantities, w, index(i), c.dt))
-
-        return load_of_point
-
-    def load_point(self) -> Callable:
-        """Make the function of a point that has not gathered: it stores its load."""
-        at_point, keep = self.at_point, self._keep()
+            return flat(load_all(quantities, point(s, block, index(i))[1]))
 
         def load_point(i, fate, s, block, cells):
-            c, w = at_point(s, block, index(i))
-            keep(w, index(i), c.dt, cells)
-
-        return load_point
-
-    def gather(self) -> Callable:
-        """Make the function of a point: gather from the nodes, update, store its load."""
-        at_point, tasks, keep = self.at_point, self.row.visit.tasks, self._keep()
+            keep(point(s, block, index(i))[1], cells)
 
         def gather_point(i, fate, s, block, cells):
-            p = index(i)
-            c, w = at_point(s, block, p)
-            stencil = sweep.stencil_of(w, p)
-            found = gathered_by(OneByOne(), tasks, w, stencil, sweep.position_of(w, p))
+            c, pt = point(s, block, index(i))
+            pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
+            x = sweep.position_of(pt.w, pt.p)
+            totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
             # From zero: what others have found by now would depend on which thread comes first.
-            moved, rate = updated_all(tasks, w, stencil, p, c.dt, found, real(0, c.dt))
-            _report(fate, block.points.id[p], moved, rate, c.stride)
-            keep(w, p, c.dt, cells)
-
-        return gather_point
-
-    def _place(self) -> Callable:
-        present = self.lists
-
-        def place(w, p):
-            places = w.places.y if present and w.frame.moves else w.places.where
-            return place_at(w.basis, w.kin, places, p)
-
-        return place
-
-    def count(self) -> Callable:
-        """Make what a point does to be listed: it finds its cell, and is counted."""
-        at_point, place, count, corners = self.at_point, self._place(), self.support, self.corners
+            moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
+            _report(fate, block.points.id[pt.p], moved, rate, c.stride)
+            keep(pt, cells)
 
         def count_point(i, fate, s, block, cells):
-            points, p = block.points, index(i)
-            c, w = at_point(s, block, p)
-            where = place(w, p)
-            if inside(w.grid, c.kin, where):
-                stencil = locate(c.basis, c.kin, w.grid, where)
-                for k in range(corners):
-                    number = entry(c.basis, c.kin, w.grid, stencil, k * count)[0]
-                    cells.number[index(k * points.mass.size + i)] = number
-                    counted(cells.count, number, 1)
-            else:
-                for k in range(corners):
-                    cells.number[index(k * points.mass.size + i)] = 0  # of a run that ends here
-                    counted(cells.count, 0, 1)
-                goes_wrong(fate, points.id[p])
+            points = block.points
+            c, pt = point(s, block, index(i))
+            where = place(pt)
+            found = inside(pt.w.grid, c.kin, where)
+            for k in range(corners):
+                number = 0  # of a run that ends here
+                if found:
+                    stencil = locate(c.basis, c.kin, pt.w.grid, where)
+                    number = entry(c.basis, c.kin, pt.w.grid, stencil, k * count)[0]
+                cells.number[index(k * points.mass.size + i)] = number
+                counted(cells.count, number, 1)
+            if not found:
+                goes_wrong(fate, points.id[pt.p])
 
-        return count_point
+        self._point, self._place = point, place
+        self.load, self.load_point = load_of_point, load_point
+        self.gather, self.count = gather_point, count_point
 
     def scatter(self, part: int) -> Callable:
         """Make what a cell does: it sums what its points give to a part of the nodes they see."""
-        at_point, place, quantities = self.at_point, self._place(), self.row.visit.quantities
+        point, place, quantities = self._point, self._place, self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
         filled = tuple(dict.fromkeys(name for name, _, _ in columns))
@@ -285,16 +211,9 @@ class Stage:
             return rooms[filled.index(name)] if name in filled else otherwise
 
         def nodes_for(nodes, rooms):
-            return Nodes(
-                room_of("sums", rooms, nodes.sums),
-                nodes.update,
-                room_of("velocity", rooms, nodes.velocity),
-                tuple([type(one)(room_of(type(one), rooms, one.array)) for one in nodes.fields]),
-            )
-
-        def loaded(w, p, dt, cells):
-            like = load_all(quantities, w, p, dt)  # for its shape alone
-            return nested_as(like, tuple([cells.loads[k, p] for k in range(len(flat(like)))]))
+            fields = [type(one)(room_of(type(one), rooms, one.array)) for one in nodes.fields]
+            sums, velocity = room_of("sums", rooms, nodes.sums), nodes.velocity
+            return Nodes(sums, nodes.update, room_of("velocity", rooms, velocity), tuple(fields))
 
         def scatter_cell(i, fate, s, block, cells):
             if i >= cells.box[cells.box.size - 1] or (only_if_more and is_last(s)):
@@ -303,19 +222,22 @@ class Stage:
             first, last = cells.first[cell], cells.first[cell + 1]
             size = block.points.mass.size
             p, corner = _point_and_corner(corners, size, cells.order[first])
-            c, w = at_point(s, block, p)
+            c, pt = point(s, block, p)
             rooms = tuple([room_for(width, (c.dt,) * count) for width in widths])
             for name, column, _ in columns:
                 for k in range(begin, end):
                     room_of(name, rooms, None)[k, column] = c.dt - c.dt
-            out = w._replace(basis=InCell(w.basis), nodes=nodes_for(w.nodes, rooms))
+            out = pt.w._replace(nodes=nodes_for(pt.w.nodes, rooms))
+            like = load_all(quantities, pt)  # for its shape alone
             for q in range(first, last):
                 behind = cells.order[min(q + 1, last - 1)]  # asked for ahead
-                stencil = locate(w.basis, w.kin, w.grid, place(w, p))
+                here = pt._replace(p=p)
+                stencil = locate(out.basis, out.kin, out.grid, place(here))
                 seen = stencil if corners == 1 else of_corner(stencil, corner)
-                loads = loaded(w, p, c.dt, cells)
+                numbers = tuple([cells.loads[k, p] for k in range(len(flat(like)))])
                 for k in range(begin, end):
-                    scattered_all(quantities, out, seen, k, loads)
+                    node = node_of(out, seen, k)._replace(i=index(k))  # numbered in the cell
+                    scattered_all(quantities, nested_as(like, numbers), node)
                 p, corner = _point_and_corner(corners, size, behind)
             for j, (name, column, _) in enumerate(columns):
                 for k in range(begin, end):
@@ -336,26 +258,22 @@ class Stage:
 
     def sum(self, part: int, anew: bool) -> Callable:
         """Make what a node does: it sums what cells have given to it; `anew` from zero."""
-        columns, only_if_more = self.columns, self.row.only_if_more
+        columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(part)
-        at = self.at
-
-        def put(nodes, n, found):
-            for (name, column, add), value in zip(columns, found, strict=True):
-                array = getattr(nodes, name) if isinstance(name, str) else field(nodes.fields, name)
-                if add or not anew:
-                    array[n, column] += value
-                else:
-                    array[n, column] = value
 
         def sum_node(i, fate, s, block, cells, use):
             if use[i] == 0 or (only_if_more and is_last(s)):
                 return
             grid = _grid_of(s.grids, i)
-            found = (real(0, s.nodes.sums[0, 0]),) * len(columns)
+            totals = (real(0, s.nodes.sums[0, 0]),) * len(columns)
             for k in range(begin, end):
-                found = _with_cell(s, cells, grid, i, k, begin, end, found)
-            put(at(s).nodes, index(i), found)
+                totals = _with_cell(s, cells, grid, i, k, (begin, end), totals)
+            for (name, column, add), value in zip(columns, totals, strict=True):
+                array = found(at(s).nodes, name)
+                if add or not anew:
+                    array[index(i), column] += value
+                else:
+                    array[index(i), column] = value
 
         return sum_node
 
@@ -398,16 +316,16 @@ def _steps_to(s, grid, k):
     return node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
 
 
-def _with_cell(s, cells, grid, n, k, begin, end, found):
-    """Add to `found` what a cell gives to node `n`, which its points see as their k-th node."""
-    c = n - _steps_to(s, grid, k)
+def _with_cell(s, cells, grid, n, k, part, totals):
+    """Add to `totals` what a cell gives to node `n`, which its points see as their k-th node."""
+    (begin, end), c = part, n - _steps_to(s, grid, k)
     box = cells.box[index(max(c, 0))]
     there = (box >= 0) & (c >= 0)
     at = index(max(box, 0))
     return tuple(
         [
             value + where(there, cells.boxes[j * (end - begin) + k - begin, at], value - value)
-            for j, value in enumerate(found)
+            for j, value in enumerate(totals)
         ]
     )
 
@@ -541,14 +459,13 @@ def put_rows(i, fate, rows, room):
 
 def of_nodes(row: Any) -> Callable:
     """Make what a node does for a row of a task."""
-    task, at, length = row.task, row.at or _as_it_is, row.length or kick
+    task, at, length = row.task, row.at or (lambda s: s), row.length or kick
     made = task if callable(task) else lambda s: task
 
     def visit_node(i, fate, s, use):
-        if use[i] == 0:
-            return
-        here = at(s)
-        at_node(made(s), here.kin, here.nodes, index(i), length(s))
+        if use[i] > 0:
+            here = at(s)
+            at_node(made(s), here.kin, here.nodes, index(i), length(s))
 
     return visit_node
 

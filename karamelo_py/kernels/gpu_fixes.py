@@ -16,41 +16,21 @@ from karamelo_py.compiler.formula import ROWS, STACK
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.kernels import arrays, hook_loop, totals, watch
-from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items_of
+from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, step_size
-from karamelo_py.kernels.contact import Scratch, SeparateFields
+from karamelo_py.kernels.contact import SeparateFields
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
-from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.kernels.step import GAINED
-from karamelo_py.points.kinematics import planar
-
-
-class Own(NamedTuple):
-    """Arrays of a thread instead of those in `Hooks`."""
-
-    chosen: np.ndarray
-    scratch: np.ndarray
-
-
-class OwnTotals(NamedTuple):
-    """Totals of a thread instead of those in `Control`."""
-
-    totals: np.ndarray
-
-
-class OwnValues(NamedTuple):
-    """Published values of a thread, whose time it may set back."""
-
-    totals: np.ndarray
-    values: np.ndarray
 
 
 def _hooks_with_room(hooks):
     """Return the hooks with room for one member."""
-    own = Own(room_for(1, (0,))[0], room_for(1, (0.0,) * (STACK + ROWS + 1)))
-    own.scratch[:6] = 0.0
-    return with_items_of(hook_loop.without_whole(hooks), own)
+    scratch = room_for(1, (0.0,) * (STACK + ROWS + 1))
+    scratch[:6] = 0.0
+    chosen = room_for(1, (0,))[0]
+    return with_items(hook_loop.without_whole(hooks), chosen=chosen, scratch=scratch)
 
 
 def _control(count: int) -> Callable:
@@ -65,8 +45,8 @@ def _control(count: int) -> Callable:
     def control_of(s, copies, i):
         own = copies[index((i // 32) % len(copies))]
         if count:
-            return with_items_of(s.control, OwnValues(own, own_values(s.control.values)))
-        return with_items_of(s.control, OwnTotals(own))
+            return with_items(s.control, totals=own, values=own_values(s.control.values))
+        return with_items(s.control, totals=own)
 
     return control_of
 
@@ -83,71 +63,60 @@ def clear_held(i, fate, held):
         held[i, c].slot = 0
 
 
+class Act(NamedTuple):
+    """Arguments of the members of a hook, besides setup and hooks."""
+
+    h: int
+    heavy: np.ndarray  # (hooks,) members with mass
+    copies: np.ndarray  # of the totals
+
+
 def _member(hooks, h, i):
     begin = hooks.table[h].begin
     return i if begin < 0 else hooks.members[begin + i]
 
 
-def count_node(i, fate, nodes, hooks, h, heavy):
+def count_node(i, fate, s, hooks, about):
     """Count a member with mass."""
-    if nodes.sums[_member(hooks, h, i), arrays.MASS] > 0:
-        counted(heavy, h, 1)
+    if s.nodes.sums[_member(hooks, about.h, i), arrays.MASS] > 0:
+        counted(about.heavy, about.h, 1)
 
 
-def _share(hooks, h, heavy):
-    return 1.0 / max(heavy[h], 1) if hooks.table[h].uses_share else 1.0
+def hooked_nodes(target: int, of_heat: bool = False) -> Callable:
+    """Make the argument of hooks on components of nodes; for temperatures always as in FLIP."""
+    return lambda s: hook_loop.hooked_nodes(s, target, 1.0 if of_heat else s.control.clock[0].kept)
 
 
-def _planar_nodes(nodes):
-    """Return the nodes with the fields for hooks."""
-    known = hook_loop.known_to_hooks(nodes)
-    return arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known)
+def whole_nodes(target: int, stage: int) -> Callable:
+    """Make the argument of hooks on whole nodes."""
+    return lambda s, tag: hook_loop.whole_nodes(s, tag, stage, target)
 
 
-def on_node(target: int, task: int, values: int, of_heat: bool = False) -> Callable:
-    """Make what a member of a hook on nodes does; `task` is ACT or RUB."""
-    control_of = _control(values)
-    length = step_size if of_heat else kick
-
-    def visit_member(i, fate, s, hooks, h, heavy, copies):
-        n = _member(hooks, h, i)
-        if not s.nodes.sums[n, arrays.MASS] > 0:
-            return
-        own = _hooks_with_room(hooks)
-        own.chosen[0] = n
-        # For temperatures always FLIP, whatever the transfer of velocity.
-        control, kept = control_of(s, copies, i), 1.0 if of_heat else s.control.clock[0].kept
-        nodes = _planar_nodes(s.nodes)
-        what = hook_loop.HookedNodes(target, planar(s.kin), s.grids, nodes, s.ranges, kept)
-        hook_loop.act(what, task, own, control, float(length(s)), h, 1, _share(hooks, h, heavy))
-
-    return visit_member
-
-
-def on_whole_node(target: int, early: bool) -> Callable:
-    """Make the same of a hook on whole nodes; `early` before the update."""
-
-    def visit_whole_member(i, fate, s, hooks, tag, h, copies):
-        n = _member(hooks, h, i)
-        if not s.nodes.sums[n, arrays.MASS] > 0:
-            return
-        own = _hooks_with_room(hooks)
-        own.chosen[0] = n
-        what = hook_loop.WholeNodes(tag, planar(s.kin), s.grids, s.nodes, s.ranges, early, target)
-        hook_loop.act(what, hook_loop.ACT, own, _CONTROL(s, copies, i), float(kick(s)), h, 1, 1.0)
-
-    return visit_whole_member
-
-
-def work_of_loads(i, fate, s, hooks, copies):
+def work_of_loads(i, fate, s, hooks, about):
     """Sum the work of loads on a node, and clear them."""
     if s.nodes.sums[i, arrays.MASS] > 0:
         own = _hooks_with_room(hooks)
         own.chosen[0] = i
-        what = hook_loop.HookedNodes(
-            hook_loop.LOADS, planar(s.kin), s.grids, _planar_nodes(s.nodes), s.ranges, 0.0
-        )
-        hook_loop.act(what, hook_loop.ACT, own, _CONTROL(s, copies, i), float(kick(s)), 0, 1, 1.0)
+        call = hook_loop.Call(own, _CONTROL(s, about.copies, i), float(kick(s)), 0, 1.0)
+        hook_loop.act(hook_loop.hooked_nodes(s, hook_loop.LOADS, 0.0), hook_loop.ACT, call, 1)
+
+
+def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
+    """Make what a member of a hook on nodes does in time `length`; `task` is ACT or RUB."""
+    control_of = _control(values)
+
+    def visit_member(i, fate, s, hooks, about, *tag):
+        n = _member(hooks, about.h, i)
+        if s.nodes.sums[n, arrays.MASS] > 0:
+            own = _hooks_with_room(hooks)
+            own.chosen[0] = n
+            shared = hooks.table[about.h].uses_share
+            share = 1.0 / max(about.heavy[about.h], 1) if shared else 1.0
+            control = control_of(s, about.copies, i)
+            call = hook_loop.Call(own, control, float(length(s)), about.h, share)
+            hook_loop.act(nodes_of(s, *tag), task, call, 1)
+
+    return visit_member
 
 
 # --- points -----------------------------------------------------------------------------------
@@ -161,34 +130,26 @@ def clear_force(i, fate, s, block):
             force[c, i] = 0
 
 
-def _act_on_point(what, control_of, i, s, hooks, h, copies):
-    own = _hooks_with_room(hooks)
-    count, _ = hook_loop.choose_points(what, own, h, i, i + 1)
-    if count > 0:
-        hook_loop.act(
-            what, hook_loop.ACT, own, control_of(s, copies, i), float(step_size(s)), h, 1, 1.0
-        )
+def whole_points(heats: bool) -> Callable:
+    """Make the argument of hooks on whole points."""
+    return lambda s, block, then, tag: hook_loop.whole_points(
+        tag, s, block, then, heat_of(block.points) if heats else ()
+    )
 
 
-def on_point(what_of: Callable, then: int, values: int) -> Callable:
-    """Make a point's function for a hook on the result of `what_of`; `then` is 1 after the move."""
+def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
+    """Make a point's function for a hook on the result of `points_of`; `then`: 1 after the move."""
     control_of = _control(values)
 
-    def visit_point(i, fate, s, block, hooks, h, copies):
-        _act_on_point(what_of(s, block, then), control_of, i, s, hooks, h, copies)
+    def visit_point(i, fate, s, block, hooks, about, *tag):
+        own, control = _hooks_with_room(hooks), control_of(s, about.copies, i)
+        what = points_of(s, block, then, *tag)
+        call = hook_loop.Call(own, control, float(step_size(s)), about.h, 1.0)
+        count, _ = hook_loop.choose_points(what, call, i, i + 1)
+        if count > 0:
+            hook_loop.act(what, hook_loop.ACT, call, 1)
 
     return visit_point
-
-
-def on_whole_point(then: int, heats: bool = False) -> Callable:
-    """Make the same of a hook on whole points."""
-
-    def visit_whole_point(i, fate, s, block, hooks, tag, h, copies):
-        heat = heat_of(block.points) if heats else ()
-        what = hook_loop.whole_points(tag, s, block, then, heat)
-        _act_on_point(what, _CONTROL, i, s, hooks, h, copies)
-
-    return visit_whole_point
 
 
 def check_point(i, fate, s, block):
@@ -211,28 +172,19 @@ def take_moves(i, fate, s):
 # --- functions of nodes, of points, and between loops -------------------------------------------
 
 
-class OwnParts(NamedTuple):
-    """Items of a thread instead of those in `Setup`."""
-
-    contact: NamedTuple
-    control: NamedTuple
-
-
 def _setup(s: arrays.Setup) -> Callable:
     """Make the setup of a thread, with private copies of arrays that threads would overwrite."""
-    contact = s.contact
-    fields = len(contact.slot) if isinstance(contact, SeparateFields) else 0
-    d = s.kin.dimension
+    fields, d = len(s.contact.slot) if isinstance(s.contact, SeparateFields) else 0, s.kin.dimension
 
     def contact_of(s):
         if fields == 0:
             return s.contact
         own = room_for(2, (0,) * fields)
-        room = Scratch(own[:, 0], own[:, 1], room_for(d, (0.0,) * fields))
-        return with_items_of(s.contact, room)
+        change = room_for(d, (0.0,) * fields)
+        return with_items(s.contact, meeting=own[:, 0], partners=own[:, 1], change=change)
 
     def setup_of(s, copies, i):
-        return with_items_of(s, OwnParts(contact_of(s), _CONTROL(s, copies, i)))
+        return with_items(s, contact=contact_of(s), control=_CONTROL(s, copies, i))
 
     return setup_of
 
@@ -242,9 +194,8 @@ def each_node(function: Callable, s: arrays.Setup) -> Callable:
     setup_of = _setup(s)
 
     def visit_each_node(i, fate, s, use, copies):
-        if use[i] == 0:
-            return
-        function(setup_of(s, copies, i), i)
+        if use[i] > 0:
+            function(setup_of(s, copies, i), i)
 
     return visit_each_node
 
@@ -293,16 +244,11 @@ def collect_total(i, fate, copies, sums, first):
     sums[row, limb] = total
 
 
-def publish(i, fate, s, hooks, always):
-    """Publish the totals of all hooks, if they are read."""
+def publish(i, fate, s, hooks, numbers, always):
+    """Publish the totals of hooks with these `numbers`, from and to before, if they are read."""
     if always or is_last(s):
-        for h in range(len(hooks.table)):
+        for h in range(*numbers):
             hook_loop.publish_total(hooks, h, s.control)
-
-
-def publish_hook(i, fate, s, hooks, h):
-    """Publish the totals of one hook."""
-    hook_loop.publish_total(hooks, h, s.control)
 
 
 # --- the watch over energy --------------------------------------------------------------------

@@ -20,9 +20,10 @@ from karamelo_py.kernels import arrays, totals
 from karamelo_py.kernels import hooks as kinds
 from karamelo_py.kernels.arrays import first_from
 from karamelo_py.kernels.clock import kick, step_size
-from karamelo_py.kernels.loss import FrictionalHeat
-from karamelo_py.kernels.p2g import Force, RigidSums
-from karamelo_py.kernels.visit import state_at
+from karamelo_py.kernels.equations import RigidSums
+from karamelo_py.kernels.equations.internal_force import Force
+from karamelo_py.kernels.equations.loss import FrictionalHeat
+from karamelo_py.kernels.views import state_at
 from karamelo_py.kernels.walls import FRICTION, rub, stick
 from karamelo_py.points.basis import placed
 from karamelo_py.points.bodies import face
@@ -44,30 +45,31 @@ _call_point_function = caller_of(kinds.POINT_FUNCTION)
 _call_heat_function = caller_of(kinds.HEAT_FUNCTION)
 
 
-class HookedNodes(NamedTuple):
-    """Nodes that node functions change, nodes of heat included.
+class Call(NamedTuple):
+    """A call of a hook: number `h` of `hooks`; `share` is 1 / number of members with mass."""
 
-    `kept` is the fraction of its velocity that a point retains, and changes by nodal increments.
-    """
+    hooks: NamedTuple
+    control: NamedTuple
+    dt: float
+    h: arrays.Number
+    share: float
+
+
+class HookedNodes(NamedTuple):
+    """Nodes that node functions change, nodes of heat included."""
 
     target: int  # position in the arrays of nodes
     kin: NamedTuple
     grids: np.ndarray
     nodes: NamedTuple
     ranges: np.ndarray
-    kept: float
+    kept: float  # fraction of its velocity that a point retains, and changes by nodal increments
+    tag: NamedTuple = ()  # type: ignore[assignment]
+    before_update: bool = False
 
 
-class WholeNodes(NamedTuple):
-    """Nodes that functions of whole nodes change."""
-
-    tag: NamedTuple  # the function, and what it reads and writes: see `kinds.vector_hook`
-    kin: NamedTuple
-    grids: np.ndarray
-    nodes: NamedTuple
-    ranges: np.ndarray
-    before_update: bool  # else after it
-    target: int
+class WholeNodes(HookedNodes):
+    """Nodes that functions of whole nodes change; `tag` as `kinds.vector_hook` makes it."""
 
 
 class MovingPoints(NamedTuple):
@@ -116,7 +118,7 @@ class HeatedPoints(NamedTuple):
 
 def _turns(what, k, parts):
     """Return begin, end and stride of the chunks of thread `k` of `parts`."""
-    if isinstance(what, (HookedNodes, WholeNodes)):
+    if isinstance(what, HookedNodes):
         shares = what.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
     # Interleaved, because members may be clustered.
@@ -126,38 +128,39 @@ def _turns(what, k, parts):
 
 def _bounds(what, turn, parts):
     """Return the range of members in a chunk."""
-    if isinstance(what, (HookedNodes, WholeNodes)):
+    if isinstance(what, HookedNodes):
         return what.ranges[turn, 0], what.ranges[turn, 1]
     return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
 
 
 @point_function()
-def act(what, task, hooks, control, dt, h, count, share):
+def act(what, task, call, count):
     """Do `task` with the chosen members and add to the totals; return how many count."""
 
 
 @noinline
-def _act_on_part(what, task, hooks, control, dt, h, share, k, parts):
-    """Do `task` with the members of hook `h` in the part of thread `k`; return how many count."""
+def _act_on_part(what, task, call, k, parts):
+    """Do `task` with the members of a hook in the part of thread `k`; return how many count."""
     found = 0
-    hooks.scratch[:6] = 0.0
+    call.hooks.scratch[:6] = 0.0
     first, last, step = _turns(what, k, parts)
     for turn in range(first, last, step):
         place, end = _bounds(what, turn, parts)
         count, member = BLOCK, NONE
         while count == BLOCK:
-            if isinstance(what, (HookedNodes, WholeNodes)):
-                count, place, member = _choose_nodes(what, hooks, h, place, end, member)
+            if isinstance(what, HookedNodes):
+                count, place, member = _choose_nodes(what, call, place, end, member)
             else:
-                count, place = choose_points(what, hooks, h, place, end)
+                count, place = choose_points(what, call, place, end)
             if count > 0:
-                found += act(what, task, hooks, control, dt, h, count, share)
+                found += act(what, task, call, count)
     return found
 
 
 @shared_out
-def _act_on_parts(what, task, hooks, control, dt, h, share, k):
+def _act_on_parts(what, task, call, k):
     """Act in the part of thread `k`, with private scratch and totals: totals do not round."""
+    hooks, control, h = call.hooks, call.control, call.h
     own = record(hooks.apart, k)
     for i in range(control.values.size):
         own.values[i] = control.values[i]
@@ -167,8 +170,10 @@ def _act_on_parts(what, task, hooks, control, dt, h, share, k):
     there.set_low, there.set_high = clock.set_low, clock.set_high
     there.rise, there.fall = clock.rise, clock.fall
     there.coldest, there.hottest = clock.coldest, clock.hottest
-    here, mine = hold(arrays.with_items_of(hooks, own)), hold(arrays.with_items_of(control, own))
-    _act_on_part(what, task, here, mine, dt, h, share, k, hooks.apart.chosen.shape[0])
+    here = hold(arrays.with_items(hooks, chosen=own.chosen, scratch=own.scratch))
+    mine = hold(arrays.with_items(control, values=own.values, totals=own.totals, clock=own.clock))
+    mine_call = Call(here, mine, call.dt, h, call.share)
+    _act_on_part(what, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(own.totals, control.totals, totals.WORK)
     # If other hooks have held the nodes before, their totals change, too.
     several = hooks.held.size > 0
@@ -178,15 +183,15 @@ def _act_on_parts(what, task, hooks, control, dt, h, share, k):
             totals.hand_over(own.totals, control.totals, row)
 
 
-def _act_on_all(what, task, hooks, control, dt, h, share):
+def _act_on_all(what, task, call):
     """Do `task` with all members of a hook."""
-    mode = hooks.mode
-    if not isinstance(mode, Threaded):
-        _act_on_part(what, task, hooks, control, dt, h, share, NONE, NONE + 1)
+    hooks = call.hooks
+    if not isinstance(hooks.mode, Threaded):
+        _act_on_part(what, task, call, NONE, NONE + 1)
         return
     parts = hooks.apart.chosen.shape[0]
-    _act_on_parts(mode, parts, what, task, hooks, control, dt, h, share)
-    clock = control.clock[0]
+    _act_on_parts(hooks.mode, parts, what, task, call)
+    clock = call.control.clock[0]
     for k in range(parts):
         own = hooks.apart.clock[k, 0]
         clock.set_low = min(clock.set_low, own.set_low)
@@ -205,12 +210,13 @@ def directions(hooks):
 
 
 @noinline
-def evaluate(hooks, h, component, count, control, result, shift):
+def evaluate(call, component, count, result, shift):
     """Evaluate the formula of a component for the chosen members, at the present time plus `shift`.
 
     The results go to the row `result` of the scratch. A formula without code is a number.
     """
-    program = hooks.programs[h, component]
+    hooks, control = call.hooks, call.control
+    program = hooks.programs[call.h, component]
     if program.begin == program.end:
         number = hooks.constants[program.first]
         for q in range(count):
@@ -226,13 +232,14 @@ def evaluate(hooks, h, component, count, control, result, shift):
 
 
 @noinline
-def _evaluate_now_and_before(hooks, h, c, count, control):
+def _evaluate_now_and_before(call, c, count):
     """Evaluate the formula of direction `c`, and one step earlier if it is used."""
-    evaluate(hooks, h, c, count, control, VALUE, 0.0)
-    if hooks.table[h].uses_before:
+    evaluate(call, c, count, VALUE, 0.0)
+    if call.hooks.table[call.h].uses_before:
         # There is nothing before time 0.
+        control = call.control
         step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
-        evaluate(hooks, h, c, count, control, BEFORE, -step_back)
+        evaluate(call, c, count, BEFORE, -step_back)
 
 
 @noinline
@@ -269,12 +276,12 @@ def publish_total(hooks, h, control):
 # --- nodes ------------------------------------------------------------------------------------
 
 
-def _choose_nodes(what, hooks, h, row, end, member):
+def _choose_nodes(what, call, row, end, member):
     """Choose up to a block of members in use, with mass; return their number and where to continue.
 
     Members ascend like rows: a wall may have more members than are in use.
     """
-    ranges, sums = what.ranges, what.nodes.sums
+    hooks, h, ranges, sums = call.hooks, call.h, what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
     member = max(member, NONE if of_all else hooks.table[h].begin)
@@ -305,21 +312,22 @@ def _node(hooks, h, m):
 
 
 @act.on(HookedNodes)
-def _act_at_nodes(what, task, hooks, control, dt, h, count, share):
+def _act_at_nodes(what, task, call, count):
+    hooks = call.hooks
     if task == COUNT:
         found = 0
         for q in range(count):
-            found += totals.counts(control.ranks, hooks.chosen[q])
+            found += totals.counts(call.control.ranks, hooks.chosen[q])
         return found
     if what.target == LOADS:
-        _work_at_nodes(what, hooks, control, dt, count)
+        _work_at_nodes(what, call, count)
         return 0
-    if hooks.table[h].uses_place:
+    if hooks.table[call.h].uses_place:
         locate_nodes(what.grids, hooks, count)
     if task == RUB:
-        _rub_at_nodes(what, hooks, control, dt, h, count)
+        _rub_at_nodes(what, call, count)
     else:
-        _change_nodes(what, hooks, control, dt, h, count, share)
+        _change_nodes(what, call, count)
     return 0
 
 
@@ -350,9 +358,9 @@ def _clear_held(what, held):
 
 
 @noinline
-def _take_over(hooks, control, h, n, c, force):
-    """Let hook `h` hold node `n` by `force`; return the force of the previous hooks on it."""
-    before = 0.0
+def _take_over(call, n, c, force):
+    """Let a hook hold node `n` by `force`; return the force of the previous hooks on it."""
+    hooks, control, h, before = call.hooks, call.control, call.h, 0.0
     if hooks.held.size > 0 and hooks.table[h].holds:
         held = hooks.held[n, c]
         if held.slot > 0:
@@ -377,72 +385,22 @@ def _is_taken(rigid, n):
 
 
 @noinline
-def _change_nodes(what, hooks, control, dt, h, count, share):
+def _change_nodes(what, call, count):
     """Act on the chosen nodes; add to the totals, and to the work."""
-    target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
-    slot = hooks.table[h].slot
-    stage = hooks.table[h].stage
-    remaps = target == arrays.ON_VELOCITY and stage == arrays.POST_VELOCITIES_TO_GRID
-    # Strain before the forces belongs to the last step, and to the hooks that held then.
-    strains_first = target == arrays.ON_VELOCITY and stage == arrays.POST_UPDATE_GRID_STATE
-    strains_first = strains_first and hooks.table[h].holds > 0
-    given = BEFORE if strains_first and hooks.table[h].uses_before else VALUE
-    # Contact may take the velocity of a free node, and a rigid body the velocity of any node.
-    late = stage == arrays.POST_UPDATE_GRID_STATE
-    yields, rigid = late and hooks.table[h].holds == 0, field(nodes.fields, RigidSums)
+    hooks, control, slot = call.hooks, call.control, call.hooks.table[call.h].slot
     for c in range(directions(hooks)):
-        if hooks.programs[h, c].begin < 0:
+        if hooks.programs[call.h, c].begin < 0:
             continue
-        _evaluate_now_and_before(hooks, h, c, count, control)
+        _evaluate_now_and_before(call, c, count)
         for q in range(count):
-            n = hooks.chosen[q]
-            work = before = 0.0
-            mass = nodes.sums[n, arrays.MASS]
-            if target == arrays.ON_SUMS:
-                v = nodes.sums[n, arrays.of_momentum(kin) + c] / mass
-                star = v
-            elif target == arrays.ON_UPDATE:
-                star = nodes.update[n, c]
-                v = star - nodes.update[n, arrays.of_change(kin) + c]
+            if what.target == arrays.ON_SUMS:
+                total, work, before = _change_force(what, call, c, q), 0.0, 0.0
+            elif what.target == arrays.ON_UPDATE:
+                total, work, before = _change_update(what, call, c, q)
             else:
-                v = nodes.velocity[n, c]
-                star = v
-                last = nodes.update[n, c]  # before the forces, from the step before
-                if remaps or (strains_first and last == hooks.scratch[given, q]):
-                    star = last
-            old, old_star = v, star
-            old_force = nodes.sums[n, arrays.of_force(kin) + c]
-            v, star, force, total = _call_node_function(
-                hooks.table[h].address, mass, v, star, old_force,
-                hooks.scratch[given, q], hooks.scratch[BEFORE, q], dt, share,
-            )  # fmt: skip
-            if target == arrays.ON_UPDATE:
-                # Points that retain velocity take the change v* - v: another v is an impulse.
-                total += kept * mass * (old - v) / dt
-                if star == hooks.scratch[VALUE, q]:
-                    before = _take_over(hooks, control, h, n, c, total)
-            if target == arrays.ON_SUMS:
-                hooks.loads[n, c] += force - old_force  # see _work_at_nodes
-                nodes.sums[n, arrays.of_force(kin) + c] = force
-            elif target == arrays.ON_UPDATE:
-                # Impulse times the mean of the velocities before and after it; or of the holding
-                # hook, as a node stopped by a bound has not moved with the wall before.
-                moved = v + star
-                if hooks.table[h].uses_before and star == hooks.scratch[VALUE, q]:
-                    moved = hooks.scratch[BEFORE, q] + star
-                impulse = mass * (star - old_star + kept * (old - v))
-                if yields or (late and _is_taken(rigid, n)):
-                    hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
-                elif not _moves_as_told(hooks, n):
-                    work = 0.5 * impulse * moved
-                clock = control.clock[0]
-                clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
-                nodes.update[n, c] = star
-                nodes.update[n, arrays.of_change(kin) + c] = star - v
-            else:
-                nodes.velocity[n, c] = star if strains_first else v
+                total, work, before = _change_velocity(what, call, c, q), 0.0, 0.0
             # Formulas have been used: their rows hold the terms to be summed.
-            own = totals.counts(control.ranks, n)
+            own = totals.counts(control.ranks, hooks.chosen[q])
             hooks.scratch[VALUE, q] = total if own else 0.0
             hooks.scratch[BEFORE, q] = work if own else 0.0
             if own and before != 0:
@@ -452,33 +410,99 @@ def _change_nodes(what, hooks, control, dt, h, count, share):
             totals.add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
 
 
+def _called(call, state, force, values):
+    """Call the function of a node: mass, v and v*, force, and values of formulas."""
+    hook = call.hooks.table[call.h]
+    return _call_node_function(hook.address, *state, force, *values, call.dt, call.share)
+
+
 @noinline
-def _rub_at_nodes(what, hooks, control, dt, h, count):
+def _change_force(what, call, c, q):
+    """Change the force on a node; return the total. Its work is found later (`_work_at_nodes`)."""
+    kin, sums, hooks, n = what.kin, what.nodes.sums, call.hooks, call.hooks.chosen[q]
+    mass, values = sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
+    v, old = sums[n, arrays.of_momentum(kin) + c] / mass, sums[n, arrays.of_force(kin) + c]
+    _, _, force, total = _called(call, (mass, v, v), old, values)
+    hooks.loads[n, c] += force - old
+    sums[n, arrays.of_force(kin) + c] = force
+    return total
+
+
+@noinline
+def _change_update(what, call, c, q):
+    """Change v* of a node; return the total, the work, and the force of hooks that held it before.
+
+    Work is impulse times the mean of the velocities before and after it; or of the holding hook, as
+    a node stopped by a bound has not moved with the wall before.
+    """
+    kin, nodes, hooks, n = what.kin, what.nodes, call.hooks, call.hooks.chosen[q]
+    hook, dt, kept, work, before = hooks.table[call.h], call.dt, what.kept, 0.0, 0.0
+    mass, values = nodes.sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
+    old_star, change = nodes.update[n, c], arrays.of_change(kin) + c
+    old = old_star - nodes.update[n, change]
+    force = nodes.sums[n, arrays.of_force(kin) + c]
+    v, star, _, total = _called(call, (mass, old, old_star), force, values)
+    # Points that retain velocity take the change v* - v: another v is an impulse.
+    total += kept * mass * (old - v) / dt
+    holds = star == values[0]
+    if holds:
+        before = _take_over(call, n, c, total)
+    moved = values[1] + star if hook.uses_before and holds else v + star
+    impulse = mass * (star - old_star + kept * (old - v))
+    # Contact may take the velocity of a free node, and a rigid body the velocity of any node.
+    late, rigid = hook.stage == arrays.POST_UPDATE_GRID_STATE, field(nodes.fields, RigidSums)
+    if late and (hook.holds == 0 or _is_taken(rigid, n)):
+        hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
+    elif not _moves_as_told(hooks, n):
+        work = 0.5 * impulse * moved
+    clock = call.control.clock[0]
+    clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
+    nodes.update[n, c] = star
+    nodes.update[n, change] = star - v
+    return total, work, before
+
+
+@noinline
+def _change_velocity(what, call, c, q):
+    """Change the velocity of a node that deforms the points; return the total."""
+    kin, nodes, hooks, n = what.kin, what.nodes, call.hooks, call.hooks.chosen[q]
+    hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
+    # Strain before the forces belongs to the last step, and to the hooks that held then.
+    strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
+    value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
+    # v* before the forces is that of the step before.
+    remaps = hook.stage == arrays.POST_VELOCITIES_TO_GRID
+    star = last if remaps or (strains_first and last == value) else v
+    state, force = (nodes.sums[n, arrays.MASS], v, star), nodes.sums[n, arrays.of_force(kin) + c]
+    v, star, _, total = _called(call, state, force, (value, hooks.scratch[BEFORE, q]))
+    nodes.velocity[n, c] = star if strains_first else v
+    return total
+
+
+@noinline
+def _rub_at_nodes(what, call, count):
     """Apply friction to the chosen nodes along their wall."""
-    target, kin, nodes, kept = what.target, what.kin, what.nodes, what.kept
-    programs = hooks.programs[h]
-    if target == arrays.ON_VELOCITY:
+    hooks = call.hooks
+    if what.target == arrays.ON_VELOCITY:
         # Otherwise v* belongs to the step before.
-        if hooks.table[h].stage == arrays.POST_VELOCITIES_TO_GRID:
+        if hooks.table[call.h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
-                stick(kin, nodes, programs, hooks.chosen[q])
+                stick(what.kin, what.nodes, hooks.programs[call.h], hooks.chosen[q])
         return
-    evaluate(hooks, h, FRICTION, count, control, VALUE, 0.0)
-    slot = hooks.table[h].slot
+    evaluate(call, FRICTION, count, VALUE, 0.0)
     for q in range(count):
-        n, mu = hooks.chosen[q], hooks.scratch[VALUE, q]
-        rub(kin, nodes, programs, hooks, n, mu, dt, kept, control, slot)
+        rub(what, call, hooks.chosen[q], hooks.scratch[VALUE, q])
 
 
 @noinline
-def _work_at_nodes(what, hooks, control, dt, count):
+def _work_at_nodes(what, call, count):
     """Sum the work of loads on the chosen nodes, and clear them; v* is the points' velocity.
 
     Force times the mean of the velocities before and after the step: the effect of stress,
     constraints and contact in the same step counts, or the work would be of first order.
     """
     update, change = what.nodes.update, arrays.of_change(what.kin)
-    terms = hooks.scratch[VALUE]
+    hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[VALUE]
     for c in range(what.kin.dimension):
         for q in range(count):
             n = hooks.chosen[q]
@@ -491,13 +515,14 @@ def _work_at_nodes(what, hooks, control, dt, count):
 
 
 @act.on(WholeNodes)
-def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
+def _act_on_whole_nodes(what, task, call, count):
     tag, nodes, kin = what.tag, what.nodes, what.kin
+    hooks, control, dt, h = call.hooks, call.control, call.dt, call.h
     if hooks.table[h].uses_place:
         locate_nodes(what.grids, hooks, count)
     rows, first = (VALUE, BEFORE, THIRD), arrays.of_force(kin)
     for c in range(len(tag.values)):
-        evaluate(hooks, h, c, count, control, rows[c], 0.0)
+        evaluate(call, c, count, rows[c], 0.0)
     for q in range(count):
         n = hooks.chosen[q]
         values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
@@ -517,15 +542,9 @@ def _act_on_whole_nodes(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
-class _NoWhole(NamedTuple):
-    """Takes the place of the functions of whole points in loops without them."""
-
-    whole: tuple
-
-
 def without_whole(hooks):
     """Omit functions of whole points: otherwise loops are compiled again for each of them."""
-    return arrays.with_items_of(hooks, _NoWhole(()))
+    return arrays.with_items(hooks, whole=())
 
 
 def known_to_hooks(nodes):
@@ -533,35 +552,41 @@ def known_to_hooks(nodes):
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
-def node_hooks(stage, target, kin, grids, nodes, ranges, hooks, control, dt, kept):
-    """Call the node functions of `stage` on the members that have mass.
+def hooked_nodes(s, target, kept):
+    """Return the nodes that node functions change, with the fields that the loop uses.
 
     `kept` is the fraction of its velocity that a point retains, and changes by nodal increments.
+    """
+    nodes = s.nodes
+    known = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
+    return HookedNodes(target, planar(s.kin), s.grids, known, s.ranges, kept)
+
+
+def whole_nodes(s, tag, stage, target):
+    """Return the nodes that a function of whole nodes changes."""
+    early = stage == arrays.POST_PARTICLES_TO_GRID
+    return WholeNodes(target, planar(s.kin), s.grids, s.nodes, s.ranges, 0.0, tag, early)
+
+
+def node_hooks(stage, what, hooks, s, dt):
+    """Call the node functions of `stage` on the members that have mass; `what`: `hooked_nodes`.
+
     For `LOADS` the work is summed: here, so that the loop over the nodes is compiled once.
     """
-    fields = known_to_hooks(nodes)
-    early, flat = stage == arrays.POST_PARTICLES_TO_GRID, planar(kin)
-    whole = tuple(
-        [
-            WholeNodes(tag, flat, grids, nodes, ranges, early, target)
-            for tag in hooks.whole
-            if tag.of_nodes
-        ]
-    )
-    nodes = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
-    kin, dt, hooks = planar(kin), float(dt), without_whole(hooks)
-    _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control, dt, kept)
+    own = [tag for tag in hooks.whole if tag.of_nodes]
+    whole = tuple([whole_nodes(s, tag, stage, what.target) for tag in own])
+    _node_hooks(stage, what, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))
 
 
 @kernel
-def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control, dt, kept):
-    what = hold(HookedNodes(target, kin, grids, nodes, ranges, kept))
-    if target == LOADS:
+def _node_hooks(stage, what, whole, call):
+    what, hooks, control, dt = hold(what), call.hooks, call.control, call.dt
+    if what.target == LOADS:
         if hooks.loads.size > 0:
-            _act_on_all(what, ACT, hooks, control, dt, NONE, 1.0)
+            _act_on_all(what, ACT, call)
             totals.carry(control.totals[totals.WORK])
         return
-    if target == arrays.ON_UPDATE:
+    if what.target == arrays.ON_UPDATE:
         _clear_held(what, hooks.held)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
@@ -569,15 +594,16 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control,
         _clear_total(hooks, h, control)
         share = 1.0
         if hooks.table[h].uses_share:
-            heavy = _act_on_part(what, COUNT, hooks, control, dt, h, share, NONE, NONE + 1)
+            heavy = _act_on_part(what, COUNT, Call(hooks, control, dt, h, share), NONE, NONE + 1)
             share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
+        own = Call(hooks, control, dt, h, share)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
                 # Before the forces (usf) v* belongs to the step before.
-                if one.tag.row == h and target != arrays.ON_VELOCITY:
-                    _act_on_all(one, ACT, hooks, control, dt, h, share)
+                if one.tag.row == h and what.target != arrays.ON_VELOCITY:
+                    _act_on_all(one, ACT, own)
         else:
-            _act_on_all(what, ACT, hooks, control, dt, h, share)
+            _act_on_all(what, ACT, own)
         publish_total(hooks, h, control)
     # Friction at walls follows when it is known which of them hold a node.
     for h in range(len(hooks.table)):
@@ -585,7 +611,7 @@ def _node_hooks(stage, target, kin, grids, nodes, ranges, whole, hooks, control,
             continue
         rubs = hooks.programs[h, FRICTION].begin >= 0
         if rubs:
-            _act_on_all(what, RUB, hooks, control, dt, h, 1.0)
+            _act_on_all(what, RUB, Call(hooks, control, dt, h, 1.0))
         if rubs or (hooks.table[h].holds and hooks.held.size > 0):
             publish_total(hooks, h, control)
 
@@ -598,9 +624,7 @@ def at_nodes(hooks, stage, target, s):
 @at_nodes.on(arrays.Hooks)
 def _at_nodes_hooks(hooks, stage, target, s):
     clock = s.control.clock[0]
-    node_hooks(
-        stage, target, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), clock.kept
-    )
+    node_hooks(stage, hooked_nodes(s, target, clock.kept), hooks, s, kick(s))
     clock.set_low = clock.set_high = 0.0  # of temperatures only
 
 
@@ -611,14 +635,15 @@ def add_work(hooks, s):
 
 @add_work.on(arrays.Hooks)
 def _add_work_hooks(hooks, s):
-    node_hooks(NONE, LOADS, s.kin, s.grids, s.nodes, s.ranges, hooks, s.control, kick(s), 0.0)
+    node_hooks(NONE, hooked_nodes(s, LOADS, 0.0), hooks, s, kick(s))
 
 
 # --- points -----------------------------------------------------------------------------------
 
 
-def choose_points(what, hooks, h, p, end):
+def choose_points(what, call, p, end):
     """Choose up to a block of members; return their number, where to continue. Store places."""
+    hooks, h = call.hooks, call.h
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
@@ -635,13 +660,13 @@ def choose_points(what, hooks, h, p, end):
 
 
 @act.on(MovingPoints)
-def _act_on_motion(what, task, hooks, control, dt, h, count, share):
-    v, y = what.v, what.y
+def _act_on_motion(what, task, call, count):
+    v, y, hooks, control, h = what.v, what.y, call.hooks, call.control, call.h
     d = directions(hooks)
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
             continue
-        _evaluate_now_and_before(hooks, h, c, count, control)
+        _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
         # Forces act while a hook leads a point from its initial velocity in the step.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
@@ -650,7 +675,7 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
             p = hooks.chosen[q]
             velocity, place, total = _call_point_function(
                 hooks.table[h].address, what.mass[p], v[c, p], what.x[c, p], y[c, p],
-                hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], dt, control.clock[0].kick,
+                hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], call.dt, control.clock[0].kick,
             )  # fmt: skip
             speed = float(v[c, p])
             first = hooks.scratch[BEFORE, q] if leads else speed
@@ -667,10 +692,11 @@ def _act_on_motion(what, task, hooks, control, dt, h, count, share):
 
 
 @act.on(HeatedPoints)
-def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
-    evaluate(hooks, h, 0, count, control, VALUE, 0.0)
+def _act_on_warmth(what, task, call, count):
+    hooks, control, h = call.hooks, call.control, call.h
+    evaluate(call, 0, count, VALUE, 0.0)
     if hooks.programs[h, 1].begin >= 0:
-        evaluate(hooks, h, 1, count, control, BEFORE, 0.0)
+        evaluate(call, 1, count, BEFORE, 0.0)
     slot = hooks.table[h].slot
     clock = control.clock[0]
     for q in range(count):
@@ -679,7 +705,7 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
         share, supply, T = _call_heat_function(
             hooks.table[h].address, what.capacity[0, p], what.temperature[0, p],
             face(what.kin, what.volume[0, p], load_vector(what.kin, what.x, p)),
-            before, hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], dt,
+            before, hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], call.dt,
         )  # fmt: skip
         what.share[0, p] = min(what.share[0, p], share)
         what.supply[0, p] = supply
@@ -698,27 +724,28 @@ def _act_on_warmth(what, task, hooks, control, dt, h, count, share):
     return 0
 
 
-def _of_time(tag, kin, hooks, control, dt, h):
+def _of_time(tag, kin, call):
     """Return formulas of time now and at the end of the step, 0 without; and contact times."""
     found = []
-    for shift in (0.0, dt):
+    for shift in (0.0, call.dt):
         for c in range(kin.dimension):
             if c < len(tag.values):
-                evaluate(hooks, h, c, 1, control, VALUE, shift)
-                found.append(hooks.scratch[VALUE, 0])
+                evaluate(call, c, 1, VALUE, shift)
+                found.append(call.hooks.scratch[VALUE, 0])
             else:
                 found.append(0.0)
-    clock = control.clock[0]
+    clock = call.control.clock[0]
     return (*found, clock.contact_dt, clock.contact_kick, clock.kick)
 
 
 @act.on(WholePoints)
-def _act_on_whole_points(what, task, hooks, control, dt, h, count, share):
+def _act_on_whole_points(what, task, call, count):
     tag, points, kin = what.tag, what.points, what.kin
+    hooks, control, dt, h = call.hooks, call.control, call.dt, call.h
     rows = (VALUE, BEFORE, THIRD)
-    led = _of_time(tag, kin, hooks, control, dt, h) if tag.of_time else ()
+    led = _of_time(tag, kin, call) if tag.of_time else ()
     for c in range(0 if tag.of_time else len(tag.values)):
-        evaluate(hooks, h, c, count, control, rows[c], 0.0)
+        evaluate(call, c, count, rows[c], 0.0)
     for q in range(count):
         p = hooks.chosen[q]
         law, state = state_at(kin, points, what.laws, p)
@@ -744,17 +771,18 @@ def _act_on_whole_points(what, task, hooks, control, dt, h, count, share):
 
 
 @kernel
-def _point_hooks(stage, what, whole, hooks, control, dt):
-    dt = float(dt)
+def _point_hooks(stage, what, whole, call):
+    hooks, control, dt = call.hooks, call.control, float(call.dt)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
+        own = Call(hooks, control, dt, h, 1.0)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
                 if one.tag.row == h:
-                    _act_on_all(one, ACT, hooks, control, dt, h, 1.0)
+                    _act_on_all(one, ACT, own)
         else:
-            _act_on_all(what, ACT, hooks, control, dt, h, 1.0)
+            _act_on_all(what, ACT, own)
 
 
 @kernel
@@ -767,19 +795,20 @@ def _begin_or_end_totals(stage, hooks, control, begin):
                 publish_total(hooks, h, control)
 
 
-def point_hooks(stage, then, hooks, s, what_of, heat_of):
+def point_hooks(stage, then, hooks, s, arguments_of):
     """Call the point functions of `stage` on the members in each block; sum over them.
 
-    ``what_of(s, block, then)`` gives the argument of functions of one component, and
-    ``heat_of(points)`` the heat arguments of functions of whole points.
+    `arguments_of` are two functions: ``what_of(s, block, then)`` gives the argument of functions of
+    one component, ``heat_of(points)`` the heat arguments of functions of whole points.
     """
-    control, dt, without = s.control, step_size(s), without_whole(hooks)
+    control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
+    call = Call(without, control, step_size(s), NONE, 1.0)
     of_points = [tag for tag in hooks.whole if not tag.of_nodes]
     _begin_or_end_totals(stage, without, control, True)
     for block in s.blocks:
         heat = heat_of(block.points)
         whole = tuple([whole_points(tag, s, block, then, heat) for tag in of_points])
-        _point_hooks(stage, what_of(s, block, then), whole, without, control, dt)
+        _point_hooks(stage, what_of(s, block, then), whole, call)
     _begin_or_end_totals(stage, without, control, False)
 
 
@@ -826,4 +855,4 @@ def _at_points_hooks(hooks, stage, then, s):
     if stage == arrays.INITIAL_INTEGRATE and len(hooks.whole):
         for block in s.blocks:
             clear_forces(s.kin, field(block.points.fields, Force), block.points.mass.size)
-    point_hooks(stage, then, hooks, s, moving_points, lambda points: ())
+    point_hooks(stage, then, hooks, s, (moving_points, lambda points: ()))

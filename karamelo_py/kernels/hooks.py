@@ -36,7 +36,7 @@ from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field, load_vector, store, vector
 from karamelo_py.compiler.tuples import flat, put_at
 from karamelo_py.kernels import arrays
-from karamelo_py.kernels.visit import volume_of
+from karamelo_py.kernels.views import volume_of
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)

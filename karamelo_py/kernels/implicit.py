@@ -23,7 +23,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.sweep import places_of
-from karamelo_py.kernels.visit import deformation_of, place_at, state_at
+from karamelo_py.kernels.views import deformation_of, place_at, state_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.kinematics import (
@@ -124,7 +124,7 @@ def see(frame, kin, basis, grids, points, laws, now, seen, part):
         seen.count[p] = count
         if not frame.moves:
             law, state = state_at(kin, points, laws, p)
-            back = inv(deformation_of(frame, kin, law, state, points, p)).at()
+            back = inv(deformation_of(frame, kin, points, (law, state), p)).at()
             for k in range(support(basis, kin)):
                 g = [seen.gradients[p, k, j] for j in range(len(kin.Gradient._fields))]
                 for j in range(len(g)):

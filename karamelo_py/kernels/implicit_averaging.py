@@ -29,7 +29,7 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of, strained_point
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.visit import state_at
+from karamelo_py.kernels.views import state_at
 from karamelo_py.points.frames import Updated, scaled_increment
 from karamelo_py.points.kinematics import I, det, inv, tensor, vector, zero
 from karamelo_py.points.laws import advance, jacobian, kirchhoff_stress, specific_volume

@@ -11,7 +11,7 @@ from karamelo_py.compiler.choices import classes_in
 from karamelo_py.compiler.compile import implements, index
 from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
 from karamelo_py.kernels.arrays import Index, Number, Tag
-from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.equations.strain import Strain
 
 
 class OneByOne(NamedTuple):

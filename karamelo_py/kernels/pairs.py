@@ -13,7 +13,7 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.held import at_hand
 from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.kernels.arrays import vector_at
-from karamelo_py.kernels.visit import state_at, volume_of
+from karamelo_py.kernels.views import state_at, volume_of
 from karamelo_py.points.bodies import NEW, MinimizePenetration, along, force_between, radius, rub
 from karamelo_py.points.kinematics import zero_vector
 

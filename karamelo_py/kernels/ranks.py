@@ -11,7 +11,7 @@ from numba import types
 
 from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.p2g import arrays_given
+from karamelo_py.kernels.sums import arrays_given
 from karamelo_py.kernels.sweep import sweep_blocks, visit_shares
 
 CALL = types.int64(types.int64, types.int64, types.int64)

@@ -14,10 +14,10 @@ from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick
-from karamelo_py.kernels.p2g import RigidSums
+from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.kernels.table import Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.views import place_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.laws.rigid import Rigid

@@ -10,7 +10,7 @@ from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import by_team, by_threads, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number
-from karamelo_py.kernels.visit import place_at
+from karamelo_py.kernels.views import place_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import Grid, cells_along, in_cells
 

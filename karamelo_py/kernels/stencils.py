@@ -6,83 +6,23 @@ All at once go sums along the arms of a stencil, what is affine, and the corners
 from karamelo_py.compiler.compile import all_lanes, point_function, prefetch_records, real
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.lanes.records import accumulate_affine
-from karamelo_py.kernels import g2p, p2g
-from karamelo_py.kernels.arrays import MASS, Tag, of_force
-from karamelo_py.kernels.g2p import Move, empty_all, gathered_all, update_at
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.arrays import Tag, of_force
+from karamelo_py.kernels.equations.loss import EnergyLoss
+from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.lanes import OneByOne
-from karamelo_py.kernels.loss import EnergyLoss
-from karamelo_py.kernels.p2g import scattered_all
-from karamelo_py.kernels.visit import NodalStress, Work, all_records_of, for_tags, nodes_of
+from karamelo_py.kernels.views import PointView, Work, node_of
 from karamelo_py.points import transfers
 from karamelo_py.points.basis import carried, entry, product, reach, support
 from karamelo_py.points.basis.cpdi import AtCorners, CornerStencil
 from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block, is_whole, of_one
 from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
-from karamelo_py.points.kinematics import from_columns, zero_vector
+from karamelo_py.points.kinematics import from_columns
 
-# --- what is affine around a point: mass, momentum, force of MLS ------------------------------
+# --- sums that are affine around a point: mass, momentum, force of MLS ------------------------
 #
-# In lanes such a quantity is brought into the order of the nodes' records once per point, not once
-# per node: half of the work of a scatter, in 3D two thirds.
-
-
-@point_function(otherwise=True)
-def affine_part(quantity, w, stencil, load):
-    """Return (array, first component, value at the first node, growth per node) of a quantity.
-
-    One growth for each direction, or none where all nodes see the same. () for what is not affine.
-    """
-    return ()
-
-
-def _affine(w, stencil, value, growths):
-    """Return the value at the first node and growth per node: of one at the point, per length."""
-    arm = reach(w.basis, w.kin, w.grid, stencil, 0)
-    for growth, way in zip(growths, arm, strict=True):
-        value = value + way * growth
-    step = w.grid.h * spacing(w.basis)
-    return value, tuple([step * growth for growth in growths])
-
-
-def _momentum(w, stencil, mass, v, moment):
-    """Return the momentum at the first node, and its growth; () if unknown."""
-    momentum = mass * v
-    if not len(moment):
-        return () if transfers.nodal_momentum.defined(type(w.transfer)) else (momentum, ())
-    c = transfers.affine_velocity(w.transfer, moment, inverse_spread(w.basis, w.grid))
-    if not len(c):
-        return ()
-    return _affine(w, stencil, momentum, (mass * c).columns())
-
-
-@affine_part.on(p2g.MassMomentum)
-def _affine_part_mass_momentum(quantity, w, stencil, load):
-    mass, v, moment, _, _ = load
-    given = _momentum(w, stencil, mass, v, moment)
-    others = EnergyLoss, p2g.RigidSums, p2g.Centre, p2g.Normal, p2g.SquaredMass
-    if not len(given) or any(field(w.nodes.fields, kind) is not None for kind in others):
-        return ()
-    momentum, growths = given
-    return w.nodes.sums, MASS, (mass, *momentum), tuple([(mass - mass, *g) for g in growths])
-
-
-@affine_part.on(p2g.MomentumAgain)
-def _affine_part_momentum_again(quantity, w, stencil, load):
-    given = _momentum(w, stencil, *load)
-    return (w.nodes.velocity, 0, *given) if len(given) else ()
-
-
-@affine_part.on(p2g.InternalForce)
-def _affine_part_internal_force(quantity, w, stencil, load):
-    inverse_d = inverse_spread(w.basis, w.grid)
-    if not (len(inverse_d) and transfers.forces_by_arms(w.transfer, w.kin)):
-        return ()
-    if field(w.nodes.fields, NodalStress) is not None:
-        return ()
-    stress, outer, _ = load
-    own = outer if len(outer) else zero_vector(w.kin, stress[0])
-    growths = [inverse_d[0] * column for column in stress.columns()]
-    return w.nodes.sums, of_force(w.kin), *_affine(w, stencil, own, tuple(growths))
+# In lanes they are brought into the order of the nodes' records once per point, not once per node:
+# half of the work of a scatter in 2D, two thirds in 3D.
 
 
 def _beside(a, b):
@@ -105,7 +45,8 @@ def joined(lanes, kin, parts):
 
 def give_affine(lanes, w, stencil, parts):
     """Give the nodes of a stencil what is affine."""
-    nodes, weights, _ = zip(*nodes_of(w, stencil), strict=True)
+    seen = PointView(w, stencil, (), ()).nodes
+    nodes, weights = tuple([node.i for node in seen]), tuple([node.N for node in seen])
     for array, first, value, growths in joined(lanes, w.kin, parts):
         value, growths = (*value,), tuple([(*growth,) for growth in growths])
         accumulate_affine(array, nodes, first, weights, value, growths)
@@ -127,7 +68,7 @@ def _gathered_at_once_move(task, w, stencil, total):
     factor = gathered_by_arms(w)
     if not len(factor):
         return ()
-    found = [update_at(w.kin, w.nodes, i, total[0]) for i, _, _ in nodes_of(w, stencil)]
+    found = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
     # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
     # planes, as the weights are products.
     sums = tuple([(v,) for v, _ in found])
@@ -160,8 +101,10 @@ def _with_moment(weights, row):
     return total, sum(tails[1:], tails[0]), *[_tails(weights, other)[-1] for other in others]
 
 
-gathered_at_once_all = for_tags(gathered_at_once, "w, stencil, totals", each="totals")
-affine_parts = for_tags(affine_part, "w, stencil, loads", each="loads")
+def affine_parts(quantities, w, stencil, loads):
+    """Return the affine parts of all quantities."""
+    pairs = zip(quantities, loads, strict=True)
+    return tuple([eq.affine_part(quantity, w, stencil, load) for quantity, load in pairs])
 
 
 # --- corners of domains, used as nodes -------------------------------------------------------
@@ -183,7 +126,7 @@ def all_by_corners(parts, w):
         "loss": field(w.nodes.fields, EnergyLoss) is not None,
         "anything": True,
     }
-    unless = [getattr(type(part), "not_at_corners", ("anything",)) for part in parts]
+    unless = [type(part).not_at_corners for part in parts]
     return not any(there[name] for names in unless for name in names)
 
 
@@ -200,14 +143,14 @@ def in_block(w):
 
 def shows_corners(tasks, w):
     """Return True if the visit needs the velocities of the corners themselves."""
-    return carried(w.basis, w.kin) > 0 and any(isinstance(task, g2p.Move) for task in tasks)
+    return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
 
 
 def gather_corners(tasks, w, stencil, totals):
     """Add up the totals of the tasks over all corners."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
-        totals = g2p.gathered_all(tasks, at, stencil, c, totals)
+        totals = eq.gathered_all(tasks, at, stencil, c, totals)
     return totals
 
 
@@ -215,18 +158,18 @@ def scatter_corners(quantities, w, stencil, loads):
     """Give all corners their parts."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
-        p2g.scattered_all(quantities, at, stencil, c, loads)
+        eq.scattered_all(quantities, loads, node_of(at, stencil, c))
 
 
 def _gather(tasks, w, stencil, totals):
     for k in range(support(w.basis, w.kin)):
-        totals = gathered_all(tasks, w, stencil, k, totals)
+        totals = eq.gathered_all(tasks, w, stencil, k, totals)
     return totals
 
 
 def _scatter(quantities, w, stencil, loads):
     for k in range(support(w.basis, w.kin)):
-        scattered_all(quantities, w, stencil, k, loads)
+        eq.scattered_all(quantities, loads, node_of(w, stencil, k))
 
 
 def _even(w, stencil, asked):
@@ -270,14 +213,15 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
 def _ask_ahead(tags, w, stencil):
     """Prefetch node records after the last of a stencil; the others were used before."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
-    for array in all_records_of(tags, w.nodes):
-        if array is not None:
-            prefetch_records(array, last)
+    for array in [type(tag).records for tag in tags]:
+        if array:
+            prefetch_records(getattr(w.nodes, array), last)
 
 
 def _gather_parts(tasks, w, stencil, totals):
     """Gather affine parts from all nodes at once, the rest node by node."""
-    found = gathered_at_once_all(tasks, w, stencil, totals)
+    pairs = zip(tasks, totals, strict=True)
+    found = [gathered_at_once(task, w, stencil, total) for task, total in pairs]
     rest = [k for k, total in enumerate(found) if not len(total)]
     own = _gather(tuple([tasks[k] for k in rest]), w, stencil, tuple([totals[k] for k in rest]))
     return tuple([own[rest.index(k)] if k in rest else total for k, total in enumerate(found)])
@@ -337,4 +281,4 @@ def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
 
 def gathered_by(lanes: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
     """Gather the totals of the tasks over the nodes of a stencil."""
-    return gather_nodes(stencil, lanes, tasks, w, empty_all(tasks, w, x))
+    return gather_nodes(stencil, lanes, tasks, w, eq.empty_all(tasks, w, x))

@@ -18,7 +18,7 @@ from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.hook_loop import at_nodes, at_points
 from karamelo_py.kernels.sweep import sweep, sweep_nodes
-from karamelo_py.kernels.visit import deformation_of, state_at
+from karamelo_py.kernels.views import deformation_of, state_at
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
 from karamelo_py.points.laws import wave_speed_squared
@@ -188,7 +188,7 @@ def _fastest(frame, kin, points, laws, control):
     common = clocks.common_velocity(kin, clock, clock.rate)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
-        f = deformation_of(frame, kin, law, state, points, p)
+        f = deformation_of(frame, kin, points, (law, state), p)
         shorter = inverse_stretch_squared(frame, kin, f, points.mass[p])
         speed = sqrt(wave_speed_squared(law, kin, state) * shorter)
         v = load_vector(kin, points.v, p) - common

@@ -1,13 +1,5 @@
 """Sweeps: over the points, tile by tile, and over the nodes in use.
 
-A sweep over the points goes from a scene to a point in five steps:
-
-- `sweep` clears the nodes, goes over the points, and sums at the nodes what they gave;
-- `sweep_blocks` goes over the blocks, one for each law, in the order that other processes need;
-- `sweep_points` goes over one block, in the way of its mode: by threads, or measured;
-- `visit_shares` goes over the tiles of one part of a block: the work of one thread;
-- `visit_tile` gathers, updates and scatters the points of one tile.
-
 The points of a tile scatter to a separate buffer: a dense box of the nodes that they may reach.
 Then each tile of nodes sums the boxes that reach it. Threads divide the tiles and need no atomics;
 sums are made in one order, whatever the number of threads.
@@ -35,7 +27,8 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import Block, Index, Nodes, Number, Places, Points, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity
-from karamelo_py.kernels.g2p import empty_all, updated_all
+from karamelo_py.kernels.equations import empty_all, load_all, updated_all
+from karamelo_py.kernels.equations.node_updates import at_node
 from karamelo_py.kernels.lanes import (
     lanes_of_update,
     lanes_with,
@@ -43,11 +36,10 @@ from karamelo_py.kernels.lanes import (
     points_from,
     zero_of,
 )
-from karamelo_py.kernels.nodes import at_node
-from karamelo_py.kernels.p2g import adds, load_all, sum_shares
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
+from karamelo_py.kernels.sums import adds, sum_shares
 from karamelo_py.kernels.totals import take_over
-from karamelo_py.kernels.visit import Work, ask_ahead, place_at
+from karamelo_py.kernels.views import PointView, Work, ask_ahead, place_at
 from karamelo_py.points.basis import locate
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
@@ -138,13 +130,10 @@ def stencil_of(w: Work, p: Index) -> tuple:
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.where, p))
 
 
-def scatter_point(
-    visit: Visit, lanes: Tag, w: Work, out: Work, stencil: tuple, p: Index, dt: Number
-) -> None:
+def scatter_point(visit: Visit, lanes: Tag, pt: PointView, out: Work) -> None:
     """Scatter the quantities of a point, or of points in lanes, to the nodes of `out`."""
-    stencil = recompute_stencil(visit.weights, w, stencil, p)
-    loads = load_all(visit.quantities, w, p, dt)
-    scatter_nodes(stencil, lanes, visit.quantities, out, loads)
+    stencil = recompute_stencil(visit.weights, pt.w, pt.stencil, pt.p)
+    scatter_nodes(stencil, lanes, visit.quantities, out, load_all(visit.quantities, pt))
 
 
 @noinline
@@ -197,7 +186,9 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
                     totals = nested_as(like, found)
                 else:
                     totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
-                moved, rate = updated_all(visit.tasks, w, stencil, p, dt, totals, fastest)
+                moved, rate = updated_all(
+                    visit.tasks, PointView(w, stencil, p, dt), totals, fastest
+                )
             elif s.frame.moves:
                 moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
             good = (moved <= s.stride) & (rate < 1e300)  # so written, NaN counts as wrong too
@@ -207,13 +198,13 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
             furthest = max(furthest, moved)
             fastest = rate
             if not apart and scatters and stays_in_box(visit.weights, s.room, moved):
-                scatter_point(visit, lanes, w, out, stencil, p, dt)
+                scatter_point(visit, lanes, PointView(w, stencil, p, dt), out)
         # From the first point on that has gone wrong, or does not fit, a tile gives nothing more:
         # the run ends, or points are sorted and give all anew.
         if apart and scatters and wrong == 0 and stays_in_box(visit.weights, s.room, furthest):
             for q in range(first, last, lanes.width):
                 p = points_from(lanes, q, last)
-                scatter_point(visit, lanes, w, out, stencil_of(w, p), p, dt)
+                scatter_point(visit, lanes, PointView(w, stencil_of(w, p), p, dt), out)
     tiling.report[t, 0] = largest(furthest)
     tiling.report[t, 1] = largest(fastest)
     tiling.report[t, 2] = wrong

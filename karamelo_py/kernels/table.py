@@ -17,13 +17,16 @@ from karamelo_py.compiler.compile import real
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
-from karamelo_py.kernels import arrays, g2p, nodes, p2g
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.clock import take_reports
+from karamelo_py.kernels.equations import fbar, loss, strain, xpic
+from karamelo_py.kernels.equations import node_updates as nodes
+from karamelo_py.kernels.equations.internal_force import InternalForce
+from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain, Normal
+from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.hook_loop import add_work
-from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
-from karamelo_py.kernels.visit import FBar
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.transfers import stores_moment
 from karamelo_py.points.transfers.xpic import XPIC
@@ -158,12 +161,12 @@ def _tasks(gathers: list[Gather]) -> tuple:
     Strain behind a move knows what that gathered. By the velocity of the last step, points are
     strained where that has led them.
     """
-    strain: type = g2p.Strain
-    if any(isinstance(g.task, g2p.Move) for g in gathers):
-        strain = g2p.StrainInMove
+    own: type = strain.Strain
+    if any(isinstance(g.task, Move) for g in gathers):
+        own = strain.StrainInMove
     elif any(g.of_last_step for g in gathers):
-        strain = g2p.StrainOfLastStep
-    return tuple(strain() if type(g.task) is g2p.Strain else g.task for g in gathers)
+        own = strain.StrainOfLastStep
+    return tuple(own() if type(g.task) is strain.Strain else g.task for g in gathers)
 
 
 def _kinds(tags: Any) -> Any:
@@ -245,7 +248,7 @@ def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
         if isinstance(row, SceneTask):
             yield from plain(row.rows(s), s)
         else:
-            if isinstance(row, Sweep) and isinstance(s.averaging, FBar):
+            if isinstance(row, Sweep) and isinstance(s.averaging, fbar.FBar):
                 yield from average_volumes(row)
             yield row
 
@@ -264,7 +267,7 @@ def _clear_radial(s, n):
         nodes.update[n, 0] = 0
         nodes.update[n, arrays.of_change(kin)] = 0
         nodes.velocity[n, 0] = 0
-        clear_first(field(nodes.fields, p2g.Normal), n)
+        clear_first(field(nodes.fields, Normal), n)
 
 
 def _axis_of(grids, g):
@@ -303,30 +306,30 @@ def sum_series(s: Setup) -> tuple:
         return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     terms = Repeated(lambda s: s.transfer.order - 1, _next_term)
-    return NodeTask(nodes.StartSeries()), terms, *hold_axis(s)
+    return NodeTask(xpic.StartSeries()), terms, *hold_axis(s)
 
 
 def _next_term(k: int) -> tuple:
-    visit = Visit((g2p.SeriesTerm(k),), (p2g.SeriesBack(),), OldWeights())
-    return Sweep(visit, moves=False, reported=None), NodeTask(nodes.ExtendSeries())
+    visit = Visit((xpic.SeriesTerm(k),), (xpic.SeriesBack(),), OldWeights())
+    return Sweep(visit, moves=False, reported=None), NodeTask(xpic.ExtendSeries())
 
 
 def average_volumes(row: Sweep) -> tuple:
     """Average the change of volume of the strain to come at the nodes."""
-    if not (row.gathers and any(isinstance(task, g2p.Strain) for task in row.visit.tasks)):
+    if not (row.gathers and any(isinstance(task, strain.Strain) for task in row.visit.tasks)):
         return ()
-    trial = g2p.TrialStrainOfLastStep() if row.of_last_step else g2p.TrialStrain()
-    visit = Visit((trial,), (p2g.Volumes(),), OldWeights())
+    trial = strain.TrialStrainOfLastStep() if row.of_last_step else strain.TrialStrain()
+    visit = Visit((trial,), (fbar.Volumes(),), OldWeights())
     sweep = Sweep(visit, row.share, row.of_last_step, moves=False, reported=None)
-    return sweep, NodeTask(nodes.TakeMean())
+    return sweep, NodeTask(fbar.TakeMean())
 
 
 def average_stress(s: Setup) -> tuple:
     """Replace the points' mean stress by the averaged one, with F-bar."""
-    if not isinstance(s.averaging, FBar):
+    if not isinstance(s.averaging, fbar.FBar):
         return ()
-    visit = Visit((g2p.SetMeanStress(),), (p2g.AveragedForce(),), OldWeights())
-    return NodeTask(nodes.TakeMeanStress()), Sweep(visit, moves=False, reported=None)
+    visit = Visit((fbar.SetMeanStress(),), (fbar.AveragedForce(),), OldWeights())
+    return NodeTask(fbar.TakeMeanStress()), Sweep(visit, moves=False, reported=None)
 
 
 def at_nodes_with(kind: type, task: Tag) -> Any:
@@ -354,9 +357,9 @@ light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[at
 
 
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
-FRICTION = SceneTask(at_nodes_with(FrictionalHeat, nodes.ClearFrictionalHeat()))
+FRICTION = SceneTask(at_nodes_with(loss.FrictionalHeat, loss.ClearFrictionalHeat()))
 LOSS = SceneTask(
-    at_nodes_with(EnergyLoss, nodes.KeepLoss()),
+    at_nodes_with(loss.EnergyLoss, loss.KeepLoss()),
     "kinetic energy that the nodes lose, as heat to the points",
 )
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
@@ -370,8 +373,8 @@ SERIES = SceneTask(sum_series, "series of XPIC")
 
 BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
-SUMS = Scatter((p2g.MassMomentum(), p2g.InternalForce()))
-MASS_AND_MOMENTUM = Scatter((p2g.MassMomentum(),))
+SUMS = Scatter((MassMomentum(), InternalForce()))
+MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
 # For schemes that strain first: the nodal velocity before the forces.
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
@@ -380,7 +383,7 @@ VELOCITY_BEFORE = (
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_VELOCITY),
     CONTACT_BEFORE,
 )
-FORCE = Scatter((p2g.InternalForce(),), OldWeights())
+FORCE = Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
 ACCELERATE = (
     FRICTION,
@@ -395,14 +398,14 @@ ACCELERATE = (
     WORK_OF_LOADS,
 )
 MOVE = (
-    Gather(g2p.Move()),
+    Gather(Move()),
     AtPoints(arrays.POST_GRID_TO_POINT, 1),
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
 )
 # The velocity of the moved points, at the nodes once more.
 MOMENTUM_AGAIN = (
-    Scatter((p2g.MomentumAgain(),), OldWeights()),
+    Scatter((MomentumAgain(),), OldWeights()),
     NodeTask(nodes.MomentumToVelocity()),
     AXIS,
     AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),

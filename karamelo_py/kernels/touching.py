@@ -14,9 +14,9 @@ from karamelo_py.compiler.fields import field, load_vector, store
 from karamelo_py.compiler.loops import caller_of, noinline
 from karamelo_py.compiler.session import one_at_a_time
 from karamelo_py.kernels import hooks
-from karamelo_py.kernels.p2g import Force
+from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.surfaces import depth, slopes
-from karamelo_py.kernels.visit import volume_of
+from karamelo_py.kernels.views import volume_of
 from karamelo_py.points.bodies import along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 

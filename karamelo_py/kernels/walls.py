@@ -10,7 +10,7 @@ from math import sqrt
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
-from karamelo_py.kernels.loss import FrictionalHeat, warm_node
+from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts
 
 FRICTION = 3  # the program of the coefficient, after the components' programs
@@ -23,12 +23,14 @@ def _is_free(held, programs, n, c):
 
 
 @noinline
-def rub(kin, nodes, programs, hooks, n, mu, dt, kept, control, slot):
-    """Apply the wall friction to node `n`; add the force to the totals from `slot`.
+def rub(what, call, n, mu):
+    """Apply the wall friction of coefficient `mu` to node `n`; add the force to the totals.
 
-    `programs` are the programs of the holding hook, whose change of v* is the normal impulse. If
-    several fixes hold the node, each applies friction for the directions in which it decides.
+    The change of v* by the holding hook is the normal impulse. If several fixes hold the node, each
+    applies friction for the directions in which it decides.
     """
+    kin, nodes, hooks, control, dt = what.kin, what.nodes, call.hooks, call.control, call.dt
+    slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], what.kept
     d, held = kin.dimension, hooks.held
     mass = nodes.sums[n, MASS]
     across = 0.0

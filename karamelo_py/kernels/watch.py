@@ -23,9 +23,9 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws
+from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.p2g import WorkOfForces
-from karamelo_py.kernels.visit import state_at
+from karamelo_py.kernels.views import state_at
 from karamelo_py.points.basis.linear import PER_CELL
 from karamelo_py.points.kinematics import dot, free_from
 from karamelo_py.points.laws import (

@@ -9,9 +9,9 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import MASS, TIME, known_to_laws, of_force, of_momentum
+from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_to_nodes
 from karamelo_py.kernels.hooks import CompiledHook
-from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import AXES, declared_columns, volumes_before
 from karamelo_py.points.laws import can, constrained_velocity

@@ -9,8 +9,8 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.kernels import export
 from karamelo_py.kernels.arrays import TIMESTEP, Block, Points, Setup, known_to_laws, some_of
+from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.p2g import VelocityBefore
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.laws import columns_of

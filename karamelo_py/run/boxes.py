@@ -129,7 +129,7 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """List the arrays that points scatter to, of the kinds in `what` (p2g.arrays_given)."""
+    """List the arrays that points scatter to, of the kinds in `what` (`sums.arrays_given`)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
 

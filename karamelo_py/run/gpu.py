@@ -9,22 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
+from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 from karamelo_py.compiler.gpu import Images, KernelLaunch, numbers_of
-from karamelo_py.kernels import arrays, gpu, table
+from karamelo_py.kernels import arrays, gpu, heat, table
 from karamelo_py.kernels import gpu_fixes as fixes
-from karamelo_py.kernels.clock import take_reports
-from karamelo_py.kernels.heat import (
-    Conducting,
-    at_heat_nodes,
-    at_heated_points,
-    at_its_nodes,
-    heated,
-)
+from karamelo_py.kernels.clock import kick, step_size, take_reports
+from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.hook_loop import ACT, RUB, add_work, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
-from karamelo_py.kernels.p2g import WorkOfForces
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.kernels.walls import FRICTION
@@ -52,10 +46,10 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 def there(s: arrays.Setup) -> arrays.Setup:
     """Leave out of a setup what no card needs: tiles, and the boxes of their nodes."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
-    buffers, heat = s.buffers._replace(nodes=s.nodes), s.heat
-    if isinstance(heat, Conducting):
-        heat = heat._replace(buffers=buffers._replace(nodes=heat.nodes))
-    return s._replace(blocks=blocks, buffers=buffers, heat=heat)
+    buffers, own = s.buffers._replace(nodes=s.nodes), s.heat
+    if isinstance(own, heat.Conducting):
+        own = own._replace(buffers=buffers._replace(nodes=own.nodes))
+    return s._replace(blocks=blocks, buffers=buffers, heat=own)
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
@@ -150,15 +144,19 @@ class StepsOnCard:
 
     def _loads(self, stages: list[gpu.Stage], block: Any) -> np.ndarray:
         """Give room to what the points of a block give."""
-        arguments = self.images.of((self.s, block))
-        counts = (numbers_of(stage.load(), arguments) for stage in stages if stage.scatters)
+        loads = [stage.load for stage in stages if stage.scatters]
+        if INTERPRETED:
+            counts = [len(load(self.s, block, 0)) for load in loads]
+        else:
+            arguments = self.images.of((self.s, block))
+            counts = [numbers_of(load, arguments) for load in loads]
         shape = (max(counts, default=0), block.points.mass.size)
         return self.images.new(shape, self.s.nodes.sums.dtype)
 
     def _stage(self, row: Any) -> gpu.Stage:
         nodes = (row.at(self.s) if row.at else self.s).nodes
         present = ["sums", "velocity", *(type(one) for one in nodes.fields)]
-        stage = gpu.Stage(row, self.s.basis, self.s.kin, present)
+        stage = gpu.Stage(row, self.s, present)
         size = self.s.nodes.sums.itemsize
         words = size // 4 * len(stage.columns) * stage.support
         stage.parts = max(1, -(-words // REGISTERS[size]))
@@ -206,9 +204,9 @@ class StepsOnCard:
                 found.append(self._launch(gpu.take_reports(take_reports), 1, self.s))
             elif row.function is add_work:
                 found += self._work_of_loads()
-            elif row.function is at_heat_nodes:
+            elif row.function is heat.at_heat_nodes:
                 found += self._hooks_on_nodes(*row.arguments, of_heat=True)
-            elif row.function is at_heated_points:
+            elif row.function is heat.at_heated_points:
                 found += self._hooks_on_points(arrays.SUPPLY_HEAT, 0)
             else:
                 raise TypeError(f"no GPU knows what {row.function.__name__} does in a step")
@@ -231,7 +229,7 @@ class StepsOnCard:
 
     def _gathers(self, row: Any) -> Iterator[KernelLaunch]:
         if row.gathers:
-            gather = self._stage(row).gather()
+            gather = self._stage(row).gather
             for block, cells in zip(self.s.blocks, self.cells, strict=True):
                 yield self._of_points(gather, block, cells)
             if row.reported:
@@ -243,12 +241,12 @@ class StepsOnCard:
         if not stage.scatters:
             return
         if not row.gathers:
-            load = stage.load_point()
+            load = stage.load_point
             for block, cells in pairs:
                 yield self._of_points(load, block, cells)
         # Points that stay are listed once, before the first step, where something is done then.
         if stage.lists and (s.frame.moves or ahead is None or not self.begin):
-            count = stage.count()
+            count = stage.count
             for block, cells in pairs:
                 yield self._of_points(count, block, cells)
                 yield from self._lists(block, cells)
@@ -325,34 +323,39 @@ class StepsOnCard:
     def _hooks_on_nodes(
         self, stage: int, target: int, of_heat: bool = False
     ) -> Iterator[KernelLaunch]:
-        hooks, heavy, copies = self.hooks, self.heavy, self.copies
-        s = at_its_nodes(self.s) if of_heat else self.s
+        s = heat.at_its_nodes(self.s) if of_heat else self.s
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         yield from self._clear_again(stage, own)
-        if own and target == arrays.ON_UPDATE and hooks.held.size:
-            yield self._launch(fixes.clear_held, self.nodes, hooks.held)
+        if own and target == arrays.ON_UPDATE and self.hooks.held.size:
+            yield self._launch(fixes.clear_held, self.nodes, self.hooks.held)
+        nodes_of, length = fixes.hooked_nodes(target, of_heat), step_size if of_heat else kick
         for h in own:
-            row, count, called = self._table()[h], self._members(h), self._called(h)
+            row = self._table()[h]
             if row.uses_share:
-                yield self._launch(gpu.clear, 1, heavy, h)
-                yield self._launch(fixes.count_node, count, s.nodes, hooks, h, heavy)
+                yield self._launch(gpu.clear, 1, self.heavy, h)
+                yield self._act(fixes.count_node, h, s)
             if row.address != arrays.WHOLE:
-                act = fixes.on_node(target, ACT, self._values(h), of_heat)
-                yield self._launch(act, count, s, hooks, h, heavy, copies, called=called)
+                yield self._act(fixes.on_node(nodes_of, ACT, self._values(h), length), h, s)
             elif target != arrays.ON_VELOCITY:
-                (tag,) = (one for one in hooks.whole if one.row == h)
-                act = fixes.on_whole_node(target, stage == arrays.POST_PARTICLES_TO_GRID)
-                yield self._launch(act, count, s, hooks, tag, h, copies, called=called)
+                act = fixes.on_node(fixes.whole_nodes(target, stage), ACT)
+                yield self._act(act, h, s, self._whole(h))
             yield from self._publish_at_once(h)
         for h in own:
-            if hooks.programs[h][FRICTION].begin >= 0:
-                rub = fixes.on_node(target, RUB, 0)
-                rest = (s, hooks, h, heavy, copies)
-                yield self._launch(rub, self._members(h), *rest, called=self._called(h))
+            if self.hooks.programs[h][FRICTION].begin >= 0:
+                yield self._act(fixes.on_node(nodes_of, RUB), h, s)
                 yield from self._publish_at_once(h)
 
+    def _whole(self, h: int) -> arrays.Tag:
+        (tag,) = (one for one in self.hooks.whole if one.row == h)
+        return tag
+
+    def _act(self, function: Callable, h: int, s: arrays.Setup, *tag: arrays.Tag) -> KernelLaunch:
+        """Launch a function of the members of a hook on nodes."""
+        about, called = fixes.Act(h, self.heavy, self.copies), self._called(h)
+        return self._launch(function, self._members(h), s, self.hooks, about, *tag, called=called)
+
     def _hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
-        s, hooks, copies = self.s, self.hooks, self.copies
+        s, hooks = self.s, self.hooks
         own = [h for h, row in enumerate(self._table()) if row.stage == stage]
         heats = stage == arrays.SUPPLY_HEAT
         yield from self._clear_again(stage, own)
@@ -360,20 +363,20 @@ class StepsOnCard:
             if stage == arrays.INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
                 yield self._of_points(fixes.clear_force, block)
             for h in own:
-                called = self._called(h)
+                about, called = fixes.Act(h, self.heavy, self.copies), self._called(h)
                 if self._table()[h].address != arrays.WHOLE:
-                    act = fixes.on_point(heated if heats else moving_points, then, self._values(h))
-                    yield self._of_points(act, block, hooks, h, copies, called=called)
+                    points_of = heat.heated if heats else moving_points
+                    act = fixes.on_point(points_of, then, self._values(h))
+                    yield self._of_points(act, block, hooks, about, called=called)
                 else:
-                    (tag,) = (one for one in hooks.whole if one.row == h)
-                    act = fixes.on_whole_point(then, heats)
-                    yield self._of_points(act, block, hooks, tag, h, copies, called=called)
+                    act, tag = fixes.on_point(fixes.whole_points(heats), then), self._whole(h)
+                    yield self._of_points(act, block, hooks, about, tag, called=called)
         for h in own:
             yield from self._publish_at_once(h)
 
     def _work_of_loads(self) -> Iterator[KernelLaunch]:
         if len(self._table()) and self.hooks.loads.size:
-            rest = (self.s, self.hooks, self.copies)
+            rest = self.s, self.hooks, fixes.Act(0, self.heavy, self.copies)
             yield self._launch(fixes.work_of_loads, self.nodes, *rest, called=self._called(0))
 
     # --- totals, and the watch over energy
@@ -416,7 +419,8 @@ class StepsOnCard:
     def _publish(self, last: bool) -> list[KernelLaunch]:
         if not len(self._table()):
             return []
-        publish = self._launch(fixes.publish, 1, self.s, self.hooks, last)
+        numbers = 0, len(self._table())
+        publish = self._launch(fixes.publish, 1, self.s, self.hooks, numbers, last)
         return [*self._collect(*self._slots()), *self._collect(WORK, WORK + 1), publish]
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
@@ -424,7 +428,7 @@ class StepsOnCard:
         slots = range(*self._slots())
         if self._table()[h].slot < 0 or all(read not in slots for _, read in self._globals()):
             return []
-        publish = self._launch(fixes.publish_hook, 1, self.s, self.hooks, h)
+        publish = self._launch(fixes.publish, 1, self.s, self.hooks, (h, h + 1), True)
         return [*self._collect(*self._rows_of(h)), publish]
 
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:

@@ -11,9 +11,9 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks, some_of
 from karamelo_py.kernels.clock import all_well, step_size
+from karamelo_py.kernels.equations.internal_force import Force
+from karamelo_py.kernels.equations.node_updates import SumsToVelocity
 from karamelo_py.kernels.heat import SHOW, Conducting
-from karamelo_py.kernels.nodes import SumsToVelocity
-from karamelo_py.kernels.p2g import Force
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS

@@ -90,7 +90,7 @@ def lone_point(hub: Hub) -> float:
     The stored velocity gradient L responds to its pressure by dL/dt = -p / (rho D): an oscillator
     of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; if gradients are stored,
     sums of |grad N|^2 / N replace 1 / D. Points of flowing materials can become isolated; points of
-    a gas then store no moments (`kernels.loss.in_company`).
+    a gas then store no moments (`kernels.equations.loss.in_company`).
     """
     update = hub.update
     keeps = stores_moment(hub.update.transfer) and update.method.frame.moves

@@ -6,7 +6,7 @@ import copy
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from karamelo_py.kernels.p2g import VelocityBefore
+from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.unknown import line_below

@@ -15,7 +15,9 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.fields import columns_of
 from karamelo_py.compiler.trace import Undefined, places_of
 from karamelo_py.kernels import table
-from karamelo_py.kernels.heat import Conducting, Supply
+from karamelo_py.kernels.equations.heat import Supply
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
+from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.hooks import (
     ACTS_ON,
     NODE_WORDS,
@@ -26,7 +28,6 @@ from karamelo_py.kernels.hooks import (
     WORDS,
     CompiledHook,
 )
-from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table

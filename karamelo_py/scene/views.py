@@ -12,11 +12,12 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.equations.heat import Supply, Temperature
+from karamelo_py.kernels.equations.internal_force import Force
+from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.kernels.export import export_velocity_moment, impose_stress, impose_temperature
-from karamelo_py.kernels.heat import Supply, Temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.p2g import Force, VelocityBefore
 from karamelo_py.output.point_table import (
     AXES,
     VECTORS,

@@ -3,7 +3,7 @@
 from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.kernels import arrays, table
-from karamelo_py.kernels.g2p import StrainOfLoadStep
+from karamelo_py.kernels.equations.strain import StrainOfLoadStep
 from karamelo_py.language.signature import Constraint, NonNegative, Positive
 from karamelo_py.schemes.traits import SchemeTraits
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.kernels import table
-from karamelo_py.kernels.g2p import Strain
+from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.schemes.traits import SchemeTraits
 
 

@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real
 from karamelo_py.kernels import arrays, table
-from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.nodes import UpdateToVelocity
-from karamelo_py.kernels.p2g import SquaredMass
+from karamelo_py.kernels.equations.node_updates import SquaredMass, UpdateToVelocity
+from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.table import NodeTask, light_node
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight

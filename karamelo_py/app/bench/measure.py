@@ -17,8 +17,8 @@ from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Serial, Threaded, new_team, shared_out
 from karamelo_py.kernels.clock import finish
-from karamelo_py.kernels.p2g import columns_of
 from karamelo_py.kernels.step import DONE, Fused, begin, step
+from karamelo_py.kernels.sums import columns_of
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console

@@ -156,6 +156,6 @@ def carrier(basis, kin, grid, stencil, corner):
 
 
 @point_function(otherwise=True)
-def carry(basis, kin, place, old, corner, displacement):
-    """`place` with one corner of the domain displaced; `old` is the place before any change."""
+def carry(basis, kin, place, corner, displacement):
+    """`place` with one corner of the domain displaced."""
     return place

@@ -275,7 +275,7 @@ def _carrier_cpgimp_corners(basis, kin, grid, stencil, corner):
 
 
 @bases.carry.on(CPGIMPCorners)
-def _carry_cpgimp_corners(basis, kin, place, old, corner, displacement):
+def _carry_cpgimp_corners(basis, kin, place, corner, displacement):
     d = kin.dimension
     moves = enumerate(zip(place[d : 2 * d], displacement, strict=True))
     half = [size + 0.5**d * (u if corner & (1 << i) else -u) for i, (size, u) in moves]

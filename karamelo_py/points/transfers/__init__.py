@@ -9,7 +9,9 @@ v_pic
 dv
     sum_I N_I (v*_I - v_I), its change during the step
 
-Every class has `traits`, and names the fields of points that it needs in `point_fields`.
+Functions of a node take a view of it: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and
+`kin` (:mod:`karamelo_py.kernels.views`). Every class has `traits`, and names the fields of points
+that it needs in `point_fields`.
 
 The default for undefined functions is PIC: nothing is stored, only v is mapped.
 """
@@ -80,9 +82,9 @@ def known_volume(transfer, law, kin, state):
 
 
 @point_function(otherwise=True)
-def nodal_momentum(transfer, kin, basis, grid, stencil, k, weight, mass, v, moment):
-    """Return the momentum that a point gives to the k-th node of its stencil."""
-    return weight * mass * v
+def nodal_momentum(transfer, pt, node):
+    """Return the momentum that a point gives to a node. `pt` has `mass`, `v` and `moment`."""
+    return node.N * pt.mass * pt.v
 
 
 @point_function(otherwise=True)
@@ -101,8 +103,8 @@ def zero_moment(transfer, kin, like):
 
 
 @point_function(otherwise=True)
-def add_moment(transfer, kin, basis, grid, stencil, k, weight, gradient, velocity, moment):
-    """Add the contribution of the k-th node to the moment."""
+def add_moment(transfer, node, v, moment):
+    """Add the contribution of a node of velocity `v` to the moment."""
     return moment
 
 
@@ -116,9 +118,9 @@ def by_arms(transfer, inverse_d):
 
 
 @point_function(otherwise=True)
-def gradient_weight(transfer, basis, kin, grid, stencil, k, gradient):
-    """Return the weight of the k-th node in strains and forces: by default its `gradient`."""
-    return gradient
+def gradient_weight(transfer, node):
+    """Return the weight of a node in strains and forces: by default `node.grad_N`."""
+    return node.grad_N
 
 
 @point_function(otherwise=True)

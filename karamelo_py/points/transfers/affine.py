@@ -12,7 +12,6 @@ from karamelo_py.compiler.compile import where
 from karamelo_py.language.kinds import In
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import transfers
-from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.laws import jacobian
 from karamelo_py.points.transfers import Moment, TransferTraits
@@ -119,12 +118,12 @@ def _displacing_velocity_asflip(transfer, v, v_pic, j):
     return v_pic + beta * (v - v_pic)
 
 
-def nodal_momentum_affine(transfer, kin, basis, grid, stencil, k, weight, mass, v, B):
-    return weight * mass * v + mass * (B @ affine_weight(basis, kin, grid, stencil, k))
+def nodal_momentum_affine(transfer, pt, node):
+    return node.N * pt.mass * pt.v + pt.mass * (pt.moment @ node.affine_N)
 
 
-def add_moment_affine(transfer, kin, basis, grid, stencil, k, weight, gradient, v, B):
-    return B + outer(weight * v, reach(basis, kin, grid, stencil, k))
+def add_moment_affine(transfer, node, v, B):
+    return B + outer(node.N * v, node.arm)
 
 
 def affine_velocity_of_moment(transfer, B, inverse_d):

@@ -9,7 +9,6 @@ constant; with splines, as far as velocity is linear over their support.
 from typing import Annotated, NamedTuple
 
 from karamelo_py.points import transfers
-from karamelo_py.points.basis import affine_weight, reach
 from karamelo_py.points.kinematics import Axisymmetric, outer
 from karamelo_py.points.kinematics import gradient as as_gradient
 from karamelo_py.points.transfers import Moment, TransferTraits
@@ -75,12 +74,12 @@ class MLS(NamedTuple):
     in_lanes = True
 
 
-def nodal_momentum_taylor(transfer, kin, basis, grid, stencil, k, weight, mass, v, L):
-    return weight * mass * (v + L @ reach(basis, kin, grid, stencil, k))
+def nodal_momentum_taylor(transfer, pt, node):
+    return node.N * pt.mass * (pt.v + pt.moment @ node.arm)
 
 
-def add_moment_taylor(transfer, kin, basis, grid, stencil, k, weight, gradient, v, L):
-    return L + outer(v, gradient.planar())
+def add_moment_taylor(transfer, node, v, L):
+    return L + outer(v, node.strain_N.planar())
 
 
 def kept_velocity_gradient(transfer, L, inverse_d):
@@ -99,10 +98,10 @@ take_nodal_velocity(MLS)
 
 
 @transfers.gradient_weight.on(MLS)
-def _gradient_weight_mls(transfer, basis, kin, grid, stencil, k, gradient):
+def _gradient_weight_mls(transfer, node):
     # The hoop part N / r in axisymmetry is unchanged.
-    moved = affine_weight(basis, kin, grid, stencil, k)
-    return as_gradient(kin, [*moved, *gradient[len(moved) :]])
+    moved = node.affine_N
+    return as_gradient(node.kin, [*moved, *node.grad_N[len(moved) :]])
 
 
 transfers.by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)

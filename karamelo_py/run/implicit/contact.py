@@ -18,7 +18,7 @@ from scipy.sparse.linalg import spsolve
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import TIMESTEP
 from karamelo_py.kernels.contact import SeparateFields, list_pairs
-from karamelo_py.kernels.loss import FrictionalHeat
+from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
 

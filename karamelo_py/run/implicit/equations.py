@@ -13,8 +13,8 @@ from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import implicit as loops
 from karamelo_py.kernels.arrays import MASS, Setup, known_to_laws
-from karamelo_py.kernels.heat import Conductance
-from karamelo_py.kernels.visit import FBar
+from karamelo_py.kernels.equations.fbar import FBar
+from karamelo_py.kernels.equations.heat import Conductance
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
 from karamelo_py.run.implicit.averaging import AveragedVolumes

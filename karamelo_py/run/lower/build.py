@@ -14,11 +14,11 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.equations.fbar import NodalMean
+from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
-from karamelo_py.kernels.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.table import Insulated
-from karamelo_py.kernels.visit import NodalMean
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import owners_of_fields
 from karamelo_py.points import laws
@@ -220,7 +220,7 @@ def returns_loss(hub: Hub) -> bool:
     """Check that kinetic energy that the transfer takes heats points of the scene.
 
     FLIP 1 takes none that does not vanish with the step, unless it stores moments.
-    XPIC has its own way (`kernels.loss.reflect`).
+    XPIC has its own way (`kernels.equations.loss.reflect`).
     """
     transfer = hub.update.transfer
     keeps_all = flip_coefficient(transfer) == 1 and not stores_moment(transfer)

@@ -15,7 +15,7 @@ from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, results
 from karamelo_py.kernels.laws import law_in, law_on
-from karamelo_py.kernels.visit import place_at, state_at
+from karamelo_py.kernels.views import place_at, state_at
 from karamelo_py.language.faults import as_script_error, fault, place_of
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
@@ -59,7 +59,7 @@ def _samples(setup: Setup, fix: Fix, hook: Any) -> Iterator[tuple]:
     """Yield what `results` is called with for a node, or for a point of each law in the group."""
     tag, kin = hook.tag(0, ()), setup.kin
     if hook.on_nodes:
-        yield WholeNodes(tag, planar(kin), None, _one_node(setup), None, True, 0), kin, kin, 0
+        yield WholeNodes(0, planar(kin), None, _one_node(setup), None, 0.0, tag, True), kin, kin, 0
         return
     for points, table, _ in setup.blocks:
         for p in np.flatnonzero(fix.group.has(points.id))[:1]:

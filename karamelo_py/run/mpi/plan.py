@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
-from karamelo_py.kernels.p2g import arrays_given
 from karamelo_py.kernels.step import step
+from karamelo_py.kernels.sums import arrays_given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.boxes import Boxes, chosen_of, no_nodes
 from karamelo_py.run.lower.memory import memory_of, nodes_in_use

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.laws import elastic_law, law_on
-from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
 from karamelo_py.output.units import Powers

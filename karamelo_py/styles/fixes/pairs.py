@@ -9,8 +9,8 @@ import numpy as np
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.kernels.p2g import Force, WorkOfForces
 from karamelo_py.language.rules import gain
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.bodies import Hertz, MinimizePenetration

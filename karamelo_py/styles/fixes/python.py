@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES
-from karamelo_py.kernels.p2g import Force
 from karamelo_py.language.faults import KNOWN, cause_of, place_in, steps_to
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import AnyGroup, NodeGroup

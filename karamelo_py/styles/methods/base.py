@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.visit import FBar, FBarOfSoil, PointByPoint
+from karamelo_py.kernels.equations.fbar import FBar, FBarOfSoil, PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated

@@ -286,7 +286,7 @@ def _carrier_corners(basis, kin, grid, stencil, corner):
 
 
 @bases.carry.on(CarriedDomain)
-def _carry_corners(basis, kin, place, old, corner, displacement):
+def _carry_corners(basis, kin, place, corner, displacement):
     first = kin.dimension * (1 + corner)
     last = first + kin.dimension
     moves = zip(place[first:last], displacement, strict=True)

@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated
 
-from karamelo_py.kernels.p2g import Force, WorkOfForces
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Fix, vector_hook

@@ -1,7 +1,7 @@
 """fix charged: a force by a field of the points' own, their charge, which leaks away."""
 
 from karamelo_py.compiler.fields import Field
-from karamelo_py.kernels.p2g import Force, WorkOfForces
+from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.modify import Fix, vector_hook
 from karamelo_py.script.expressions import Expression

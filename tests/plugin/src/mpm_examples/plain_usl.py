@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.compile import real, shared
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
-from karamelo_py.kernels.g2p import Strain
-from karamelo_py.kernels.nodes import UpdateToVelocity
+from karamelo_py.kernels.equations.node_updates import UpdateToVelocity
+from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.table import ACCELERATE, MOVE, SERIES, SUMS, AtPoints, Gather, NodeTask
 from karamelo_py.schemes.traits import SchemeTraits
 

@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from karamelo_py.compiler.fields import Field
-from karamelo_py.kernels.heat import Supply
+from karamelo_py.kernels.equations.heat import Supply
 from karamelo_py.language.signature import In
 from karamelo_py.points.kinematics import dev, von_mises
 from karamelo_py.points.laws import cauchy_stress, plastic_strain

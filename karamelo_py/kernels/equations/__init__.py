@@ -1,0 +1,284 @@
+"""Quantities that points give to the nodes, and tasks that gather from them: one file each.
+
+A quantity is a tag with its equations as data, `takes` and `gives`; a task has functions `empty`,
+`gathered` and `updated`. docs/house/kernels.md shows one of each.
+"""
+
+from collections import namedtuple
+from collections.abc import Callable
+from itertools import groupby
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import accumulate, of_present, point_function, real
+from karamelo_py.compiler.fields import SummedField, field, scalar, vector
+from karamelo_py.compiler.tuples import flat
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Nodes, Number, Tag, of_force
+from karamelo_py.kernels.views import NodeView, PointView, Work, node_of
+from karamelo_py.points import laws
+from karamelo_py.points.basis import reach
+from karamelo_py.points.basis.product import spacing
+from karamelo_py.points.transfers import Moment, zero_moment
+
+
+class NodeColumns(NamedTuple):
+    """Columns of an array of nodes: a name in `Nodes`, or the class of a field."""
+
+    array: Any
+    first: Callable  # functions of the kinematics
+    count: Callable
+    end: Callable  # with the gap after them: records fill registers
+
+
+def _zero(kin):
+    return 0
+
+
+class Sum(NamedTuple):
+    """Sum over the points at a node: ``of(pt, node)`` is the part of a point, a tuple.
+
+    Where it is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b, no columns
+    for b = 0, or () if that is unknown: in lanes, such sums are brought into the order of the
+    records once per point, instead of once per node.
+    """
+
+    into: NodeColumns
+    of: Callable
+    affine: Callable = lambda pt, w: ()
+
+
+def whole(kind: Any, count: Callable | None = None) -> NodeColumns:
+    """Return the columns of a field; `count`, a function of the kinematics, if they are fewer."""
+    count = count or kind.shape
+    return NodeColumns(kind, _zero, count, count)
+
+
+class RigidSums(SummedField):
+    """Sums of the rigid points at a node: mass, momentum, force on them, as in `Nodes.sums`."""
+
+    @staticmethod
+    def shape(kin):
+        """Return the components of the sums of a node."""
+        return arrays.SUMS_WIDTH[kin.dimension]
+
+
+MASS = NodeColumns("sums", _zero, scalar, arrays.of_momentum)
+MOMENTUM = NodeColumns("sums", arrays.of_momentum, vector, of_force)
+FORCE = NodeColumns("sums", of_force, vector, RigidSums.shape)
+RIGID_MASS, RIGID_MOMENTUM = MASS._replace(array=RigidSums), MOMENTUM._replace(array=RigidSums)
+VELOCITY = NodeColumns("velocity", _zero, vector, lambda kin: arrays.VELOCITY_WIDTH[kin.dimension])
+
+
+def of_point(**functions: Callable) -> MappingProxyType:
+    """Name functions of a point, for `Quantity.takes`."""
+    return MappingProxyType(functions)
+
+
+class NodalQuantity(NamedTuple):
+    """Base of quantities that also work in lanes; `not_at_corners` as in `kernels.stencils`."""
+
+    in_lanes = True
+    not_at_corners = ()
+    records = ""  # array of nodes whose records are prefetched, if any
+    adds = False  # to the present values at the nodes, instead of replacing them
+    also_reads = ()  # fields of points, besides those of `takes`
+    takes = of_point()
+    gives = ()
+
+    @classmethod
+    def __init_subclass__(cls):
+        _register(cls)
+
+
+class Task(NamedTuple):
+    """Base of tasks that also work in lanes and at domain corners.
+
+    They have functions ``empty``, ``gathered`` and ``updated``, as declared below.
+    """
+
+    in_lanes = True
+    not_at_corners = ()
+    records = ""
+
+    @classmethod
+    def __init_subclass__(cls):
+        for name, function in (("empty", empty), ("gathered", gathered), ("updated", updated)):
+            if name in vars(cls):
+                function.on(cls)(vars(cls)[name])
+
+
+class Report(NamedTuple):
+    """Result of a point in a task; NaN or infinity for a failed one."""
+
+    moved: Number  # its move, in cells
+    rate: Number  # the largest so far, for the step size: as `Sweep.reported` takes it
+
+
+@point_function()
+def empty(task: Tag, w: Work, x: tuple) -> tuple:
+    """Return the initial totals of a gather: zeros."""
+
+
+@point_function()
+def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
+    """Add the contribution of a node to `total`."""
+
+
+@point_function()
+def updated(task: Tag, pt: PointView, total: tuple, totals: tuple, fastest: Number) -> Report:
+    """Store the update from `total`, one of the `totals` of the visit; report on the point.
+
+    The larger of its rate and `fastest`, the largest so far, is reported.
+    """
+
+
+@point_function()
+def load_of(quantity: Tag, pt: PointView) -> tuple:
+    """Return the load of a point: the numbers that it scatters, before weighting."""
+
+
+@point_function()
+def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
+    """Add the contribution of a load to a node."""
+
+
+@point_function()
+def affine_part(quantity, w, stencil, load):
+    """Return (array, first component, value at the first node, growth per node) of a quantity.
+
+    One growth for each direction, or none where all nodes see the same. () for what is not affine.
+    """
+
+
+def _register(own: Any) -> None:
+    """Register the equations of a quantity."""
+    groups = [(array, (*sums,)) for array, sums in groupby(own.gives, lambda one: one.into.array)]
+    made, takes = namedtuple("Load", own.takes), tuple(own.takes.values())  # type: ignore[misc]
+    names = [name for take in takes for name in take.reads]
+    own.reads = tuple(dict.fromkeys((*own.also_reads, *names)))
+
+    @load_of.on(own)
+    def load_of_point(quantity, pt):
+        return made(*[take(pt) for take in takes])
+
+    @scattered.on(own)
+    def scatter(quantity, load, node):
+        for array, sums in groups:
+            there = found(node.w.nodes, array)
+            values = () if there is None else flat([one.of(load, node) for one in sums])
+            if len(values):
+                accumulate(there, node.i, sums[0].into.first(node.w.kin), values)
+
+    @affine_part.on(own)
+    def affine(quantity, w, stencil, load):
+        present = [(array, sums) for array, sums in groups if found(w.nodes, array) is not None]
+        if len(present) != 1:
+            return ()
+        array, sums = present[0]
+        parts = [one.affine(load, w) for one in sums]
+        if not all(len(part) for part in parts):
+            return ()
+        at_first = [_at_first(w, stencil, *part) for part in parts]
+        return found(w.nodes, array), sums[0].into.first(w.kin), *_joined(at_first)
+
+
+def found(nodes: Nodes, array: Any) -> Any:
+    """Return an array of nodes by its name or the class of its field; None where it is absent."""
+    return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
+
+
+def _at_first(w, stencil, value, slopes):
+    """Return the value at the first node and growth per node: of one at the point, per length."""
+    value = value if isinstance(value, tuple) else (value,)
+    if not len(slopes):
+        return value, ()
+    arm = reach(w.basis, w.kin, w.grid, stencil, 0)
+    for slope, way in zip(slopes, arm, strict=True):
+        value = value + way * slope
+    step = w.grid.h * spacing(w.basis)
+    return value, tuple([step * slope for slope in slopes])
+
+
+def _joined(parts):
+    """Join values and growths of sums into one record; what does not grow has zeros."""
+    values = flat([value for value, _ in parts])
+    growing = [growths for _, growths in parts if len(growths)]
+    if not growing:
+        return values, ()
+    none = [tuple([a - a for a in value]) for value, _ in parts]
+    growths = [
+        own or (zeros,) * len(growing[0]) for zeros, (_, own) in zip(none, parts, strict=True)
+    ]
+    return values, tuple([flat(ways) for ways in zip(*growths, strict=True)])
+
+
+# --- what equations take of a point -------------------------------------------------------------
+
+
+def reads(*names: str) -> Callable:
+    """Declare the fields of points that a function of a point reads."""
+
+    def declare(function: Any) -> Any:
+        function.reads = names
+        return function
+
+    return declare
+
+
+def is_apart(w):
+    """Return True for rigid points with separate sums at their nodes."""
+    return laws.moves_as_told(w.laws) and field(w.nodes.fields, RigidSums) is not None
+
+
+@reads("mass")
+def mass(pt):
+    """Mass that a point gives to the sums of all solids: 0 for rigid points with separate sums."""
+    own = of_present(pt.p, pt.w.points.mass[pt.p])
+    return own - own if is_apart(pt.w) else own
+
+
+@reads("v")
+def v(pt):
+    """Velocity (d,)."""
+    return pt.v
+
+
+@reads("moment")
+def moment(pt):
+    """Tensor that the transfer stores with the velocity; () if it stores none."""
+    return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
+
+
+# --- tuples of tags -------------------------------------------------------------------------------
+
+
+def empty_all(tasks, w, x):
+    """Return the initial totals of all tasks."""
+    return tuple([empty(task, w, x) for task in tasks])
+
+
+def gathered_all(tasks, w, stencil, k, totals):
+    """Add the contribution of the k-th node of a stencil to the totals of all tasks."""
+    node = node_of(w, stencil, k)
+    return tuple([gathered(task, node, totals[n]) for n, task in enumerate(tasks)])
+
+
+def updated_all(tasks, pt, totals, fastest):
+    """Update by the tasks in order: moves are summed, and the rate is passed on."""
+    moved = real(0, fastest)
+    for task, total in zip(tasks, totals, strict=True):
+        further, fastest = updated(task, pt, total, totals, fastest)
+        moved += further
+    return moved, fastest
+
+
+def load_all(quantities, pt):
+    """Return the loads of all quantities."""
+    return tuple([load_of(quantity, pt) for quantity in quantities])
+
+
+def scattered_all(quantities, loads, node):
+    """Add the contributions of all quantities to a node."""
+    for quantity, load in zip(quantities, loads, strict=True):
+        scattered(quantity, load, node)

@@ -1,0 +1,193 @@
+"""F-bar: changes of volume are averaged over the surroundings, where a scene asks for it.
+
+The ratio of volumes J_p of an increment becomes the average of Jbar_i = sum_q N_iq V_q J_q / sum_q
+N_iq V_q over the nodes (after Coombs et al. 2018, "Overcoming volumetric locking in material point
+methods", eq. 23; there over the points of a cell).
+"""
+
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import fma, real
+from karamelo_py.compiler.fields import Field, StepField, SummedField, field, pair
+from karamelo_py.compiler.tuples import row
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.points import laws
+from karamelo_py.points.frames import force_stress, scaled_increment
+from karamelo_py.points.kinematics import I, nothing
+
+
+class VolumeRatio(StepField):
+    """Ratio of volumes of the trial increment of a point."""
+
+    start = 1.0
+
+
+class NodalMean(SummedField):
+    """Sum weight times value, and weights, at a node; then replace the first by the mean.
+
+    Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
+    """
+
+    shape = pair
+
+
+class AveragedStress(StepField):
+    """Mean stress of a point and its surroundings."""
+
+
+class PressureBeside(Field):
+    """Pressure that the last forces had more than the point: averaged less own (F-bar)."""
+
+
+class NodalStress(SummedField):
+    """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
+
+    shape = NodalMean.shape
+
+
+class PointByPoint(NamedTuple):
+    """Every point has its own change of volume."""
+
+    in_lanes = True
+
+
+class FBar(NamedTuple):
+    """Changes of volume are averaged over the surroundings, against volumetric locking.
+
+    With d_p the rate of volume of a point and V_p its volume, the average is
+    sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with volumes it is its own adjoint: the
+    mean stress averaged alike gives forces whose power equals the averaged strain's.
+    """
+
+    in_lanes = True
+    point_fields = (VolumeRatio, AveragedStress)
+    node_fields = (NodalMean, NodalStress)
+
+
+class FBarOfSoil(FBar):
+    """The same, with laws whose yield surface takes a part of the averaged pressure.
+
+    If it took the point's pressure, soil that dilates less than friction asks for would lose
+    strength in stripes (:func:`~karamelo_py.points.laws.strengths.frictional.share_of_average`).
+    """
+
+    point_fields = (*FBar.point_fields, PressureBeside)
+
+
+@eq.reads("mass", "state", "material", "volume ratio")
+def volumes(pt):
+    """Volume of a point after and before the trial increment."""
+    law, state = pt.law_and_state
+    volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
+    return volume * pt.of(VolumeRatio)[0, pt.p], volume
+
+
+class Volumes(eq.NodalQuantity):
+    """Scatter volume, after and before the trial increment."""
+
+    says = "volumes to grid"
+    takes = eq.of_point(volumes=volumes)
+    gives = (eq.Sum(eq.whole(NodalMean), lambda pt, node: tuple([node.N * V for V in pt.volumes])),)
+
+
+def mean_stress(pt):
+    """Return volume times mean Kirchhoff stress of a point, and its present volume."""
+    law, state = pt.law_and_state
+    return _mean_stress(pt.kin, law, state, eq.mass(pt) * laws.specific_volume(law))
+
+
+def _mean_stress(kin, law, state, volume):
+    tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
+    return volume * tau, volume * laws.jacobian(law, kin, state)
+
+
+@eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
+def minus_V_stress_beside(pt):
+    """Minus volume times the averaged mean stress less the point's, a tensor."""
+    law, state, f = pt.law_state_F
+    own, present = _mean_stress(pt.kin, law, state, eq.mass(pt) * laws.specific_volume(law))
+    change = present * pt.of(AveragedStress)[0, pt.p] - own
+    return force_stress(pt.w.frame, pt.kin, nothing(pt.kin) - change * I, f)
+
+
+class AveragedForce(eq.NodalQuantity):
+    """Scatter the force of the averaged mean stress less that of the point's; added to forces."""
+
+    not_at_corners = ("moments",)
+    says = "internal force of the averaged mean stress"
+    adds = True
+    takes = eq.of_point(minus_V_stress=minus_V_stress_beside)
+    gives = (eq.Sum(eq.FORCE, lambda pt, node: pt.minus_V_stress.dot(node.strain_N)),)
+
+
+class SetMeanStress(eq.Task):
+    """Gather the averaged mean stress."""
+
+    says = "averaged mean stress"
+    reads = ("x", "state", "material")
+    writes = ("averaged stress", "pressure beside")
+
+    def empty(task, w, x):
+        return real(0, x[0])
+
+    def gathered(task, node, total):
+        return fma(node.N, row(node.of(NodalStress), node.i, 0, (total,))[0], total)
+
+    def updated(task, pt, total, totals, fastest):
+        pt.of(AveragedStress)[0, pt.p] = total
+        beside = pt.of(PressureBeside)
+        if beside is not None:
+            law, state = pt.law_and_state
+            own = laws.cauchy_stress(law, pt.kin, state).mean_of_stretching()
+            beside[0, pt.p] = own - total
+        return eq.Report(real(0, pt.dt), fastest)
+
+
+# --- the averaged ratio in a gather of strain --------------------------------------------------
+
+
+def no_ratio(w, like):
+    """Return the start of the gather of the averaged volume ratio; () where none is averaged."""
+    return (real(0, like),) if isinstance(w.averaging, FBar) else ()
+
+
+def gathered_ratio(node, total):
+    """Add the ratio of volumes at a node to `total`, where it is averaged."""
+    if not len(total):
+        return total
+    (mean,) = row(node.of(NodalMean), node.i, 0, total)
+    return (fma(node.N, mean, total[0]),)
+
+
+def averaged(pt, dl, ratio):
+    """Give `dl` the change of volume that the surroundings have on average, where there is one.
+
+    In the total frame, `dl` is dt Fdot, and F + dl is scaled.
+    """
+    if not len(ratio):
+        return dl
+    _, _, f = pt.law_state_F
+    own = pt.of(VolumeRatio)[0, pt.p]
+    return scaled_increment(pt.w.frame, pt.kin, dl, f, ratio[0] / own)
+
+
+# --- means at nodes -----------------------------------------------------------------------------
+
+
+@node_task
+class TakeMean(NamedTuple):
+    """The weighted mean from its two sums, at the nodes."""
+
+    goes_through = ("nodal mean", "nodal mean")
+
+    def at_node(task, kin, nodes, n, dt):
+        sums = field(nodes.fields, NodalStress if isinstance(task, TakeMeanStress) else NodalMean)
+        if sums[n, 1] > 0:
+            sums[n, 0] /= sums[n, 1]
+
+
+class TakeMeanStress(TakeMean):
+    """The same of the mean stress."""
+
+    goes_through = ("nodal stress", "nodal stress")

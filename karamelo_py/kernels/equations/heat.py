@@ -1,0 +1,216 @@
+"""Heat: capacity and heat of nodes, the flow by conduction, and the temperature of points.
+
+C_i = sum_p N_ip C_p, C_i T_i = sum_p N_ip C_p (T_p + grad T_p (X_i - x_p)), and the flow to a node
+-sum_p k_p V_p grad T_p grad N_ip. Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt &
+Guilkey 2007 for points with gradients; Tao et al. 2016, "A generalized interpolation material point
+method for coupled thermo-mechanical processes", for heat.
+"""
+
+from karamelo_py.compiler.compile import fma, of_present, real, round_off, where
+from karamelo_py.compiler.fields import Field, StepField, pair, scalar, store, vector
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.arrays import of_force
+from karamelo_py.kernels.equations.fbar import NodalMean
+from karamelo_py.points import laws
+from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
+from karamelo_py.points.kinematics import Line
+
+# Heat has one component: its flow lies where a force of a line does.
+HEAT = eq.NodeColumns("sums", lambda kin: 0, pair, lambda kin: of_force(Line()))
+FLOW = eq.NodeColumns("sums", HEAT.end, scalar, lambda kin: of_force(Line()) + 1)
+
+
+class Temperature(StepField):
+    """Temperature of a point before the step."""
+
+
+class Capacity(StepField):
+    """Heat capacity of a point."""
+
+
+class Conductance(StepField):
+    """Conductivity times volume of a point."""
+
+
+class Volume(StepField):
+    """Volume of a point."""
+
+
+class Supply(StepField):
+    """Heat per time that fixes supply to a point."""
+
+    columns = ("gamma",)
+
+
+class TemperatureShare(StepField):
+    """Fraction of the change of the nodal temperature that a point takes."""
+
+
+class HeatGradient(Field):
+    """Gradient of temperature at a point."""
+
+    shape = vector
+
+
+FIELDS = Temperature, Capacity, Conductance, Volume, Supply, TemperatureShare, HeatGradient
+HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as of `HeatedPoints`
+
+
+def at_least_round_off(weight):
+    """Return `weight`, or a tiny number if it is 0.
+
+    A point on a node has no weight at the next node, but a gradient: that node needs the
+    temperature that the point has there, and the flow to it has to return.
+    """
+    return max(weight, round_off(weight))
+
+
+@eq.reads("mass", "state", "material")
+def content(pt):
+    """Heat capacity, conductivity times volume, and temperature of a point; also stored."""
+    (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
+    volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
+    T = laws.temperature(law, pt.kin, state)
+    capacity = mass * laws.heat_capacity(law, pt.dt)
+    conductance = volume * laws.conductivity(law, pt.dt)
+    pt.of(Temperature)[0, p] = T
+    pt.of(Capacity)[0, p] = capacity
+    pt.of(Conductance)[0, p] = conductance
+    pt.of(Volume)[0, p] = volume
+    # Fixes may supply heat, and reset the fraction of the change that the point takes.
+    pt.of(Supply)[0, p] = real(0, pt.dt)
+    pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
+    return of_present(p, capacity), of_present(p, conductance), T
+
+
+@eq.reads("heat gradient")
+def heat_gradient(pt):
+    """Gradient of temperature (d,)."""
+    return pt.load(HeatGradient, pt.v)
+
+
+def temperature_at(pt, node):
+    """Temperature of a point, extrapolated to a node."""
+    _, _, T = pt.content
+    for axis in range(len(pt.gradient)):
+        T = fma(pt.gradient[axis], node.arm[axis], T)
+    return T
+
+
+def heat_at(pt, node):
+    """Capacity and heat."""
+    part = at_least_round_off(node.N) * pt.content[0]
+    return part, part * temperature_at(pt, node)
+
+
+def mean_at(pt, node):
+    """Conductance times temperature, and conductance."""
+    part = at_least_round_off(node.N) * pt.content[1]
+    return part * temperature_at(pt, node), part
+
+
+class HeatContent(eq.NodalQuantity):
+    """Scatter heat capacity and heat, with the points' gradients up to the nodes."""
+
+    not_at_corners = ("anything",)
+    says = "heat to grid"
+    also_reads = ("x",)
+    takes = eq.of_point(content=content, gradient=heat_gradient)
+    gives = (eq.Sum(HEAT, heat_at), eq.Sum(eq.whole(NodalMean), mean_at))
+
+
+@eq.reads("state", "material", "deformation gradient", "heat gradient", "conductance")
+def flow(pt):
+    """Heat flow times volume, (d,)."""
+    _, _, f = pt.law_state_F
+    against = pulled_back(pt.w.frame, pt.kin, heat_gradient(pt), f)
+    return -of_present(pt.p, pt.of(Conductance)[0, pt.p]) * against
+
+
+@eq.reads()
+def supply(pt):
+    """Heat per time from fixes."""
+    return of_present(pt.p, pt.of(Supply)[0, pt.p])
+
+
+def flow_at(pt, node):
+    """Heat per time to a node."""
+    total = at_least_round_off(node.N) * pt.supply
+    for axis in range(len(pt.flow)):
+        total = fma(pt.flow[axis], node.grad_N[axis], total)
+    return (total,)
+
+
+class HeatFlow(eq.NodalQuantity):
+    """Scatter the heat flow and the supply of fixes."""
+
+    not_at_corners = ("anything",)
+    says = "heat flow"
+    takes = eq.of_point(flow=flow, supply=supply)
+    gives = (eq.Sum(FLOW, flow_at),)
+
+
+class TemperatureGradient(eq.Task):
+    """Gather the gradient of the nodal temperature."""
+
+    not_at_corners = ("anything",)
+    says = "gradient of temperature"
+    reads = ("x",)
+    writes = ("heat gradient",)
+
+    def empty(task, w, x):
+        return x - x
+
+    def gathered(task, node, total):
+        # An axisymmetric gradient also has the hoop part after it; a scalar has none.
+        return total + node.w.nodes.velocity[node.i, 0] * node.grad_N.planar()
+
+    def updated(task, pt, total, totals, fastest):
+        store(pt.of(HeatGradient), pt.p, total)
+        return eq.Report(real(0, pt.dt), fastest)
+
+
+class Warming(eq.Task):
+    """Gather the change of the nodal temperature; update the temperature of the point."""
+
+    not_at_corners = ("anything",)
+    says = "temperature"
+    reads = (
+        "x",
+        "state",
+        "material",
+        "temperature",
+        "capacity",
+        "conductance",
+        "temperature share",
+    )
+    writes = ("state",)
+
+    def empty(task, w, x):
+        zero = x[0] - x[0]
+        return zero, zero
+
+    def gathered(task, node, total):
+        weight = at_least_round_off(node.N)
+        change, mean = total
+        mean = fma(weight, node.of(NodalMean)[node.i, 0], mean)
+        return fma(weight, node.w.nodes.update[node.i, 1], change), mean
+
+    def updated(task, pt, total, totals, fastest):
+        """Update the temperature; the rate is the factor by which conduction has become faster."""
+        law, state, f = pt.law_state_F
+        T, p = pt.of(Temperature)[0, pt.p], pt.p
+        capacity = pt.of(Capacity)[0, p]
+        some = capacity > 0
+        rate = pt.of(Conductance)[0, p] / where(some, capacity, real(1, capacity))
+        hidden = (
+            real(4 * pt.kin.dimension, pt.dt) * (rate * pt.w.grid.inv_h * pt.w.grid.inv_h) * pt.dt
+        )
+        change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
+        T = where(some, fma(pt.of(TemperatureShare)[0, p], change, T), T)
+        store(pt.w.points.state, p, laws.with_temperature(law, pt.kin, state, T))
+        # Compared with the undeformed body.
+        faster = laws.jacobian(law, pt.kin, state) * inverse_stretch_squared(
+            pt.w.frame, pt.kin, f, pt.dt
+        )
+        return eq.Report(real(0, pt.dt) * T, max(fastest, faster))

@@ -1,0 +1,77 @@
+"""Forces on nodes: f_i = sum_p (-V_p sigma_p grad N_ip + N_ip f_p), f_p the force of fixes.
+
+In the total frame, with the reference volume, the first Piola-Kirchhoff stress and the gradient at
+reference positions.
+"""
+
+from karamelo_py.compiler.compile import of_present, real
+from karamelo_py.compiler.fields import Field, StepField, vector
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.fbar import FBar, NodalStress, mean_stress
+from karamelo_py.points import laws
+from karamelo_py.points.basis.product import inverse_spread
+from karamelo_py.points.frames import force_stress
+from karamelo_py.points.kinematics import zero_vector
+from karamelo_py.points.transfers import forces_by_arms
+
+
+class Force(StepField):
+    """Force of fixes on a point."""
+
+    shape = vector
+    columns = ("bx", "by", "bz")
+
+
+class WorkOfForces(Field):
+    """Work of that force since the last look at the energy."""
+
+
+@eq.reads("mass", "state", "material", "deformation gradient")
+def minus_V_stress(pt):
+    """Minus volume times the stress that acts on the frame's gradients, a tensor."""
+    law, state, f = pt.law_state_F
+    volume = eq.mass(pt) * laws.specific_volume(law)
+    return -volume * force_stress(pt.w.frame, pt.kin, laws.kirchhoff_stress(law, pt.kin, state), f)
+
+
+@eq.reads("force")
+def force_of_fixes(pt):
+    """Force (d,) of fixes on a point; () where none acts."""
+    force = pt.load(Force, pt.v)
+    if not len(force):
+        return ()
+    # Rigid points take no force: it would act on other points at their nodes.
+    return of_present(pt.p, real(0 if laws.moves_as_told(pt.w.laws) else 1, force[0])) * force
+
+
+@eq.reads()
+def V_mean_stress(pt):
+    """Volume times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
+    return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
+
+
+def force_at(pt, node):
+    """Force of a point on a node."""
+    force = pt.minus_V_stress.dot(node.strain_N)
+    return node.N * pt.force + force if len(pt.force) else force
+
+
+def affine_force(pt, w):
+    """Force at the point and its slope, where strains have moments as weights (MLS)."""
+    inverse_d = inverse_spread(w.basis, w.grid)
+    if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
+        return ()
+    own = pt.force if len(pt.force) else zero_vector(w.kin, pt.minus_V_stress[0])
+    return own, tuple([inverse_d[0] * column for column in pt.minus_V_stress.columns()])
+
+
+class InternalForce(eq.NodalQuantity):
+    """Scatter the internal force, and the forces of fixes on points."""
+
+    not_at_corners = ("moments",)
+    says = "internal force"
+    takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_of_fixes, mean=V_mean_stress)
+    gives = (
+        eq.Sum(eq.FORCE, force_at, affine_force),
+        eq.Sum(eq.whole(NodalStress), lambda pt, node: tuple([node.N * a for a in pt.mean])),
+    )

@@ -1,0 +1,86 @@
+"""Mass and momentum of nodes: m_i = sum_p N_ip m_p, (m v)_i = sum_p N_ip m_p v_p(X_i)."""
+
+from karamelo_py.compiler.compile import of_present
+from karamelo_py.compiler.fields import SummedField, field, vector
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.loss import BROUGHT, energy_of
+from karamelo_py.kernels.equations.node_updates import SquaredMass
+from karamelo_py.points.basis import mapped_again
+from karamelo_py.points.basis.product import inverse_spread
+from karamelo_py.points.transfers import affine_velocity, nodal_momentum
+
+
+class Normal(SummedField):
+    """Sum of m grad N at a node: it points out of a body, for contact between solids."""
+
+    shape = vector
+
+
+class Centre(SummedField):
+    """Sum of mass times position at a node, for the gap between solids."""
+
+    shape = vector
+
+
+@eq.reads()
+def rigid_mass(pt):
+    """Mass of a rigid point with separate sums; () for others."""
+    return (of_present(pt.p, pt.w.points.mass[pt.p]),) if eq.is_apart(pt.w) else ()
+
+
+@eq.reads()
+def place(pt):
+    """Position (d,) after the move, where a scene needs centres; else ()."""
+    return () if field(pt.w.nodes.fields, Centre) is None else pt.y
+
+
+def momentum(pt, node):
+    """Momentum that a point gives to a node; in APIC and its kin affine around the point."""
+    return nodal_momentum(node.transfer, pt, node)
+
+
+def affine_momentum(pt, w):
+    """Momentum at the point, and its gradient, where the transfer makes it affine."""
+    at_point = pt.mass * pt.v
+    if not len(pt.moment):
+        return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())
+    c = affine_velocity(w.transfer, pt.moment, inverse_spread(w.basis, w.grid))
+    return (at_point, (pt.mass * c).columns()) if len(c) else ()
+
+
+class MassMomentum(eq.NodalQuantity):
+    """Scatter mass and momentum; that of rigid points with separate sums to these."""
+
+    not_at_corners = ("moments", "loss")
+    records = "sums"
+    says = "p2g mass and momentum"
+    also_reads = ("x moved",)
+    takes = eq.of_point(mass=eq.mass, v=eq.v, moment=eq.moment, rigid=rigid_mass, x=place)
+    gives = (
+        eq.Sum(eq.MASS, lambda pt, node: (node.N * pt.mass,), lambda pt, w: (pt.mass, ())),
+        eq.Sum(eq.MOMENTUM, momentum, affine_momentum),
+        eq.Sum(eq.RIGID_MASS, lambda pt, node: tuple([node.N * m for m in pt.rigid])),
+        eq.Sum(eq.RIGID_MOMENTUM, lambda pt, node: tuple([node.N * m * pt.v for m in pt.rigid])),
+        eq.Sum(eq.whole(Normal), lambda pt, node: pt.mass * node.grad_N.planar()),
+        eq.Sum(eq.whole(Centre), lambda pt, node: tuple([node.N * pt.mass * x for x in pt.x])),
+        eq.Sum(eq.whole(SquaredMass), lambda pt, node: (node.N * pt.mass * pt.mass,)),
+        eq.Sum(BROUGHT, lambda pt, node: (energy_of(node.N * pt.mass, momentum(pt, node)),)),
+    )
+
+
+@eq.reads("moment")
+def moment_again(pt):
+    """Part of the moment that is mapped again after the move."""
+    own = eq.moment(pt)
+    # With weights that never change, all is mapped again.
+    return mapped_again(pt.w.basis, pt.w.grid, own) if len(own) and pt.w.frame.moves else own
+
+
+class MomentumAgain(eq.NodalQuantity):
+    """Scatter momentum to the velocity array."""
+
+    not_at_corners = ("moments",)
+    records = "velocity"
+    says = "momentum to grid"
+    takes = eq.of_point(mass=eq.mass, v=eq.v, moment=moment_again)
+    gives = (eq.Sum(eq.VELOCITY, momentum, affine_momentum),)

@@ -1,0 +1,110 @@
+"""Tasks at the nodes between two visits of the points."""
+
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler.fields import SummedField, field
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag
+
+
+@point_function()
+def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
+    """Do `task` at node `n`. Nodes without mass stay at rest."""
+
+
+def node_task(tag: type) -> type:
+    """Register the function ``at_node`` of a task."""
+    at_node.on(tag)(vars(tag)["at_node"])
+    return tag
+
+
+def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
+    """Return one over the mass of a node, 0 where it has none."""
+    mass = nodes.sums[n, arrays.MASS]
+    return real(1, like) / mass if mass > 0 else real(0, like)
+
+
+def unlimited(seen, n, mass, light):
+    """Return the fraction of its velocity change that a node shows: 1 unless it is light."""
+    if seen is None:
+        return real(1, mass)
+    square = mass * mass
+    least = light * seen[n, 0]
+    return square / least if square < least else real(1, mass)
+
+
+class SquaredMass(SummedField):
+    """Sum of N m^2 at a node: divided by the sum of N m, the mean mass of its points (USL)."""
+
+    @staticmethod
+    def needed(basis):
+        """Return True if a basis makes light nodes that affect the gradient."""
+        return basis.traits.steep_edge
+
+
+@node_task
+class NodalUpdate(NamedTuple):
+    """v* = v + dt f / m from the sums."""
+
+    says = "update v*"
+    goes_through = ("sums", "update")
+
+    def at_node(task, kin, nodes, n, dt):
+        factor = per_mass(nodes, n, dt)
+        for k in range(kin.dimension):
+            dv = dt * nodes.sums[n, arrays.of_force(kin) + k] * factor
+            nodes.update[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor + dv
+            nodes.update[n, arrays.of_change(kin) + k] = dv
+
+
+@node_task
+class MomentumToVelocity(NamedTuple):
+    """The momentum in the velocity array over the mass: the re-mapped velocity of MUSL."""
+
+    says = "re-mapped velocity"
+    goes_through = ("sums", "velocity", "velocity")
+
+    def at_node(task, kin, nodes, n, dt):
+        factor = per_mass(nodes, n, dt)
+        for k in range(kin.dimension):
+            nodes.velocity[n, k] *= factor
+
+
+@node_task
+class SumsToVelocity(NamedTuple):
+    """Velocity from the momentum in the sums, before the update (USF)."""
+
+    says = "nodal velocity"
+    goes_through = ("sums", "velocity")
+
+    def at_node(task, kin, nodes, n, dt):
+        factor = per_mass(nodes, n, dt)
+        for k in range(kin.dimension):
+            nodes.velocity[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
+
+
+@node_task
+class UpdateToVelocity(NamedTuple):
+    """The velocity whose gradient deforms the points is v*, limited at light nodes (USL).
+
+    A point of mass m that gives a node the fraction N of it gets back the strain of f dt / (N m)
+    from there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes
+    lighter than `light` = d (c dt / h)^2 times the mean mass of the points that they see, weighted
+    with what these give, count as such; the limit vanishes with the step.
+    """
+
+    light: float
+
+    goes_through = ("sums", "update", "velocity")
+
+    def at_node(task, kin, nodes, n, dt):
+        # The change of a light node's velocity enters the gradient by the fraction of its mass.
+        # Points take the whole change: momentum is conserved.
+        one = real(1, dt)
+        share = unlimited(
+            field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light
+        )
+        for k in range(kin.dimension):
+            dv = nodes.update[n, arrays.of_change(kin) + k]
+            nodes.velocity[n, k] = nodes.update[n, k] - (one - share) * dv

@@ -1,0 +1,157 @@
+"""Strain: the state of the law follows from the velocity gradient sum_i v_i grad N_i."""
+
+from math import inf, sqrt
+
+from karamelo_py.compiler.compile import all_lanes, real, where
+from karamelo_py.compiler.fields import store, store_from
+from karamelo_py.kernels.equations import Report, Task, fbar
+from karamelo_py.kernels.views import place_at
+from karamelo_py.points import frames, laws, transfers
+from karamelo_py.points.basis import carried, deformed, extent
+from karamelo_py.points.kinematics import I, det, large, outer, zero
+
+
+class Strain(Task):
+    """Gather the gradient of the nodal velocity; update the state of the law."""
+
+    not_at_corners = ("moments",)
+    records = "velocity"
+    says = "stress"
+    reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
+    writes = ("state", "deformation gradient")
+
+    def empty(task, w, x):
+        gradient = zero(w.kin, x[0])
+        if _is_known(task, w):
+            gradient = transfers.straining(w.transfer, w.kin, gradient)
+        return gradient, fbar.no_ratio(w, x[0])
+
+    def gathered(task, node, total):
+        return add_gradient(node, total[0]), fbar.gathered_ratio(node, total[1])
+
+    def updated(task, pt, total, totals, fastest):
+        """Update the state of the law and the domain shape; report growth in cells, and rate."""
+        w, (gradient, ratio) = pt.w, total
+        if not len(gradient):  # the point stores it
+            gradient = totals[0][2]
+        dl = increment(pt.dt, gradient)
+        if isinstance(task, StrainOfLastStep):
+            dl = frames.of_places_before(w.frame, w.kin, dl)
+        dl = fbar.averaged(pt, dl, ratio)
+        law, old, f = pt.law_state_F
+        growth = frames.spatial_increment(w.frame, w.kin, dl, f)
+        load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
+        strained = large(growth) if load_step else growth  # domains grow by the whole gradient
+        beside = pt.load(fbar.PressureBeside, (pt.dt,))
+        state = laws.advance_beside(law, w.kin, old, strained, pt.dt, sum(beside))
+        store(w.points.state, pt.p, state)
+        now = frames.strained(w.frame, w.kin, f, dl)
+        store(pt.of(frames.DeformationGradient), pt.p, now)
+        j = laws.jacobian(law, w.kin, state)
+        grown = real(0, j)
+        if w.frame.moves and carried(w.basis, w.kin) == 0:
+            grown = grown + _deform_domain(task, pt, growth)
+        if not all_lanes(j > 0):
+            return Report(where(j > 0, grown, inf), fastest)
+        return Report(grown, _fastest_wave(pt, (law, state, now), fastest))
+
+
+class StrainOfLastStep(Strain):
+    """`Strain` with the velocity that led here, at the new positions."""
+
+
+class SecondStrain(Strain):
+    """`Strain` for the second of two strain increments of a step."""
+
+    records = ""
+    says = "second half of the stress"
+
+
+class StrainOfLoadStep(Strain):
+    """`Strain` for large rotations in a step (:func:`~karamelo_py.points.kinematics.large`).
+
+    Used by implicit schemes.
+    """
+
+    records = ""
+
+
+class StrainInMove(Strain):
+    """`Strain` in one visit after `Move`, without gathering again."""
+
+    records = ""
+
+
+class TrialStrain(Strain):
+    """Gather the gradient; compute only the volume ratio that it would cause (F-bar)."""
+
+    records = ""
+    says = "trial volume"
+    writes = ("volume ratio",)
+
+    def empty(task, w, x):
+        return zero(w.kin, x[0])
+
+    def gathered(task, node, total):
+        return add_gradient(node, total)
+
+    def updated(task, pt, total, totals, fastest):
+        dl = increment(pt.dt, total)
+        if isinstance(task, TrialStrainOfLastStep):
+            dl = frames.of_places_before(pt.w.frame, pt.kin, dl)
+        _, _, f = pt.law_state_F
+        dl = frames.spatial_increment(pt.w.frame, pt.kin, dl, f)
+        pt.of(fbar.VolumeRatio)[0, pt.p] = det(I + dl)
+        return Report(real(0, pt.dt), fastest)
+
+
+class TrialStrainOfLastStep(TrialStrain):
+    """`TrialStrain` for `StrainOfLastStep`."""
+
+
+def _is_known(task, w):
+    """Return True for a gradient that the transfer may already have from v*."""
+    return isinstance(task, StrainInMove) and not isinstance(w.averaging, fbar.FBar)
+
+
+def add_gradient(node, grad_v):
+    """Add the contribution of a node to the velocity gradient, if it is gathered."""
+    return grad_v + outer(node.v, node.strain_N) if len(grad_v) else grad_v
+
+
+def increment(dt, grad_v):
+    """Return dl = dt grad v, as numbers: F + dl is a sum of two of them."""
+    return grad_v._make(dt * grad_v)
+
+
+def _deform_domain(task, pt, growth):
+    """Deform the domain of a point; return by how many cells it reaches further."""
+    w = pt.w
+    x = w.places.y if isinstance(task, SecondStrain) else w.places.x
+    before = place_at(w.basis, w.kin, x, pt.p)
+    after = deformed(w.basis, w.kin, before, growth)
+    store_from(w.places.y, pt.p, w.kin.dimension, after)
+    return further_reach(w.basis, w.kin, w.grid, before, after)
+
+
+def further_reach(basis, kin, grid, before, after):
+    """Return by how many cells the domain of a point reaches further than before."""
+    further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
+    return max(further, 0)
+
+
+def _fastest_wave(pt, material, fastest):
+    """Return the larger of `fastest` and c + max |v_i - common_i| of a point.
+
+    `material` is law, state and F. The wave speed c is computed only for the few points that may be
+    faster than all before them.
+    """
+    w, (law, state, now) = pt.w, material
+    shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
+    most = laws.wave_speed_bound(law, w.kin, state) * shorter
+    speed = (pt.v - w.common).largest()
+    slack = fastest - speed
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # in this form, NaN is noticed too
+        return fastest
+    rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
+    return where(fastest > rate, fastest, rate)

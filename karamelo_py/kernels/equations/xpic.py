@@ -1,0 +1,80 @@
+"""XPIC: the terms w_k = (1 - S+ S)^k S+ v of its series, from the nodes to the points and back."""
+
+from collections import namedtuple
+from typing import NamedTuple
+
+from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.fields import field, store, vector
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.loss import reflect, term_at
+from karamelo_py.kernels.equations.node_updates import node_task, per_mass
+from karamelo_py.points.transfers.xpic import Series, TermOfSeries
+
+
+class SeriesTerm(namedtuple("SeriesTerm", "k"), eq.Task):
+    """Gather term `k` of the series, from 0."""
+
+    says = "term of the series to the points"
+    reads = ("x",)
+    writes = ("term of series",)
+
+    def empty(task, w, x):
+        return x - x
+
+    def gathered(task, node, total):
+        return total + node.N * term_at(node, total)
+
+    def updated(task, pt, total, totals, fastest):
+        store(pt.of(TermOfSeries), pt.p, total)
+        reflect(pt, total, task.k)
+        return eq.Report(real(0, pt.dt), fastest)
+
+
+@eq.reads("term of series")
+def term(pt):
+    """Term of the series at a point, (d,)."""
+    return pt.load(TermOfSeries, pt.v)
+
+
+class SeriesBack(eq.NodalQuantity):
+    """Scatter the term of the series, times mass, to the second vector of `Series`."""
+
+    says = "term of the series to the grid"
+    takes = eq.of_point(mass=eq.mass, term=term)
+    gives = (
+        eq.Sum(
+            eq.NodeColumns(Series, vector, vector, Series.shape),
+            lambda pt, node: node.N * pt.mass * pt.term,
+        ),
+    )
+
+
+@node_task
+class StartSeries(NamedTuple):
+    """First term of the series: the velocity v; the new one as far as it is known."""
+
+    goes_through = ("sums", "series", "update", "update")
+
+    def at_node(task, kin, nodes, n, dt):
+        series = field(nodes.fields, Series)
+        factor = per_mass(nodes, n, dt)
+        for k in range(kin.dimension):
+            series[n, k] = nodes.sums[n, arrays.of_momentum(kin) + k] * factor
+            nodes.update[n, arrays.of_change(kin) + k] = nodes.update[n, k]
+
+
+@node_task
+class ExtendSeries(NamedTuple):
+    """Next term of the series, in the new velocity, too."""
+
+    goes_through = ("sums", "series", "series", "update", "update")
+
+    def at_node(task, kin, nodes, n, dt):
+        d = kin.dimension
+        series = field(nodes.fields, Series)
+        factor = per_mass(nodes, n, dt)
+        for k in range(d):
+            v = series[n, k] - series[n, d + k] * factor
+            series[n, k] = v
+            nodes.update[n, arrays.of_change(kin) + k] += v

@@ -1,0 +1,91 @@
+"""Sums at nodes of what the points of all tiles gave, in one order for any number of threads."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.compile import index
+from karamelo_py.compiler.held import at_hand
+from karamelo_py.compiler.lanes.records import move_record
+from karamelo_py.compiler.threads import by_threads
+from karamelo_py.compiler.tuples import put_at
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Buffers, Nodes, Tag
+from karamelo_py.kernels.equations import found
+
+
+def adds(quantity: NamedTuple) -> bool:
+    """Return True if a quantity adds to the values at the nodes."""
+    return type(quantity).adds  # type: ignore[attr-defined]
+
+
+def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
+    """List the columns that take all the quantities; adjacent ones are one entry."""
+    ends: dict[tuple[Any, int], int] = {}  # the first column of each array that ends there
+    for one in [one for quantity in quantities for one in type(quantity).gives]:
+        array, first = one.into.array, one.into.first(kin)
+        ends[array, one.into.end(kin)] = ends.pop((array, first), first)
+    return [(array, first, end) for (array, end), first in ends.items()]
+
+
+def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[Any, int, bool]]:
+    """List each column that takes the quantities, of arrays that are present; those adding last."""
+    turns = sorted(quantities, key=adds)
+    sums = [(one.into, adds(quantity)) for quantity in turns for one in type(quantity).gives]
+    return [
+        (into.array, into.first(kin) + k, add)
+        for into, add in sums
+        if into.array in present
+        for k in range(into.count(kin))
+    ]
+
+
+def arrays_given(quantities: tuple, kin: Tag) -> int:
+    """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
+    names = {name for name, _, _ in columns_of(quantities, kin)}
+    fields = any(not isinstance(name, str) for name in names)
+    return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
+
+
+def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
+    for kind in (False, True):
+        chosen = tuple(q for q in quantities if adds(q) == kind)
+        yield from ((*columns, kind) for columns in columns_of(chosen, kin))
+
+
+def _take_record(quantities, kin, nodes, n, buffers, m, keep):
+    """Move record `m` of the buffers to node `n`, adding or replacing; the record becomes zero."""
+    for name, first, end, add in _columns(quantities, kin):
+        array = found(nodes, name)
+        if array is not None:
+            like = (0,) * (end - first)
+            move_record(array, n, found(buffers, name), m, first, like, add or keep)
+
+
+def _clear_record(quantities, kin, nodes, n):
+    """Clear the columns of node `n` for the quantities, except those that add."""
+    for name, first, end, add in _columns(quantities, kin):
+        array = found(nodes, name)
+        if array is not None and not add:
+            put_at(array, n, first, (0,) * (end - first))
+
+
+@by_threads
+def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
+    """Sum the quantities at the nodes of a part, tile after tile, box after box."""
+    nodes, buffers = at_hand(nodes), at_hand(buffers)
+    first, parts = buffers.first, buffers.parts
+    for part in range(first[share], first[share + 1]):
+        what, count = parts[part, 9], parts[part, 4]
+        for i in range(parts[part, 2]):
+            for j in range(parts[part, 3]):
+                n = parts[part, 0] + i * parts[part, 5] + j * parts[part, 6]
+                m = parts[part, 1] + i * parts[part, 7] + j * parts[part, 8]
+                if what == arrays.CLEAR:
+                    for k in range(count):
+                        _clear_record(quantities, kin, nodes, index(n + k))
+                else:
+                    for k in range(count):
+                        _take_record(
+                            quantities, kin, nodes, index(n + k), buffers.nodes, index(m + k),
+                            what == arrays.ADD,
+                        )  # fmt: skip

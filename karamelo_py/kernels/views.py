@@ -1,0 +1,186 @@
+"""Views of a visit: what equations read of a point, `pt`, and of a node that it sees, `node`.
+
+An equation such as ``node.N * pt.mass`` is a function of these two. Views exist while a kernel is
+traced; no kernel contains them. docs/house/kernels.md lists the attributes, with shapes and units.
+"""
+
+from collections import namedtuple
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.algebra import algebra
+from karamelo_py.compiler.compile import Weighted, index, prefetch
+from karamelo_py.compiler.fields import field, load, load_vector
+from karamelo_py.compiler.gpu import aligned_record
+from karamelo_py.compiler.loops import many_threads
+from karamelo_py.compiler.tuples import count_in, record, row
+from karamelo_py.kernels.arrays import (
+    Index,
+    Nodes,
+    Number,
+    Places,
+    Points,
+    Tag,
+    of_change,
+    vector_at,
+)
+from karamelo_py.points.basis import affine_weight, blank, entry, reach, support
+from karamelo_py.points.frames import DeformationGradient
+from karamelo_py.points.grid import Grid
+from karamelo_py.points.kinematics import vector, zero
+from karamelo_py.points.laws import deformation, initial_state, jacobian, specific_volume
+from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
+
+
+class Work(NamedTuple):
+    """Arrays and tags of a visit to a point; made once per tile."""
+
+    frame: Tag
+    kin: Tag
+    basis: Tag
+    grid: Grid
+    transfer: Tag
+    averaging: Tag
+    nodes: Nodes
+    points: Points
+    laws: NamedTuple  # parameters of the materials, an array (m,) each
+    places: Places
+    common: tuple  # (d,) velocity that speeds are measured from
+    kick: Number  # how long forces act in the step
+
+
+@algebra
+class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
+    """The k-th node of the stencil of a point."""
+
+    __slots__ = ()
+    kin = property(lambda node: node.w.kin)
+    transfer = property(lambda node: node.w.transfer)
+    strain_N = property(lambda node: gradient_weight(node.w.transfer, node))
+
+    @property
+    def arm(self):
+        """X_i - x."""
+        w = self.w
+        return reach(w.basis, w.kin, w.grid, self.stencil, self.k)
+
+    @property
+    def affine_N(self):
+        """N_i D^-1 (X_i - x)."""
+        w = self.w
+        return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
+
+    def v_star(self, like):
+        """v* and v* - v: one record in 2D, two in 3D; `like` is a vector."""
+        kin, records, i = self.w.kin, self.w.nodes.update, self.i
+        first, d = of_change(kin), kin.dimension
+        if many_threads() and not isinstance(i, Weighted):  # adjacent records
+            both = aligned_record(records, i, 2 * first)
+            return vector(kin, both[:d]), vector(kin, both[first : first + d])
+        if d == 2:
+            both = row(records, i, 0, (*like, *like))
+            return vector(kin, both[:2]), vector(kin, both[2:])
+        return vector_at(kin, records, i, 0, like), vector_at(kin, records, i, first, like)
+
+    @property
+    def v(self):
+        """The velocity that deforms the points."""
+        kin, records = self.w.kin, self.w.nodes.velocity
+        if many_threads() and not isinstance(self.i, Weighted):
+            return vector(kin, aligned_record(records, self.i, of_change(kin))[: kin.dimension])
+        return vector_at(kin, records, self.i, 0, self.grad_N[: kin.dimension])
+
+    def of(self, kind):
+        """The array of a field of nodes, or None."""
+        return field(self.w.nodes.fields, kind)
+
+
+@algebra
+class PointView(namedtuple("PointView", "w stencil p dt")):
+    """A point, or points in lanes, in a gather or an update."""
+
+    __slots__ = ()
+    kin = property(lambda pt: pt.w.kin)
+    v = property(lambda pt: load_vector(pt.w.kin, pt.w.points.v, pt.p))
+    x = property(lambda pt: load_vector(pt.w.kin, pt.w.places.x, pt.p))
+    y = property(lambda pt: load_vector(pt.w.kin, pt.w.places.y, pt.p))
+    law_and_state = property(lambda pt: state_at(pt.w.kin, pt.w.points, pt.w.laws, pt.p))
+
+    @property
+    def law_state_F(self):
+        """Its law, the state, and F as `deformation_of`."""
+        w, material = self.w, self.law_and_state
+        return *material, deformation_of(w.frame, w.kin, w.points, material, self.p)
+
+    @property
+    def nodes(self):
+        """The nodes that it sees."""
+        w = self.w
+        return tuple([node_of(w, self.stencil, k) for k in range(support(w.basis, w.kin))])
+
+    def of(self, kind):
+        """The array of a field of points, or None."""
+        return field(self.w.points.fields, kind)
+
+    def load(self, kind, like):
+        """Components 0, 1, ... of a field, as `like` has them; () where there is none."""
+        return load(self.of(kind), self.p, like)
+
+
+def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
+    """Load the place (w,) of point `p`: its position and the shape of its domain."""
+    return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
+
+
+def node_of(w: Work, stencil: tuple, k: int) -> NodeView:
+    """Return the view of the k-th node of a stencil."""
+    return NodeView(w, stencil, k, *entry(w.basis, w.kin, w.grid, stencil, k))
+
+
+def law_at(points: Points, laws: NamedTuple, p: Index) -> Tag:
+    """Load the law of point `p`, with the parameters of its material."""
+    return record(laws, index(points.material[p]))  # type: ignore[arg-type]
+
+
+def state_at(kin: Tag, points: Points, laws: NamedTuple, p: Index) -> tuple:
+    """Load the law of point `p` and its state."""
+    law = law_at(points, laws, p)
+    return law, load(points.state, p, initial_state(law, kin, points.mass[p]))
+
+
+def volume_of(kin: Tag, points: Points, law: Tag, state: tuple, p: Index) -> Number:
+    """Return the present volume of point `p`."""
+    return points.mass[p] * specific_volume(law) * jacobian(law, kin, state)
+
+
+def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Index) -> tuple:
+    """Return the deformation gradient F of a point where the frame needs it, else ().
+
+    `material` is its law and state.
+    """
+    if frame.moves:
+        return ()
+    law, state = material
+    f = load(field(points.fields, DeformationGradient), p, zero(kin, points.mass[p]))
+    return f if len(f) else deformation(law, kin, state)
+
+
+def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
+    """Prefetch the data of the next points in 3D.
+
+    Points with velocity moments are visited once per step with all their arrays, more than the
+    hardware prefetcher follows. So are the arrays that the update of a stretch of points needs
+    (`apart`) while it gathers.
+    """
+    d, fields = w.kin.dimension, w.points.fields
+    moment = len(zero_moment(w.transfer, w.kin, like))
+    if d == 3 and (apart or moment):
+        state = count_in(initial_state(law_at(w.points, w.laws, p), w.kin, like))
+        more = (field(fields, Moment), moment)
+        if apart:
+            more = (field(fields, DeformationGradient), w.kin.tensor_size)
+        for array, rows in ((w.places.x, d), (w.points.v, d), more, (w.points.state, state)):
+            if array is not None:
+                for k in range(rows):
+                    prefetch(array, (k, p))
