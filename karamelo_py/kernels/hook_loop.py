@@ -470,7 +470,7 @@ def _change_velocity(what, call, c, q):
     # Strain before the forces belongs to the last step, and to the hooks that held then.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
-    # v* before the forces is that of the step before.
+    # Before the forces, v* belongs to the previous step.
     remaps = hook.stage == arrays.POST_VELOCITIES_TO_GRID
     star = last if remaps or (strains_first and last == value) else v
     state, force = (nodes.sums[n, arrays.MASS], v, star), nodes.sums[n, arrays.of_force(kin) + c]

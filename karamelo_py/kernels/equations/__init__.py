@@ -82,7 +82,7 @@ class NodalQuantity(NamedTuple):
     not_at_corners = ()
     records = ""  # array of nodes whose records are prefetched, if any
     adds = False  # to the present values at the nodes, instead of replacing them
-    also_reads = ()  # fields of points, besides those of `takes`
+    also_reads = ()  # fields of points, in addition to `takes`
     takes = of_point()
     gives = ()
 

@@ -112,7 +112,7 @@ def minus_V_stress_beside(pt):
 
 
 class AveragedForce(eq.NodalQuantity):
-    """Scatter the force of the averaged mean stress less that of the point's; added to forces."""
+    """Add the force of the averaged mean stress minus the point's mean stress."""
 
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"

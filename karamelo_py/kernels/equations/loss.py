@@ -143,7 +143,7 @@ def in_company(pt, moment):
         return moment
     mass = pt.w.points.mass[pt.p]
     one, share = real(1, mass), mass - mass
-    for node in pt.nodes:  # the share of the point in the mass of its nodes
+    for node in pt.nodes:  # the point's fraction of the mass of its nodes
         share += node.N * node.N * mass / max(lost[node.i, 2], real(1e-36, mass))
     kept = (one - share) / real(1 - ALONE**pt.kin.dimension, mass)
     return max(min(kept, one), mass - mass) * moment

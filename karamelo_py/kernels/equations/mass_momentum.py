@@ -49,7 +49,7 @@ def affine_momentum(pt, w):
 
 
 class MassMomentum(eq.NodalQuantity):
-    """Scatter mass and momentum; that of rigid points with separate sums to these."""
+    """Scatter mass and momentum; rigid points with separate sums scatter to these."""
 
     not_at_corners = ("moments", "loss")
     records = "sums"
