@@ -124,8 +124,8 @@ def is_last(s):
 class Stage:
     """A visit of the points in a step, as functions of threads: `row` is one of its scheme's.
 
-    `columns` are those of the nodes that it fills, (array, column, whether it adds), of the arrays
-    that are `present`. The nodes that the points of a cell see are summed in `parts`.
+    `columns` are the columns of the nodes that it fills, (array, column, whether it adds), in the
+    arrays that are `present`. The nodes that the points of a cell see are summed in `parts`.
     """
 
     def __init__(self, row: Any, s: Any, present: list):
