@@ -429,7 +429,7 @@ def test_no_file_to_go_on_from(run_interpreted, content):
     says = {
         None: "there is no file bad.h5",
         4: "bad.h5 has format 4, of an older karamelo-py",
-        99: "without this file, or go on with the newer karamelo-py that wrote it",
+        99: "without this file, or with the newer karamelo-py that wrote it",
     }
     assert says.get(content, "is not a restart file of this program") in result.err
     assert result.err.count("error:") == 1
