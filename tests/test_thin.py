@@ -180,7 +180,7 @@ def test_a_plate_has_the_mass_of_its_thickness(run_interpreted):
 @pytest.mark.parametrize(
     ("line", "before", "says"),
     [
-        ("dimension(3, 0, 2, 0, 2, 0, 2, 0.25)", "", "plane_stress is for 2D scenes"),
+        ("dimension(3, 0, 2, 0, 2, 0, 2, 0.25)", "", "3 dimensions, not 2"),
         ("dimension(1, 0, 2, 0.25)", "", "uniaxial_stress"),
         ("axisymmetric(true)", "dimension(2, 0, 2, 0, 2, 0.25)\n", "axisymmetric"),
         (

@@ -140,6 +140,12 @@ def axisymmetric(hub: Hub, active: bool) -> None:
             argument="active",
             expected="dimension(2, 0, ...), or more than 0 instead of 0",
         )
+    if active and domain.thin:
+        raise ScriptError(
+            "the scene has plane stress, which has no stress around an axis",
+            argument="active",
+            expected="plane_stress(false)",
+        )
     if hub.solids and active != domain.axisymmetric:
         raise ScriptError(
             "the points of solids are made already",

@@ -71,17 +71,18 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 
 def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float) -> None:
     domain = require_domain(hub)
-    if domain.dimension != dimension or (active and domain.axisymmetric):
-        kind = "an axisymmetric one" if domain.axisymmetric else f"{domain.dimension}D"
+    if domain.dimension != dimension:
         raise ScriptError(
-            f"{command} is for {dimension}D scenes, and this one is {kind}",
+            f"the scene has {domain.dimension} dimensions, not {dimension}",
             argument="active",
-            expected=f"dimension({dimension}, ...) before {command}(true)"
-            if domain.dimension != dimension
-            else "axisymmetric(false)",
-            hint={1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
-            if not domain.axisymmetric
-            else None,
+            expected=f"dimension({dimension}, ...) before {command}(true)",
+            hint={1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension),
+        )
+    if active and domain.axisymmetric:
+        raise ScriptError(
+            "the scene is axisymmetric, which has stress around the axis",
+            argument="active",
+            expected="axisymmetric(false)",
         )
     if hub.materials and active != domain.thin:
         first = next(iter(hub.materials))
