@@ -1,4 +1,4 @@
-"""Billet pressed flat between platens that hold it, in 3D: load and shape beside axisymmetry."""
+"""Billet pressed flat between platens that hold it, in 3D: load and shape against axisymmetry."""
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def compare(run, axes, full):
         here, there = loads(space, press), loads(flat, press)
         yield Row(f"load at {press:.0%} (kN)", there, here, 0.03, SOURCE)
     for press in (0.2, 0.4):
-        name = f"load at {press:.0%} over that of a cylinder"
+        name = f"load at {press:.0%} over a cylinder's"
         ratio = loads(flat, press) / uniform(press)
         yield Row(name, (1, sticking(press)), ratio, 0.01, "limit analysis (Siebel 1923)")
     yield Row("largest radius at 60 % (mm)", flat.radius[-1], space.radius[-1], 0.03, SOURCE)

@@ -1,4 +1,4 @@
-"""Copper ball on copper at 500 m/s, a quarter in 3D: strain and heat beside axisymmetry."""
+"""Copper ball on copper at 500 m/s, a quarter in 3D: strain and heat against axisymmetry."""
 
 import numpy as np
 

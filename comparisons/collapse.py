@@ -1,4 +1,4 @@
-"""Heap of aluminium bars let go on one side: what is left, against the experiment of Bui et al."""
+"""Heap of aluminium bars released on one side: what is left, against Bui et al. (experiment)."""
 
 from math import atan, degrees
 from pathlib import Path

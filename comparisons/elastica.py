@@ -1,4 +1,4 @@
-"""Beam that bends by 80 % of its length in load steps: error and cost, beside explicit runs."""
+"""Beam that bends by 80 % of its length in load steps: error and cost, against explicit runs."""
 
 from comparisons.cost import chart
 from comparisons.exact import elastica

@@ -11,7 +11,7 @@ SMALL = {}
 def compare(run, axes, full):
     """Volumes averaged against locking; in full also not, where the load goes on rising."""
     limit = prandtl_load(1)
-    cases = {"volumes averaged": ({}, limit, 0.05)}
+    cases = {"F-bar": ({}, limit, 0.05)}
     if full:
         words = {"phi": 20, "v": 0.16}
         cases["friction and dilatancy of 20 degrees"] = words, prandtl_load(1, radians(20)), 0.08

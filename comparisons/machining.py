@@ -1,4 +1,4 @@
-"""Tool that cuts steel at 50 m/s: force of the cut beside Merchant's, energy, chip."""
+"""Tool that cuts steel at 50 m/s: force of the cut against Merchant's, energy, chip."""
 
 from math import atan, cos, pi, sin, sqrt
 
@@ -39,10 +39,10 @@ def compare(run, axes, full):
         last = result.snapshots("machining")[-1]
         cut = (last.y0 > 0.1e-3) & (last.x0 > 1e-3 - 50 * TIME)
         broken = np.average(last.damage[cut] > 0.99, weights=last.mass[cut])
-        yield Row(f"broken share of what was cut{cells}", (0.02, 1), broken, 0.0, "chips come off")
+        yield Row(f"broken fraction of the chip{cells}", (0.02, 1), broken, 0.0, "chips come off")
         below = last.y0 < 0.05e-3
         deep = np.average(last.damage[below] > 0.99, weights=last.mass[below])
-        yield Row(f"broken share deep below the cut{cells}", 0.0, deep, 0.01, "the piece holds")
+        yield Row(f"broken fraction deep below the cut{cells}", 0.0, deep, 0.01, "the piece holds")
     coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain (1)", limits=(0, 2))
     axes.fill([0.75, 0.775, 1], [0.1, 0.35, 0.125], color="0.6", lw=0)
     axes.text(0.84, 0.2, "tool", ha="center", fontsize=8)

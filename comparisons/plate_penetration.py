@@ -21,7 +21,7 @@ def compare(run, axes, full):
     there = (log.Time > 0.7 * THROUGH) & (log.Time < 1.4 * THROUGH)
     # Artificial viscosity and the heat of shear are in it, too.
     yield Row("pressure behind the shock (GPa)", PRESSURE, log.p[there].mean(), 0.2, "Hugoniot")
-    yield Row("momentum over that of the ball", 1.0, -log.P_z[5] / (MASS * V), 0.03, "exact")
+    yield Row("momentum over the ball's", 1.0, -log.P_z[5] / (MASS * V), 0.03, "exact")
     # Later, what splashes back leaves the domain.
     kept = log.P_z[log.Time < 5e-6][-1] / log.P_z[0]
     yield Row("momentum at 5 us over that at first", 1.0, kept, 1e-6, "exact")

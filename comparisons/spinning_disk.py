@@ -1,4 +1,4 @@
-"""Disk that spins freely: angular momentum and energy after a turn."""
+"""Disk that spins freely: angular momentum and energy after a revolution."""
 
 from math import pi
 

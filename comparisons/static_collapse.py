@@ -1,4 +1,4 @@
-"""Blocks of clay and of sand that flow under their weight: load steps beside explicit ones."""
+"""Blocks of clay and of sand that flow under their weight: load steps against explicit ones."""
 
 from comparisons.lines import surface
 from comparisons.pictures import coloured

@@ -1,4 +1,4 @@
-"""Column under its own weight in load steps: error and cost, beside explicit runs."""
+"""Column under its own weight in load steps: error and cost, against explicit runs."""
 
 from comparisons.cost import chart
 from comparisons.row import Row

@@ -1,4 +1,4 @@
-"""Rigid strip pressed into clay in load steps: error and cost, beside explicit runs."""
+"""Rigid strip pressed into clay in load steps: error and cost, against explicit runs."""
 
 from comparisons.cost import chart
 from comparisons.exact import prandtl_load
@@ -20,12 +20,12 @@ def compare(run, axes, full):
     averaged = {"basis": "linear", "bar": "true", "v": 0.04}
     runs = {
         "implicit, quadratic-spline": [run(refine=n) for n in refine],
-        "implicit, volumes averaged": [run(refine=n, **averaged) for n in refine],
+        "implicit, F-bar": [run(refine=n, **averaged) for n in refine],
     }
     if full:
         splines = {"basis": "quadratic-spline", "bar": "false"}
         runs["explicit, quadratic-spline"] = [run("footing", refine=n, **splines) for n in refine]
-        runs["explicit, volumes averaged"] = [run("footing", refine=n) for n in refine]
+        runs["explicit, F-bar"] = [run("footing", refine=n) for n in refine]
     found = chart(axes, runs, error)
     axes.set(ylabel="relative error of the load (1)")
     for name, points in found.items():

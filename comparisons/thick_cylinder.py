@@ -17,12 +17,12 @@ def compare(run, axes, full):
     for refine in (0.25, 0.5, 1, 2) if full else (1,):
         result = run(refine=refine)
         pressure, cells = result.log.pressure, int(16 * refine)
-        name = f"pressure that the wall bears, over the yield stress, {cells} cells"
+        name = f"limit pressure of the wall, over the yield stress, {cells} cells"
         yield Row(name, BEARS, pressure[-1], 0.01 / refine, source)
         axes.plot(result.log.Time / 30 * 4, pressure, label=f"{cells} cells")
         if refine == 1:
             share = pressure[1] / (E / (1 + NU) * 4 / 30 / E / ((1 - 2 * NU) + 4) * 3)
-            yield Row("first step, over that of an elastic wall", 1.0, share, 0.002, "Lame 1852")
+            yield Row("first step, over an elastic wall's", 1.0, share, 0.002, "Lame 1852")
             last = result.snapshots("cylinder")[-1]
             # Sums over the points of a cell: inside one the strain of linear functions is constant.
             order = np.argsort(last.x)

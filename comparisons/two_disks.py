@@ -1,4 +1,4 @@
-"""Two elastic disks that bounce: energies beside Karamelo's, contact beside the exact time."""
+"""Two elastic disks that bounce: energies against Karamelo's, contact against the exact time."""
 
 from pathlib import Path
 

@@ -231,7 +231,7 @@ COMMANDS = [
     ("method(mpm, FLIP, linear, 1)", 8, "hint: ulmpm, or tlmpm"),
     ("material(m2, linear, 1000; 1000, 0.3)", 22, "hint: is a comma missing in '1000; 1000'?"),
     ("material(m2, linear, 1000, 1,000,000, 0.3)", 34, "hint: commas separate arguments: a mill"),
-    ("dump(d, all, movie, 5, d.gif, seq)", 1, "hint: the size stands behind the file: dump(ID"),
+    ("dump(d, all, movie, 5, d.gif, seq)", 1, "hint: the size comes after the file: dump(ID"),
     ("E = 1e5\nlog_modify(custom, step, Ek)", 26, "hint: compute(Ek, kinetic_energy, all)"),
     ("material(c, johnson_cook, 1, 2)", 13, "'johnson_cook' is a style of strength"),
     ("fix(t, max_position, all)", 8, "is a style of compute"),

@@ -1,4 +1,4 @@
-"""The weight of clay beside a vertical cut grows until it fails."""
+"""The weight of clay next to a vertical cut grows until it fails."""
 
 from comparisons.defaults import Case
 

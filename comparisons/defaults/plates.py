@@ -3,7 +3,7 @@
 from comparisons.defaults import Case
 
 CASE = Case(
-    quantity="pressure behind a shock in copper at 500 m/s over that of Rankine and Hugoniot",
+    quantity="pressure behind a shock in copper at 500 m/s over Rankine and Hugoniot's",
     exact=1.0,
     measure=lambda result: float(result.log.ratio[-10:].mean()),
     source="Hugoniot curve, Meyers 1994",

@@ -3,7 +3,7 @@
 from comparisons.defaults import Case
 
 CASE = Case(
-    quantity="energy and heat at rest over those of the start",
+    quantity="energy and heat at rest over the initial ones",
     exact=1.0,
     measure=lambda result: result.log.E[-1] / result.log.E[0],
     source="first law",

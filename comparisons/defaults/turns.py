@@ -3,7 +3,7 @@
 from comparisons.defaults import Case
 
 CASE = Case(
-    quantity="angular momentum after 5 turns over that at first",
+    quantity="angular momentum after 5 revolutions over the initial one",
     exact=1.0,
     measure=lambda result: result.log.L_z[-1] / result.log.L_z[0],
     source="conservation",
