@@ -149,7 +149,7 @@ def words_at_end(scene: Any) -> dict[str, str]:
     if found.lost <= TOLD:
         return {}
     words = f"{found.cells:.2g} cells of the grid while it was stressed"
-    much = f"some {found.percent:.0f} % of its pressure with linear functions"
+    much = f"some {found.percent:.0f} % of its pressure with a linear basis"
     if hub.update.first_time(CROSSING):
         hub.warn(
             f"{CROSSING}: matter has moved through {words}, and lost {much}",

@@ -27,11 +27,11 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import read_script
 
 PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities that come from the grid
-TURN = 0.3  # angle, in radian, beyond which a scene is said to turn
+TURN = 0.3  # angle, in radian, beyond which a scene counts as rotating
 
 
 class Vibration(NamedTuple):
-    """Strain by which a solid swings that is stretched evenly, and in how many periods."""
+    """Strain amplitude of a solid that is stretched uniformly, and in how many periods."""
 
     strain: float
     periods: float
@@ -108,7 +108,7 @@ class SceneFacts:
 
     @cached_property
     def turn(self) -> float:
-        """Find the angle by which the solid that turns most would turn if none held it."""
+        """Find the angle by which the solid that rotates most would rotate if nothing held it."""
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((one.spin for one in self.motions), default=0.0) * self.duration
@@ -145,7 +145,7 @@ class SceneFacts:
 
     @cached_property
     def free_turns(self) -> float:
-        """Return the turns of the solid that turns most and is held nowhere."""
+        """Return the revolutions of the solid that rotates most and is held nowhere."""
         free = [one.spin for one in self.motions if self.turn > TURN and not held(self, one).any()]
         return max(free, default=0.0) * self.duration / (2 * pi)
 
@@ -171,7 +171,7 @@ class SceneFacts:
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Estimate the vibration of the solid that swings most."""
+        """Estimate the vibration of the solid that vibrates most."""
         most = Vibration(0.0, 0.0)
         for one in self.motions if self.waves > 0 else ():
             strain = one.rate * one.size / (2 * self.waves)
@@ -204,8 +204,8 @@ class SceneFacts:
     def bending(self) -> float:
         """Estimate the strain of the slenderest solid if its weight or its motion bends it.
 
-        A cantilever of the length L and the height H bears 3 g L^2 / (H c^2) at its clamp; the
-        kinetic energy of a beam becomes that of strains up to sqrt(3) v / c.
+        A cantilever of the length L and the height H has a strain of 3 g L^2 / (H c^2) at its
+        clamp; the kinetic energy of a beam becomes strain energy, with strains up to sqrt(3) v / c.
         """
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:

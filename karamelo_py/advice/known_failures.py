@@ -1,4 +1,4 @@
-"""Warnings before a run: combinations that are known to fail, with the reason and the cure.
+"""Warnings before a run: combinations that are known to fail, with reason and fix.
 
 Parts of the scene say them by their rules (`karamelo_py.language.rules`), by the name that the
 documentation has for the failure; here is what no part says. `karamelo-py check` tells them, and a
@@ -172,7 +172,7 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
         yield Advice(
             f"{DOUBTED_UNITS}velocities",
             f"points move at {s.fastest:.3g}, {s.speed:.3g} times the speed of waves "
-            f"({s.waves:.3g}), which no solid bears when it meets another or a wall. The units of "
+            f"({s.waves:.3g}), which no solid sustains when it hits another or a wall. The units of "
             "velocities, densities and moduli may be mixed",
             UNITS,
         )
@@ -224,11 +224,11 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 def warn_about_factor(hub: Hub) -> None:
     """Tell, once, that implicit steps have no stable step to take a share of."""
     update = hub.update
-    # Beside set_dt dt_factor has said so itself.
+    # With set_dt, dt_factor has said so itself.
     idle = update.dt_factor is not None and update.fixed_dt is None
     if idle and update.first_time("dt_factor"):
         hub.warn(
-            "dt_factor has no effect: load steps are those of set_dt, or 1",
+            "dt_factor has no effect: load steps are set by set_dt, or 1",
             place=update.dt_place,
             hint="set_dt(...) instead",
             code="dt-factor-ignored",
@@ -273,7 +273,7 @@ def _tell(hub: Hub, said: Iterable[Advice]) -> None:
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Sum the duration of the runs behind the next one that have the same scene, if known."""
+    """Sum the duration of the runs after the next one that have the same scene, if known."""
     present = step_of(hub, False).scene
     later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -294,7 +294,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
     """Say so when single precision cannot hold what a step adds to a position.
 
     Where nothing moves yet, by the size of cells: a block that falls at 50 000 cells from the
-    origin is wrong by 3.5 % of its way, and at 200 000 it stands still.
+    origin is wrong by 3.5 % of its way, and at 200 000 it does not move.
     """
     if s.hub.settings.precision != "single":
         return
@@ -352,6 +352,6 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
     for group in hub.groups.values():
         if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
             group.awaits_solids = False
-            hint = "nodes belong to the solids here: fix contact/surface makes walls beside them"
+            hint = "nodes belong to the solids here: fix contact/surface makes walls next to them"
             said = f"group '{group.id}' holds no nodes; {NOTHING_THERE}"
             hub.warn(said, group.place, hint, code="no-nodes")

@@ -120,7 +120,7 @@ def uneven(scene: Any) -> Uneven:
 def _touch(scene: Any, one: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
     """Return which bodies lie within a cell of one, or meet it before the run ends, (n,)."""
     touching = (np.maximum(one.low - boxes.high, boxes.low - one.high) < h).all(axis=1)
-    # Reflected, what is behind lies ahead.
+    # Reflected, so the back is in front.
     behind = one._replace(centre=-one.centre, velocity=-one.velocity, low=-one.high, high=-one.low)
     others = BodyBoxes(-boxes.centre, -boxes.velocity, -boxes.high, -boxes.low)
     first = np.minimum(meetings(one, boxes, h), meetings(behind, others, h)).min(axis=1)

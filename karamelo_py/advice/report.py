@@ -76,7 +76,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         why = unknown_work(hub)
         say(f"energy         {not_watched(why) if why else 'is monitored'}")
     say(f"threads        {simulation.threads}")
-    say(f"set-up         {set_up:.2g} s from the start of the program on, beside compiling")
+    say(f"set-up         {set_up:.2g} s from the start of the program on, without compiling")
     say("")
     say(f"{'':<34}numbers     bytes")
     for block in s.blocks:
@@ -96,7 +96,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"               {_size(sum(memory) + own + LOADED)} with the program itself")
     if (there := machine_memory.machine_memory()) is not None:
         free = _size(there.free)
-        say(f"               {free} are free on this machine, beside what check has taken")
+        say(f"               {free} are free on this machine, not counting what check has taken")
     if hub.settings.card:
         _say_of_gpu(say, simulation)
     if hub.settings.ranks > 1:

@@ -19,7 +19,7 @@ Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from which a linear basis locks
 LARGE = 100_000  # points from where on their numbers are read from memory
 RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
-# Seconds of a core (Intel Xeon): a point in a step of linear functions, a line of the log, a
+# Seconds of a core (Intel Xeon): a point in a step with a linear basis, a line of the log, a
 # picture and the first one, a file of points and a number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 0.5  # seconds of output that count

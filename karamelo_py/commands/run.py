@@ -27,7 +27,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
     """Carry out a run command of a `length` (see `RunLoop`), or what stands for it now.
 
     A rehearsal takes note of it, a program stops in front of it, and ``check`` reports in its
-    place; a run that was over in the file that a script goes on from is passed over.
+    place; a run that was over in the file that a script continues from is skipped.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)

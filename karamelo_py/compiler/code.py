@@ -284,7 +284,7 @@ def item_pointer(
 
 
 def byte_pointer(builder: Any, pointer: Any, offset: Any) -> Any:
-    """Give the address so many bytes behind another."""
+    """Compute the address at an offset in bytes."""
     place = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
     return builder.bitcast(place, pointer.type)
 

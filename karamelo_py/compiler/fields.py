@@ -23,7 +23,7 @@ shape
 
 
 A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points have the shape
-(components, points), those of nodes (nodes, components).
+(components, points), arrays of nodes (nodes, components).
 """
 
 import ctypes

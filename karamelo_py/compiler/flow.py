@@ -23,7 +23,7 @@ from karamelo_py.compiler.values import (
 _PLAIN = (bool, int, float, str, np.generic, type(None))
 _MERGED = (Value, HeldValue, *_PLAIN)  # may differ between branches
 _DROPPED = object()
-IN_A_LOOP = " from turn to turn of a loop"
+IN_A_LOOP = " between iterations of a loop"
 
 
 class Edge(NamedTuple):

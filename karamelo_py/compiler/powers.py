@@ -1,7 +1,7 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
 C library functions would be called number by number. These are series after range reduction (Muller
-2016, "Elementary Functions", chapter 11). Their relative error is about that of two operations; for
+2016, "Elementary Functions", chapter 11). Their relative error is about two round-off errors; for
 powers, times |y ln x| if that is above 1. Interpreted, they are Python's.
 """
 

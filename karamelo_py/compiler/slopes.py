@@ -111,7 +111,7 @@ class Dual(namedtuple("Dual", "value slopes")):
 
 
 def is_tensor(thing: Any) -> bool:
-    """Tell whether a thing is a vector or tensor, with products of its own class."""
+    """Tell whether a thing is a vector or tensor, with products in its class."""
     return isinstance(thing, tuple) and not isinstance(thing, Dual)
 
 

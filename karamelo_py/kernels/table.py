@@ -158,7 +158,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 def _tasks(gathers: list[Gather]) -> tuple:
     """List the tasks of one visit; strains depend on the tasks before them.
 
-    Strain behind a move knows what that gathered. By the velocity of the last step, points are
+    Strain after a move uses what that gathered. By the velocity of the last step, points are
     strained where that has led them.
     """
     own: type = strain.Strain

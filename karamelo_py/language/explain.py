@@ -63,7 +63,7 @@ def _left_out(slots: Sequence[Parameter], given: Sequence[Argument]) -> list[Par
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
-    """List what is missing; an ID behind a word of its own is no second such word."""
+    """List what is missing; an ID directly after another missing word is not listed."""
     words = {p.shown for p in slots if p.shown != p.name}
     return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
@@ -98,7 +98,7 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
 def swapped(
     hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
 ) -> str | None:
-    """Write the hint for two arguments of which each fits in the place of the other."""
+    """Write the hint for two arguments that fit in each other's place."""
 
     def fits(parameter: Parameter, argument: Argument) -> bool:
         kind = parameter.kind

@@ -1,22 +1,23 @@
 """Rules: what a part of a scene knows of itself, told before a run, by `check`, or of a gain.
 
 A part is a basis, a transfer, a scheme, a method, a field, a law or one of its parts, a fix. Its
-rules are declared beside it, those of plug-ins as well::
+rules are declared next to it, also in plug-ins::
 
     known_failure(
         PIC,
         "angular momentum",
         when=lambda pic, scene: scene.turns,
-        reason="PIC takes a per cent or more of the angular momentum of a turning body",
-        cure="APIC, or FLIP, in the place of PIC",
+        reason="PIC removes 1 % or more of the angular momentum of a rotating body",
+        cure="APIC or FLIP instead of PIC",
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`).
 It returns whether the rule speaks, or the numbers for its words, by name, or a list of these, one
 for each time that it speaks. Between braces words have these numbers and what ``part``, ``scene``
 and ``owner`` have, such as ``{scene.turn:.2g}``; the owner of a law, or of one of its parts, is the
-material. Two names mean more: ``place``, the place in the script that is marked (else that of the
-fix, the material or the method), and ``share``, of noise how much it takes of what a body bears.
+material. Two names mean more: ``place``, the place in the script that is marked (else the place of
+the fix, the material or the method), and ``share``, of noise, its size relative to the tolerable
+amount.
 """
 
 import re
@@ -54,9 +55,9 @@ _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 def known_failure(
     part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare what is known to go wrong with a part, by a name by which it is told once.
+    """Declare what is known to go wrong with a part, by a name; it is reported once.
 
-    With a `cause`, it is noise: told where its share is above 1, and as the cause of a gain.
+    With a `cause`, it is noise: reported if its share is above 1, and as the cause of a gain.
     """
     _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
     if cause:

@@ -13,7 +13,7 @@ class Claim:
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# One claim per folder and process: simulations of one process may share it.
+# One claim per folder and process: simulations of one process may both use it.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 

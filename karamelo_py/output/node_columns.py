@@ -62,7 +62,7 @@ def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
 
 
 def mask(nodes: NodeTable) -> np.ndarray:
-    """Karamelo's bits: 1 for all nodes, 2 for those of the first group, 4 of the second, ..."""
+    """Karamelo's bits: 1 for all nodes, 2 for nodes of the first group, 4 of the second, ..."""
     bits = np.ones(len(nodes.ids))
     for k, group in enumerate(nodes.hub.groups.values(), 1):
         if group.kind == "nodes":

@@ -192,7 +192,7 @@ class Hub:
         # During a rehearsal nothing runs and nothing is written.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = 0  # number of runs, including those of a rehearsal
+        self.begun = 0  # number of runs, including a rehearsal's
         self.answered = False  # the script has printed, written or ended something
         self.checking = False  # ``karamelo-py check``: the first run only reports
         self.pausing = False  # the script stops before its runs, which a program controls

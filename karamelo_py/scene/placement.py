@@ -126,7 +126,7 @@ class Filled:
 def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
     """Return the cells in which `region` is filled.
 
-    They are those of the domain's grid; with `own`, cells that start at the lower corner of the
+    They belong to the domain's grid; with `own`, cells that start at the lower corner of the
     region's bounding box, clipped to the domain.
     """
     d = domain.dimension

@@ -220,7 +220,7 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
 
 
 def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
-    """Warn if points of `new`, to be named `ID`, coincide with those of another solid."""
+    """Warn if points of `new`, to be named `ID`, coincide with another solid's."""
     for other in hub.solids.values():
         if other is not new and coinciding(new, other):
             hub.warn(

@@ -22,7 +22,7 @@ CLOSE = (
     table.Gather(StrainOfLoadStep()),
     table.AtPoints(arrays.FINAL_INTEGRATE, 1),
 )
-# Of the last step: corrections, the share of forces that was left, and parts it was done in.
+# Of the last step: corrections, the remaining fraction of forces, and parts it was done in.
 PUBLISHED = "iterations", "residual", "parts"
 
 

@@ -54,7 +54,7 @@ the basis, or a finer run is worse; finer runs are made to check. With -run the 
 checked against the target."""
 
 
-# Functions whose gradients jump between cells, and methods whose points cross these.
+# Bases with gradients that jump between cells, and methods whose points cross these.
 JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
 ALONE = "no finer run is known"
 UNFOLLOWED = f"{ALONE}, whose points may cross cells"

@@ -165,7 +165,7 @@ def row(
     """Make the row of a run; what is not known of it is left empty.
 
     A failed run has no recorded values, because its last moments mean nothing. The
-    reason of a finished run is that of the first missing value.
+    reason of a finished run is the reason of the first missing value.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)

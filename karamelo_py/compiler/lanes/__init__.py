@@ -5,7 +5,7 @@ A kernel that indexes point arrays (components, points) with a `Group` instead o
 numbers; node numbers in lanes gather from node arrays (nodes, components), and `accumulate`
 scatters to them, lane by lane in the order of the points. Point functions are unaware of it;
 powers and logarithms are computed lane by lane (`scalarised`). Each lane has the bits of the same
-operations on numbers; sums at nodes differ from those of single points by round-off.
+operations on numbers; sums at nodes differ from sums over single points by round-off.
 
 The last group of a tile may have fewer points than lanes: missing lanes load the first point, and
 store and contribute nothing.

@@ -71,7 +71,7 @@ class VtkDump(TableDump):
             file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Add what is drawn of the last points, or keep what is needed for it."""
+        """Add what is drawn of the last points, or store what is needed for it."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add what is drawn between all points."""
@@ -123,7 +123,7 @@ class GridVtk(OfNodes, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Keep the numbers of the written nodes, where some are omitted."""
+        """Store the numbers of the written nodes, where some are omitted."""
         if self.occupied:
             kept.append(ids)
 

@@ -42,7 +42,7 @@ def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
-    """Limit the re-mapped velocity likewise, and keep it on the bound if v* was limited.
+    """Limit the re-mapped velocity likewise, and leave it on the bound if v* was limited.
 
     Otherwise stress would do spurious work: a rebound would gain half of the energy.
     """

@@ -28,8 +28,8 @@ class Shock(NamedTuple):
     rho0
         Density before deformation.
     K
-        Bulk modulus, for compatibility with Karamelo; unused. The initial stiffness is that of the
-        Hugoniot curve, rho0 c0^2.
+        Bulk modulus, for compatibility with Karamelo; unused. The initial stiffness is taken from
+        the Hugoniot curve, rho0 c0^2.
     c0
         Speed of sound without shear, at zero pressure.
     S

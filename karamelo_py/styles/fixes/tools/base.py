@@ -88,7 +88,7 @@ def unit(vector: np.ndarray) -> np.ndarray:
 
 
 def begin_behind(plane: Any, scene: Any) -> Any:
-    """Count the points behind a surface before the first step, for the warning."""
+    """Count the points past a surface before the first step, for the warning."""
     if scene.simulation.step > 0:
         return False
     counts, depths = zip(*scene.hub.fields.each(plane, "behind"), strict=True)
