@@ -255,7 +255,7 @@ def test_doubts_of_a_forecast():
     assert said.startswith("not sure: expected") and "lies between" not in said
     best.choice.warnings = ()
     best.choice.values["kind"] = "ulmpm"
-    assert "gradients of linear functions jump" in adviser.doubts(best)[0]
+    assert "gradients of the basis linear jump" in adviser.doubts(best)[0]
     best.choice.values["kind"] = "tlmpm"
     adviser.choices[0].values["kind"] = "tlmpm"  # what turns round is of its kind
     (doubt,) = adviser.doubts(best)

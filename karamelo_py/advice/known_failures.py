@@ -172,8 +172,8 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
         yield Advice(
             f"{DOUBTED_UNITS}velocities",
             f"points move at {s.fastest:.3g}, {s.speed:.3g} times the speed of waves "
-            f"({s.waves:.3g}), which no solid sustains when it hits another or a wall. The units of "
-            "velocities, densities and moduli may be mixed",
+            f"({s.waves:.3g}), which no solid sustains when it hits another or a wall. The units "
+            "of velocities, densities and moduli may be mixed",
             UNITS,
         )
 

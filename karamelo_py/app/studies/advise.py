@@ -317,7 +317,7 @@ class Adviser:
         found = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
         if self._crosses(best.choice, best.step):
             found.append(
-                f"gradients of {', '.join(best.choice.kind & {*JUMPING})} functions jump between "
+                f"gradients of the basis {', '.join(best.choice.kind & {*JUMPING})} jump between "
                 "cells: errors grow once points cross them, and on finer grids they cross more"
             )
         for other in self.choices:
