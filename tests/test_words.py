@@ -30,7 +30,7 @@ EXPRESSIONS = {
     r"of (?:its|their|his|one's) own": ("separate, or nothing", 0, 0),
     r"(?:that|those) of": ("repeat the noun", 0, 16),
     r"shares?": ("fraction; FLIP coefficient", 0, 14),
-    r"keeps?(?! [\d.]+ \|)": ("conserves, stores, retains", 1, 13),
+    r"keeps?(?! [\d.]+ \|)": ("conserves, stores, retains", 1, 12),
     r"from nowhere": ("spurious energy gain", 2, 0),
     r"averaged volumes|volumes averaged": ("F-bar", 2, 0),
     r"swings?|whirls?": ("sloshes, oscillates; vortex", 6, 0),
