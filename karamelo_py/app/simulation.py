@@ -462,10 +462,7 @@ class Simulation:
 
     @property
     def points(self) -> PointColumns:
-        """Columns of the points by name (x, vy, s11, seq ...): arrays (n,) ordered by id.
-
-        ``sim.points["vx"] = values`` sets one between two runs.
-        """
+        """Columns of the points by name (x, vy, s11, seq ...), settable: arrays (n,) by id."""
         return PointColumns(self.hub)
 
     @property

@@ -85,10 +85,7 @@ class Region(Named):
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions `x` (n, >= dimension) lie in the shape or on its faces: (n,) bool.
-
-        Ignores `exterior`.
-        """
+        """Test which positions `x` (n, >= dimension) are in or on the shape itself: (n,) bool."""
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
@@ -118,11 +115,7 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def shape(self) -> Any:
-        """Return the argument of `kernels.surfaces.depth` for `distance`; None if kernels have
-        none.
-
-        Ignores `exterior`.
-        """
+        """Return what `kernels.surfaces.depth` takes for `distance`, without `exterior`; or None."""
         return None
 
     def outline(self) -> Any:
