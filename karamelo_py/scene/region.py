@@ -115,7 +115,7 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def shape(self) -> Any:
-        """Return what `kernels.surfaces.depth` takes for `distance`, without `exterior`; or None."""
+        """Return what `kernels.surfaces.depth` takes for `distance` (no `exterior`), or None."""
         return None
 
     def outline(self) -> Any:
