@@ -1,5 +1,6 @@
 """Code for operations on values, by the table of operations and by intrinsics."""
 
+import functools
 import operator
 from collections.abc import Callable
 from typing import Any
@@ -14,6 +15,8 @@ from karamelo_py.compiler.held import HeldTuple, item_of
 from karamelo_py.compiler.session import current
 
 MOST_OPERATIONS = 10_000  # of one formula; above it, a loop is better left to LLVM
+
+_tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
 class FunctionType(types.Opaque):
@@ -69,10 +72,8 @@ class Lowering:
         if isinstance(thing, int):
             return types.literal(thing)
         if isinstance(thing, tuple):
-            kinds = tuple(types.unliteral(self.kind_of(item)) for item in thing)
-            return types.BaseTuple.from_types(
-                kinds, type(thing) if hasattr(thing, "_fields") else None
-            )
+            kinds = tuple([types.unliteral(self.kind_of(item)) for item in thing])
+            return _tuple_type(kinds, type(thing) if hasattr(thing, "_fields") else None)
         if thing is None or isinstance(thing, float | np.generic):
             return typeof(thing)
         if isinstance(thing, traced.Emitted):
