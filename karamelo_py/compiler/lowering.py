@@ -15,7 +15,6 @@ from karamelo_py.compiler.held import HeldTuple, item_of
 from karamelo_py.compiler.session import current
 
 MOST_OPERATIONS = 10_000  # of one formula; above it, a loop is better left to LLVM
-
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
