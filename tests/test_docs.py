@@ -458,6 +458,18 @@ def test_the_reference_is_written_for_every_style(tmp_path):
     assert inspect.getdoc(reference_pages)
 
 
+def test_code_that_pages_include_exists():
+    """Functions, and the lines from which on a file is shown."""
+    for page in PAGES:
+        for file, options in INCLUDED.findall(page.read_text("utf-8")):
+            text = (page.parent / file).read_text("utf-8")
+            for kind, wanted in re.findall(r"^:(pyobject|start-at): (.+)$", options, re.M):
+                name = wanted.rpartition(".")[2]
+                at = rf"^ *(?:def|class) {name}\b" if kind == "pyobject" else re.escape(wanted)
+                assert re.search(at, text, re.M), (page, wanted)
+
+
+INCLUDED = re.compile(r"^```{literalinclude} (\S+)\n(.*?)^```", re.S | re.M)
 # Questions of users, and the page that the search of the site shows first.
 QUESTIONS = {
     "moving wall": "howto/moving-wall",
