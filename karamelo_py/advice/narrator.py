@@ -36,7 +36,7 @@ class Narrator(Listener):
 
     def begun(self, run: RunLoop, simulation: Simulation, *, resumed: bool = False) -> None:
         """Warn of what is known to go wrong in this run, and of one that is very long."""
-        hub, halve = self.hub, run.rollback.halve
+        hub, halve = self.hub, run.rollback.point.halve
         self.smaller = ""
         if resumed:
             if not simulation.control.clock[0].watch_limit and simulation.step > run.first_step:

@@ -37,7 +37,7 @@ def carry_out(hub: Hub, **length: Any) -> None:
             refuse(hub)
         span = run.end_time - hub.update.time, inf if run.steps is None else run.steps
         if not hub.update.scheme.traits.implicit:
-            hub.later.append(known_failures.step_of(hub, run.rollback.halve, span))
+            hub.later.append(known_failures.step_of(hub, run.rollback.point.halve, span))
         hub.in_runs += hub.lasting()
         return
     if hub.pausing:

@@ -18,9 +18,8 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 5  # at most, in a run
+CONTINUE, HALVE, STOP = "continue", "halve", "stop"
 RETURNS = 2  # at most, to one state before an energy gain: two halvings without effect are enough
-
-
 LAST_GOOD = "last_good.*.h5"
 SMALLER_STEP = "a smaller time step (set_dt, dt_factor)"
 # Of implicit schemes; more of them is what a run may change.
@@ -36,18 +35,24 @@ class OthersWait(Exception):
     """This process cannot write a file, while other processes continue to send data for it."""
 
 
+def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
+    """Decide what follows a `status`, or `grown` energy, after `returns` to the last good state."""
+    if status == DONE:
+        return HALVE if grown and halves and returns < RETURNS else CONTINUE
+    return HALVE if halves else STOP
+
+
 class RollBack:
     """The last good state of a run, and the return to it, to `halve` the step or to end."""
 
     def __init__(self, hub: Hub, tell: Callable, *, halve: bool):
         self.hub, self.tell, self.place = hub, tell, hub.place
-        self.halve, self.point = halve, RollbackPoint(hub, halve)
+        self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Simulation, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state, or with the good one of the resumed file.
+        """Begin with the present state, or with the good one of a file, which may be `ruined`.
 
-        A step above the limit may have spoilt the present state (`ruined`); values of parts may be
-        read between any two steps (`looks`).
+        `looks` says that values of parts may be read between any two steps.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.too_large
@@ -74,19 +79,19 @@ class RollBack:
 
     def after(self, status: int) -> bool:
         """Judge steps that ended with `status`: continue from there (True), or from here."""
-        hub, simulation = self.hub, self.simulation
-        if status != DONE:
-            if status == STOPPED and boundary.delete_leaving(hub, simulation, self.point.arrays):
-                self._keep()
-            elif not self._halve_step(status):
-                self._stop(status)
+        simulation, point = self.simulation, self.point
+        if status == STOPPED and boundary.delete_leaving(self.hub, simulation, point.arrays):
+            self._keep()
             return False
-        grown = not simulation.told_of_growth and energy.has_grown(simulation)
-        if grown and self.point.returns < RETURNS and self._halve_step(DONE):
-            self.point.returns += 1
-            energy.forget_growth(simulation)
-            return False
-        return True
+        grown = status == DONE and not simulation.told_of_growth and energy.has_grown(simulation)
+        halves = point.halve and point.halvings < HALVINGS
+        halves = halves and not (status == STOPPED and self._points_only_leave())
+        choice = decide(status, grown=grown, halves=halves, returns=point.returns)
+        if choice == STOP:
+            self._stop(status)
+        if choice == HALVE:
+            self._halve_step(status)
+        return choice == CONTINUE
 
     def act_between_steps(self) -> None:
         """Call functions that act after the present step; their deletions are permanent."""
@@ -99,21 +104,16 @@ class RollBack:
         self.point.keep(self.simulation)
         self.point.returns = 0
 
-    def _halve_step(self, status: int) -> bool:
-        """Return to the last good state with half the step, if the script allows it."""
+    def _halve_step(self, status: int) -> None:
+        """Return to the last good state with half the step."""
         simulation, point = self.simulation, self.point
-        if not self.halve or point.halvings == HALVINGS:
-            return False
-        if status == STOPPED and self._points_only_leave():
-            return False
         found = self._explained(status)
         # Rows of log and dumps written since are removed with their states.
         point.return_to(simulation, cut=True)
-        while True:
+        while point.halvings < HALVINGS:
             point.halvings += 1
             simulation.halve_step(point.halvings)
-            # Steps above the limit would fail again.
-            if point.halvings == HALVINGS or not simulation.above_limit():
+            if not simulation.above_limit():  # steps above it would fail again
                 break
         self.hub.warn(
             f"{found.message}. Back to {when(simulation)}, with 1/{2**point.halvings} of the step",
@@ -121,7 +121,9 @@ class RollBack:
             code=found.code,
             cause=found.cause,
         )
-        return True
+        if status == DONE:
+            point.returns += 1
+            energy.forget_growth(simulation)
 
     def _explained(self, status: int, too_large: bool = False) -> Trouble:
         """Have a listener explain what went wrong."""
@@ -133,15 +135,14 @@ class RollBack:
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
             return False
-        step = simulation.step
-        simulation.restore(self.point.arrays)
-        before, steps = simulation.energy(), step - simulation.step
-        if steps:
-            simulation.advance(steps)
-        kept = energy.growth_since(simulation, before) <= WITHIN
-        healthy = kept and not simulation.above_limit()
+        step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
+        self.point.return_to(simulation)
+        before = simulation.energy()
+        self.point.again(simulation.advance, step)
+        kept = energy.growth_since(simulation, before) <= WITHIN and not simulation.above_limit()
         simulation.advance(1)  # repeats the failure for output
-        return healthy
+        present.give(self.hub)  # their files are unchanged
+        return kept
 
     def _stop(self, status: int) -> NoReturn:
         """Return to the last good state, write it, and raise the error for the user.
@@ -169,10 +170,9 @@ class RollBack:
         if good.step == self.begun_at:
             path = self._write_last_good()
         present.give(self.hub)  # their files are unchanged
-        back = step - simulation.step - (status in (GAINED, HEATED))
-        if back <= FAR:
-            if back > 0:
-                good.again(simulation.advance, simulation.step + back)
+        end = step - (status in (GAINED, HEATED))
+        if end - simulation.step <= FAR:
+            good.again(simulation.advance, end)
             self._end_outputs()
         return self._resume(path)
 

@@ -22,6 +22,7 @@ from karamelo_py.run.lower.hooks import PythonHooks, sets_initial_state, views_o
 from karamelo_py.run.mpi.whole import PointsMoved, Whole
 from karamelo_py.run.no_number import refuse_endless_speeds
 from karamelo_py.run.scene_arrays import SceneArrays
+from karamelo_py.run.timestep import StepPolicy
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -63,7 +64,7 @@ class Simulation(SceneArrays):
 
     def begin(self, end_time: float) -> None:
         """Start a run: choose the first dt; the run ends at `end_time` at the latest."""
-        clock = self.control.clock[0]
+        clock, self.policy = self.control.clock[0], StepPolicy.of(self.hub)
         self._ask_for_steps(0)
         clock.end_time = end_time
         clock.over_limit = 0
@@ -71,11 +72,10 @@ class Simulation(SceneArrays):
         self._choose_dt()
         begun_before = len(self.begun)
         self._make_ready()
-        if self.step == 0:
-            in_hundred_steps = 100 * self.fastest() * clock.courant * clock.dt_factor
-            if in_hundred_steps > STILL * clock.rate:
-                clock.path = np.inf
-                self._ask_for_steps(0)
+        in_hundred_steps = 100 * self.fastest() * clock.courant * clock.dt_factor
+        if self.step == 0 and in_hundred_steps > STILL * clock.rate:
+            clock.path = np.inf
+            self._ask_for_steps(0)
         self._choose_dt()
         if not np.isfinite(self.dt):
             refuse_endless_speeds(self.hub, self)
@@ -91,7 +91,7 @@ class Simulation(SceneArrays):
 
     def go_on(self, end_time: float, halvings: int) -> None:
         """Continue to this end with a state that was put into the arrays, instead of `begin`."""
-        clock = self.control.clock[0]
+        clock, self.policy = self.control.clock[0], StepPolicy.of(self.hub)
         self._make_ready()
         other_end, clock.end_time = clock.end_time != end_time, end_time
         over_limit = clock.over_limit
@@ -111,28 +111,14 @@ class Simulation(SceneArrays):
     def _ask_for_steps(self, halvings: int) -> bool:
         """Set the requested steps in the clock; return whether they have changed."""
         clock = self.control.clock[0]
-        now, moving = (
-            timestep.step_of_waves(self.hub, still=s) for s in (clock.path <= STILL, False)
-        )
-        update, share = self.hub.update, 1 / 2**halvings
-        numbers = {
-            "first_kick": 0.5 if update.half_start else 1.0,
-            "courant": now[0],
-            "courant_moving": moving[0],
-            "fixed_dt": (update.fixed_dt or float(self.implicit)) * share,  # load steps of 1
-            "stride": FAR if self.implicit else 1.0,
-            "heat_factor": (update.dt_factor or timestep.USUAL) * share,
-            "dt_factor": now[1] * share,
-            "dt_factor_moving": moving[1] * share,
-        }
+        numbers = self.policy.numbers(float(clock.path), halvings)
+        numbers["first_kick"] = 0.5 if self.hub.update.half_start else 1.0
+        numbers["stride"] = FAR if self.implicit else 1.0
         before = {name: clock[name] for name in numbers}
         for name, number in numbers.items():
             clock[name] = number
-        # Steps requested by a script are fractions of h/(c + |v|).
-        own = update.dt_factor is None and update.fixed_dt is None
-        weight = timestep.own_weight_of_drift(self.hub) if own else 1.0
-        if weight != clock.weight:
-            clock.weight, self.measured = weight, False
+        if self.policy.weight != clock.weight:
+            clock.weight, self.measured = self.policy.weight, False
         return numbers != before
 
     def _choose_dt(self) -> None:

@@ -1,7 +1,7 @@
 """The default time step as a fraction of the stable step, and its limits."""
 
 from math import inf, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -192,12 +192,38 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     return min(courant, lone_point(hub)), share
 
 
-def step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the same with the script's fraction, which is the same at rest as after."""
-    update = hub.update
-    if update.dt_factor is None and update.fixed_dt is None:
-        return own_step_of_waves(hub, still=still)
-    return courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
+class StepPolicy(NamedTuple):
+    """Choice of the steps of a run, made once at its beginning."""
+
+    still: tuple[float, float]  # stable step over h/c, and the fraction of it, at rest
+    moving: tuple[float, float]  # the same once points have moved
+    weight: float  # of the common velocity in the default step
+    fixed_dt: float  # 0: the step follows the fastest point; implicit steps are 1 by default
+    heat_factor: float  # fraction of the limit of conduction
+
+    @classmethod
+    def of(cls, hub: Hub) -> "StepPolicy":
+        """Return the choice by scheme, basis, points and the script."""
+        update = hub.update
+        fixed, heat = update.fixed_dt or float(update.scheme.traits.implicit), update.dt_factor
+        if update.dt_factor is None and update.fixed_dt is None:
+            own = (own_step_of_waves(hub, still=still) for still in (True, False))
+            return cls(*own, own_weight_of_drift(hub), fixed, USUAL)
+        # Steps requested by a script are fractions of h/(c + |v|), at rest as after.
+        given = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
+        return cls(given, given, 1.0, fixed, heat or USUAL)
+
+    def numbers(self, path: float, halvings: int) -> dict[str, float]:
+        """Return what the clock gets after a `path` of the points, in cells."""
+        (courant, share), part = self.still if path <= STILL else self.moving, 1 / 2**halvings
+        return {
+            "courant": courant,
+            "courant_moving": self.moving[0],
+            "fixed_dt": self.fixed_dt * part,
+            "heat_factor": self.heat_factor * part,
+            "dt_factor": share * part,
+            "dt_factor_moving": self.moving[1] * part,
+        }
 
 
 def own_step(hub: Hub, simulation: Any, *, still: bool = False) -> float:
