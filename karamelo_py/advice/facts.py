@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import cached_property
 from math import isfinite, pi, sqrt
+from operator import methodcaller
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from karamelo_py.script.parser import read_script
 
 PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities that come from the grid
 TURN = 0.3  # angle, in radian, beyond which a scene counts as rotating
+SEQ = methodcaller("particle", "seq")  # equivalent stress of points
 
 
 class Vibration(NamedTuple):
@@ -100,6 +102,12 @@ class SceneFacts:
     share_of_uneven = property(lambda self: self.share * self.uneven.of_step)
     fastest = cached_property(lambda self: self.simulation.fastest())  # component of a velocity
     turns = property(lambda self: self.turn > TURN)  # by an angle that counts
+    # The largest velocity over the speed of waves; the strain that impacts and weights cause.
+    speed = property(lambda self: self.fastest / self.waves if self.waves > 0 else 0.0)
+    strain = property(lambda self: max(self.impact if len(self.hub.solids) > 1 else 0.0, self.sag))
+    # Whether all bodies deform evenly, so that no cell is constrained alone.
+    even = cached_property(lambda self: all(pressed_evenly(self, one) for one in self.motions))
+    shear_stress = cached_property(lambda self: self.simulation.points.largest(SEQ)[0])
 
     @property
     def reads_temperature(self) -> bool:
@@ -117,11 +125,6 @@ class SceneFacts:
     def locks(self) -> bool:
         """Return True if linear cells contain several points whose volumes hardly change."""
         return self.hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
-
-    @cached_property
-    def even(self) -> bool:
-        """Return True if all bodies deform evenly, so that no cell is constrained alone."""
-        return all(pressed_evenly(self, one) for one in self.motions)
 
     @property
     def grid_viscosity(self) -> float:
@@ -154,11 +157,6 @@ class SceneFacts:
         """Return the speed of waves."""
         clock = self.simulation.control.clock[0]
         return float(clock.rate) - self.simulation.fastest(clock.common[0])
-
-    @property
-    def speed(self) -> float:
-        """Return the same over the speed of waves."""
-        return self.fastest / self.waves if self.waves > 0 else 0.0
 
     @cached_property
     def impact(self) -> float:
@@ -237,16 +235,6 @@ class SceneFacts:
         low = -points.largest(lambda some: some.particle("s11"))[0]
         high = points.largest(lambda some: -some.particle("s11"))[0]
         return high / low if low > 0 else 1.0
-
-    @property
-    def strain(self) -> float:
-        """Estimate the strain that impacts and weights cause."""
-        return max(self.impact if len(self.hub.solids) > 1 else 0.0, self.sag)
-
-    @cached_property
-    def shear_stress(self) -> float:
-        """Find the largest equivalent stress of a point."""
-        return self.simulation.points.largest(lambda points: points.particle("seq"))[0]
 
 
 def script_text(hub: Hub) -> str:

@@ -180,9 +180,8 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
 
 def _other_units(s: SceneFacts) -> Iterator[Advice]:
     """Look for materials whose numbers are in others than those that `units` names."""
-    units = s.hub.output.units
+    units: Any = s.hub.output.units
     for solid in s.hub.solids.values() if units else ():
-        assert units is not None
         law = solid.material.law
         density = units.si(DENSITY) / float(specific_volume(law))
         speed = units.si(VELOCITY) * timestep.elastic_speed(s.simulation, solid)[0]
