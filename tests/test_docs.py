@@ -463,7 +463,7 @@ def test_code_that_pages_include_exists():
     for page in PAGES:
         for file, options in INCLUDED.findall(page.read_text("utf-8")):
             text = (page.parent / file).read_text("utf-8")
-            for kind, wanted in re.findall(r"^:(pyobject|start-at): (.+)$", options, re.M):
+            for kind, wanted in re.findall(r"^:(pyobject|start-at): \"?(.+?)\"?$", options, re.M):
                 name = wanted.rpartition(".")[2]
                 at = rf"^ *(?:def|class) {name}\b" if kind == "pyobject" else re.escape(wanted)
                 assert re.search(at, text, re.M), (page, wanted)
