@@ -13,12 +13,12 @@ PRESS = """
     basis = "linear"
     method(ulmpm, FLIP, basis, 1)
     scheme({scheme})
-    dimension(2, 0, 1.25, 0, 1.75, 0.25)
+    dimension(2, 0, 1.5, 0, 2, 0.5)
     region(box, block, 0, 1, 0, 1)
-    region(tool, block, 0, 1.25, 1, 1.5)
+    region(tool, block, 0, 1.5, 1, 1.5)
     material(m, linear, 1, 1000, 0.25)
     material(steel, rigid, 1)
-    solid(s, region, box, 2, m, 0.25, 0)
+    solid(s, region, box, 2, m, 0.5, 0)
     region(floor, block, -INF, INF, -INF, 1e-6)
     region(top, block, -INF, INF, 1-1e-6, INF)
     group(floor, nodes, region, floor, all)
@@ -31,7 +31,7 @@ PRESS = """
     log_modify(custom, step, time, iterations, Es, hold_x, hold_y{columns})
     run(4)
 """
-LED = """solid(t, region, tool, 2, steel, 0.25, 0)
+LED = """solid(t, region, tool, 2, steel, 0.5, 0)
     group(t, particles, region, tool, solid, t)
     fix(press, {kind}, t, 1e-3, {value})"""
 
@@ -40,15 +40,15 @@ LED = """solid(t, region, tool, 2, steel, 0.25, 0)
     ("scheme", "kind"),
     [("quasi-static", "velocity_particles"), ("newmark", "initial_velocity_particles")],
 )
-def test_a_rigid_solid_leads_its_nodes(run_script, scheme, kind):
+def test_a_rigid_solid_leads_its_nodes(run_interpreted, scheme, kind):
     """The same as nodes that are given the velocity of the end of each step, and the reaction."""
     value = "-0.01" if kind.startswith("initial") else "-0.01*time"
     lines = LED.format(kind=kind, value=value)
     columns = ", ContactForce_t_x, ContactForce_t_y"
-    by_tool = run_script(PRESS.format(scheme=scheme, lines=lines, columns=columns)).log
+    by_tool = run_interpreted(PRESS.format(scheme=scheme, lines=lines, columns=columns)).log
     lines = f"fix(press, velocity_nodes, top, 1e-3, {value})"
     columns = ", press_x, press_y"
-    by_nodes = run_script(
+    by_nodes = run_interpreted(
         PRESS.format(scheme=scheme, lines=lines, columns=columns), folder="nodes"
     ).log
     for axis in "xy":
