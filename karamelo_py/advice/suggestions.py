@@ -1,21 +1,25 @@
 """Suggestions: what a scene pays for and could leave out, with the words to write instead."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any
 
 import numpy as np
 
-from karamelo_py.advice.facts import SceneFacts, script_text
+from karamelo_py.advice.facts import SceneFacts, is_zero, script_text
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.points.laws import parameter
+from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
+from karamelo_py.styles.regions import Cylinder
+from karamelo_py.styles.solids import RegionSolid
 
 Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
+AXES = "xyz"
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from which a linear basis locks
 LARGE = 100_000  # points from where on their numbers are read from memory
 RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
@@ -32,7 +36,7 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
-    rules = _unread, _of_parts, _averaging, _precision, _output
+    rules = _unread, _of_parts, _averaging, _flat, _round, _precision, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
@@ -70,6 +74,163 @@ def _averaging(hub: Hub, simulation: Any) -> Words:
         "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
         "incompressible or flows",
         "leave it out",
+    )
+
+
+# --- dimensions ----------------------------------------------------------------------------------
+
+
+def _acting(hub: Hub) -> list[Any]:
+    return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
+
+
+def _given(fix: Any) -> tuple:
+    """Give its formulas by direction; of fixes without, that they may do anything."""
+    return tuple(fix.formulas) or (np.nan,) * 3
+
+
+def _depends(formula: Any, axes: str) -> bool:
+    if formula is None:
+        return False
+    if not hasattr(formula, "names"):
+        return True
+    return any(name in formula.names for axis in axes for name in (axis, axis + "0"))
+
+
+def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Tell whether all points (or nodes) at places of one `key` are in the group, or none."""
+    group = fix.group
+    if group is None or group.all:
+        return group is not None
+    if isinstance(group, NodeGroup):
+        whole = [(lattice.first, lattice.positions()) for lattice in hub.lattices]
+        members = fix.nodes
+    else:
+        whole = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
+        members = group.members
+    for first, x in whole:
+        places = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
+        _, which = np.unique(places, axis=0, return_inverse=True)
+        found = np.bincount(which, np.isin(first + np.arange(len(x)), members))
+        if ((found > 0) & (found < np.bincount(which))).any():
+            return False
+    return True
+
+
+def _flat(hub: Hub, simulation: Any) -> Words:
+    """Find solids that are the same all along a direction in which nothing moves."""
+    domain = hub.domain
+    d = domain.dimension
+    if d == 1 or domain.axisymmetric or len(hub.lattices) > 1:
+        return
+    for k in range(d):
+        rest = [axis for axis in range(d) if axis != k]
+        layers = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else 0
+        if layers and _acts_alike(hub, rest):
+            given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
+            kept = " and ".join(AXES[axis] for axis in rest)
+            named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
+            yield (
+                f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
+                f"the points of {'plane strain' if d == 3 else 'a line'}, which has the forces and "
+                f"energies of a {'thickness' if d == 3 else 'cross-section'} of 1",
+                f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
+            )
+            return
+
+
+def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
+    """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
+    for fix in _acting(hub):
+        given = _given(fix)
+        if len(given) <= len(rest) or not is_zero(given[k]):
+            return False
+        if any(_depends(act, AXES[k]) for act in (*(given[j] for j in rest), fix.wall_friction)):
+            return False
+    return True
+
+
+def _acts_alike(hub: Hub, rest: list[int]) -> bool:
+    """Tell whether fixes act on all that lies at one place in the directions `rest`, or none."""
+    for fix in _acting(hub):
+        smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
+        if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
+            return False
+    return True
+
+
+def _layers(hub: Hub, k: int, rest: list[int]) -> int:
+    """Count the equal layers of solids across direction k, between faces that are held; or 0."""
+    most, ends = 0, set()
+    for solid in hub.solids.values():
+        if not solid.count:
+            continue
+        places = np.rint(solid.x0 * (1e6 / solid.h)).astype(np.int64)
+        across, counts = np.unique(places[:, k], return_counts=True)
+        columns = np.unique(places[:, rest], axis=0)
+        if len(set(counts)) > 1 or len(columns) * len(across) != len(places):
+            return 0
+        most = max(most, len(across))
+        first, last = solid.x0[:, k].min(), solid.x0[:, k].max()
+        apart = len(across) - 1
+        ppc = solid.ppc if isinstance(solid, RegionSolid) else 1
+        half = (last - first) / apart / 2 if apart else solid.h / ppc / 2
+        ends.add((round((first - half) / solid.h, 6), round((last + half) / solid.h, 6)))
+    return most if len(ends) == 1 and _faces_held(hub, k, *ends.pop()) else 0
+
+
+def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
+    """Tell whether no node of the planes at `low` and `high` (in cells) moves along k."""
+    lattice = hub.lattices[0]
+    held = np.zeros(lattice.shape, np.bool_)
+    for fix in hub.fixes.values():
+        if fix.prescribes_velocity and len(fix.formulas) > k and fix.formulas[k] is not None:
+            held.ravel()[fix.nodes - lattice.first] = is_zero(fix.formulas[k])
+    if held.all():
+        return True
+    planes = [(end * lattice.h - lattice.lo[k]) / lattice.spacing for end in (low, high)]
+    if any(abs(plane - round(plane)) > 1e-4 for plane in planes):
+        return False
+    numbers = [round(plane) for plane in planes]
+    inside = all(0 <= number < lattice.shape[k] for number in numbers)
+    return inside and bool(held.take(numbers, axis=k).all())
+
+
+def _round(hub: Hub, simulation: Any) -> Words:
+    """Find cylinders about one axis, along which all acts."""
+    if hub.domain.dimension != 3:
+        return
+    solids = hub.solids.values()
+    regions = [solid.region for solid in solids if isinstance(solid, RegionSolid)]
+    cylinders = [region for region in regions if isinstance(region, Cylinder)]
+    axes = {cylinder.axis for cylinder in cylinders}
+    if len(axes) != 1 or len(cylinders) < len(solids):
+        return
+    along, middle = axes.pop()
+    across = [axis for axis in range(3) if axis != along]
+    centre = np.zeros(3)
+    centre[across] = middle
+
+    def turned(x: np.ndarray) -> np.ndarray:
+        r = np.linalg.norm((x - centre)[:, across], axis=1)
+        return np.stack([r, x[:, along]], axis=1)
+
+    for fix in _acting(hub):
+        act = _given(fix)
+        if len(act) < 3 or not all(is_zero(act[axis]) for axis in across):
+            return
+        if _depends(act[along], "".join(AXES[axis] for axis in across)):
+            return
+        if not _alike(hub, fix, turned):
+            return
+    radius = max(cylinder.radius for cylinder in cylinders)
+    lo, hi = hub.domain.lo[along], hub.domain.hi[along]
+    h = hub.domain.h
+    yield (
+        "cylinders about one axis, and nothing acts around it: about "
+        f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
+        f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
+        "and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
     )
 
 
