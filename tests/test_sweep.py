@@ -396,13 +396,14 @@ def test_a_run_that_is_killed_is_recorded(folder):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")
 @pytest.mark.usefixtures("starts_are_cheap")
-def test_runs_are_copies_of_a_warm_process_and_write_what_others_do(folder):
-    """A copy of what has only imported, and a process that starts cold."""
+def test_runs_are_copies_of_warm_processes_and_write_what_others_do(folder):
+    """A copy of what has run, one of what has only imported, and a process that starts cold."""
     launch = case.Launch(folder / "in.flight")
     cases = {name: {"speed": speed} for name, speed in (("a", "3"), ("b", "300"), ("c", "3"))}
     outcomes = {name: launch.run(values, folder / name) for name, values in cases.items()}
     assert [one.status for one in outcomes.values()] == ["done", "failed", "done"]
-    ((_, first),) = launch.warm.held
+    assert set(launch.warm.keepers) == {(), ("kind",)}
+    first, warm = (launch.warm.keepers[key].pid for key in ((), ("kind",)))
     launch.warm.tries = 0
     for name, values in cases.items():
         launch.run(values, folder / f"cold {name}")
@@ -410,11 +411,12 @@ def test_runs_are_copies_of_a_warm_process_and_write_what_others_do(folder):
             texts = [(folder / place / file).read_bytes() for place in (name, f"cold {name}")]
             assert texts[0] == texts[1]
     launch.warm.tries = 2
-    launch.warm.held[0][0].close()  # as if it had gone: the next start begins another
-    assert launch.run(cases["a"], folder / "a").status == "done" and launch.warm.tries == 1
-    ((_, second),) = launch.warm.held
+    for pid in (warm, first):  # each but hurts the next start, which takes another way
+        os.kill(pid, signal.SIGKILL)
+        assert launch.run(cases["a"], folder / "a").status == "done"
+    pids = [keeper.pid for keeper in launch.warm.keepers.values() if keeper.is_ready()]
     launch.warm.finalizer()
-    assert not any(os.path.exists(f"/proc/{pid}") for pid in (first, second))
+    assert len(pids) == 2 and not any(os.path.exists(f"/proc/{pid}") for pid in pids)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")
@@ -427,9 +429,9 @@ def test_a_warm_process_that_hangs_is_killed_and_its_run_starts_from_nothing(fol
         "Popen",
         lambda *args, **more: begun.append(popen(*args, **more)) or begun[-1],
     )
-    processes = warm.WarmProcess(case.environment())
+    processes = warm.WarmProcesses(case.environment())
     with (folder / "out.txt").open("wb") as out:
-        assert processes.start([], folder, out, out) is None
+        assert processes.start((), [], folder, out, out) is None
     assert len(begun) == warm.TRIES
     assert not any(os.path.exists(f"/proc/{process.pid}") for process in begun)
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import karamelo_py
 from karamelo_py.app.leaving import STUDY
-from karamelo_py.app.studies.warm import WarmProcess
+from karamelo_py.app.studies.warm import WarmProcesses
 from karamelo_py.output.files import read_json, reported, write_whole
 from karamelo_py.output.record import NAME
 from karamelo_py.script.errors import ScriptError
@@ -119,7 +119,7 @@ class Launch:
     limit: float | None = None  # seconds after which a run is given up
     texts: tuple[str, ...] = ()  # of the script and those that it includes
     stop: threading.Event = field(default_factory=threading.Event)  # set when the study is to end
-    warm: WarmProcess = field(default_factory=lambda: WarmProcess(environment()))
+    warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
         """Hash what a result belongs to: it is used again only for the very same."""
@@ -174,7 +174,7 @@ class Launch:
             (folder / name).unlink(missing_ok=True)
         begun = time.perf_counter()
         with (folder / "out.txt").open("wb") as out, (folder / "err.txt").open("wb") as err:
-            pid = self.warm.start(words, folder, out, err)
+            pid = self.warm.start(kind_of(case.values()), words, folder, out, err)
             process: Any = SimpleNamespace(pid=pid, returncode=None)
             if process.pid is None:
                 process = subprocess.Popen(

@@ -1,8 +1,10 @@
-"""Begin runs as copies (forks) of a process that has imported the program.
+"""Begin runs as copies (forks) of processes that are warm: that have the program at hand.
 
-A run is a process like any other: the study waits for it, and nothing that happens to it affects
-others. On Linux, where the study can adopt orphaned processes; elsewhere, and where any
-of this fails, a run starts from nothing.
+The first has imported the program. A run that is done leaves a copy of itself, which holds the
+kernels of its kind; from then on runs of that kind are copies of it. A run is a process like any
+other: the study waits for it, and nothing that happens to it affects others. On Linux, where the
+study can adopt orphaned processes; elsewhere, and where any of this fails, a run starts from
+nothing.
 """
 
 import ctypes
@@ -18,88 +20,156 @@ import time
 import traceback
 import weakref
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
-from typing import BinaryIO, NoReturn
+from typing import Any, BinaryIO, NoReturn
 
 from karamelo_py.app.leaving import STUDY
 
-TRIES = 3  # to start the process
+MOST = 8  # kinds whose kernels are held
+TRIES = 3  # to start the first
 PATIENCE = 20.0  # seconds for an answer: a start takes some hundredths, the import two or so
 SUBREAPER = 36  # of Linux's prctl: adopts processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
-BEGIN = "from karamelo_py.app.studies.warm import serve; serve()"
+BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
+# A script's own functions in Python may keep what the next run must not find.
+NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
 class WarmProcess:
-    """The process that runs are copies of; it is started when first needed."""
+    """A warm process; without a pid, a run that may leave one."""
+
+    def __init__(self, link: socket.socket, pid: int | None = None):
+        self.link, self.pid = link, pid
+
+    def is_ready(self) -> bool:
+        """Tell whether runs can be copies of it; ConnectionError where it has gone."""
+        if self.pid is None:
+            with suppress(BlockingIOError):
+                said = self.link.recv(32, socket.MSG_DONTWAIT)
+                if not said:
+                    raise ConnectionError
+                self.pid = int(said)
+        return self.pid is not None
+
+    def end(self) -> None:
+        """Let it end."""
+        self.link.close()
+        if self.pid is not None:
+            with suppress(OSError):
+                os.kill(self.pid, signal.SIGKILL)  # it has nothing to lose
+                for _ in range(100):  # at most a second: the system may hold it
+                    if os.waitpid(self.pid, os.WNOHANG)[0]:
+                        break
+                    time.sleep(0.01)
+
+
+class WarmProcesses:
+    """The warm processes of a study, which end with it."""
 
     def __init__(self, environment: Mapping[str, str]):
         self.environment = environment
         self.tries = TRIES if sys.platform == "linux" else 0
         self.lock = threading.Lock()
-        self.held: list[tuple[socket.socket, int]] = []  # its link and number
-        self.finalizer = weakref.finalize(self, _end, self.held)
+        self.keepers: dict[tuple[str, ...], WarmProcess] = {}
+        self.finalizer = weakref.finalize(self, _end, self.keepers)
 
-    def start(self, words: list[str], folder: Path, out: BinaryIO, err: BinaryIO) -> int | None:
-        """Begin a run; returns the number of the process, a child of this one, or None."""
+    def start(
+        self, kind: tuple[str, ...], words: list[str], folder: Path, out: BinaryIO, err: BinaryIO
+    ) -> int | None:
+        """Begin a run; gives the number of the process, a child of this one, or None."""
         with self.lock:
             while self.tries:
+                key: tuple[str, ...] = ()
                 try:
-                    if not self.held:
-                        self._begin()
-                    link, _ = self.held[0]
+                    key = self._chosen(("kind", *kind))
+                    link = self.keepers[key].link
+                    link.settimeout(PATIENCE)  # TimeoutError is an OSError
+                    stays = self._awaited(("kind", *kind))
                     said = json.dumps([str(folder.absolute()), *words]).encode()
-                    socket.send_fds(link, [said], [out.fileno(), err.fileno()])
+                    files = [out.fileno(), err.fileno(), *([stays.fileno()] if stays else [])]
+                    with stays or nullcontext():
+                        socket.send_fds(link, [said], files)
                     return int(link.recv(32))
                 except (OSError, ValueError):
-                    _end(self.held)
-                    self.tries -= 1
+                    self._forget(key)
+                    self.tries -= key == ()
         return None
 
+    def _chosen(self, key: tuple[str, ...]) -> tuple[str, ...]:
+        """Choose the process to copy: the one of this kind, or the first."""
+        found = self.keepers.get(key)
+        if found is not None:
+            try:
+                if found.is_ready():
+                    return key
+            except ConnectionError:
+                self._forget(key)
+        if () not in self.keepers:
+            self._begin()
+        return ()
+
     def _begin(self) -> None:
+        """Start the first."""
         if ctypes.CDLL(None, use_errno=True).prctl(SUBREAPER, 1, 0, 0, 0):
             raise OSError("cannot adopt")
-        mine, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        mine.settimeout(PATIENCE)  # TimeoutError is an OSError
+        mine, theirs = _pair()
         with theirs:
             process = subprocess.Popen(
                 [sys.executable, "-c", BEGIN], stdin=theirs.fileno(), stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, env=self.environment, start_new_session=True,
             )  # fmt: skip
-        process.returncode = 0  # `_end` waits for it
-        self.held.append((mine, process.pid))
+        process.returncode = 0  # `WarmProcess.end` waits for it
+        self.keepers[()] = WarmProcess(mine, process.pid)
+
+    def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
+        """Make the link of the process that a run is to leave; none where there is one."""
+        if key in self.keepers:
+            return None
+        if len(self.keepers) > MOST:
+            self._forget(next(each for each in self.keepers if each))
+        mine, theirs = _pair()
+        self.keepers[key] = WarmProcess(mine)
+        return theirs
+
+    def _forget(self, key: tuple[str, ...]) -> None:
+        if key in self.keepers:
+            self.keepers.pop(key).end()
 
 
-def _end(held: list[tuple[socket.socket, int]]) -> None:
-    while held:
-        link, pid = held.pop()
-        link.close()
-        with suppress(OSError):
-            os.kill(pid, signal.SIGKILL)  # it has nothing to lose
-            for _ in range(100):  # at most a second: the system may hold it
-                if os.waitpid(pid, os.WNOHANG)[0]:
-                    break
-                time.sleep(0.01)
+def _pair() -> tuple[socket.socket, socket.socket]:
+    return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
-# ---- in the warm process -------------------------------------------------------------------------
+def _end(keepers: dict[Any, WarmProcess]) -> None:
+    while keepers:
+        keepers.popitem()[1].end()
 
 
-def serve() -> NoReturn:
-    """Import the program, and begin runs of it as copies of this process until the study ends."""
+# ---- in the warm processes ----------------------------------------------------------------------
+
+
+def begin() -> NoReturn:
+    """Import the program, and begin runs of it."""
+    gc.disable()
+    link = socket.socket(fileno=os.dup(0))
     import karamelo_py.app.cli
     import karamelo_py.run.loop  # noqa: F401
 
+    keep(link)
+
+
+def keep(link: socket.socket) -> NoReturn:
+    """Begin runs as copies of this process, until the study has ended."""
     gc.collect()
     gc.freeze()
     gc.disable()
-    link = socket.socket(fileno=os.dup(0))
     os.chdir("/")  # no folder is in use by it
-    with open(os.devnull, "rb") as nothing:
-        os.dup2(nothing.fileno(), 0)
+    with open(os.devnull, "r+b") as nothing:
+        for at in range(3):
+            os.dup2(nothing.fileno(), at)
     while True:
-        said, files, *_ = socket.recv_fds(link, LONGEST, 2)
+        said, files, *_ = socket.recv_fds(link, LONGEST, 3)
         if not said:
             os._exit(0)
         read, write = os.pipe()
@@ -109,9 +179,8 @@ def serve() -> NoReturn:
             if pid:
                 os.write(write, str(pid).encode())
                 os._exit(0)
-            link.close()
-            os.close(read)
-            os.close(write)
+            for end in (link, read, write):
+                end.close() if end is link else os.close(end)
             _run(json.loads(said), *files)
         os.waitpid(between, 0)  # from here on the run is a child of the study
         os.close(write)
@@ -120,8 +189,8 @@ def serve() -> NoReturn:
             os.close(file)
 
 
-def _run(said: list[str], out: int, err: int) -> NoReturn:
-    """Carry out a run in this process, as the program does."""
+def _run(said: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
+    """Carry out a run in this process, as the program does, and leave a copy if it went well."""
     from karamelo_py.app.start import main
 
     folder, *sys.argv[1:] = said
@@ -143,4 +212,18 @@ def _run(said: list[str], out: int, err: int) -> NoReturn:
         traceback.print_exc()
         status = 1
     sys.stdout.flush()
+    if stays is not None and status == 0 and _is_clean():
+        os.environ[STUDY] = study
+        with socket.socket(fileno=stays) as link:
+            pid = os.fork()
+            if not pid:
+                keep(link)
+            link.send(str(pid).encode())
     os._exit(status)
+
+
+def _is_clean() -> bool:
+    """Tell whether nothing but the program itself has run here."""
+    from karamelo_py.language import registry
+
+    return NOT_OURS not in sys.modules and not registry.foreign()
