@@ -173,22 +173,37 @@ FLOWS = {
 }
 
 
-def flowing(method: str) -> str:
-    """One point a law, pulled and sheared until all flow."""
-    lines = [f"method({method})", f"dimension(2, 0, {len(FLOWS) / 10 + 0.1}, 0, 0.3, {H})",
-             "eos(bulk, linear, 8, 160)"]  # fmt: skip
-    for k, (name, law) in enumerate(FLOWS.items()):
+ELASTIC = {
+    "a": "hyperelastic, 2, 20*(I1*J^(-2/3) - 3) + 50*(J - 1)^2",
+    "b": "mooney-rivlin, 2, 15, 5, 100",
+    "c": "ogden, 2, 100, 60, 1.3, -10, -2",
+    "d": "yeoh, 2, 100, 20, -1",
+    "e": "gent, 2, 40, 20, 100",
+    "f": "saint-venant-kirchhoff, 2, 50, 40",
+    "g": "orthotropic, 2, 100, 50, 50, 0.2, 0.2, 0.3, 40, 40, 20, 30",
+    "h": "transverse, 2, 100, 0.3, 50, 0.1, 30, 30, 90",
+}
+
+
+def of_laws(method: str, laws: dict[str, str], thin: str = "false") -> str:
+    """One point for each law, strengths or materials, pulled and sheared."""
+    lines = [f"method({method})", f"dimension(2, 0, {len(laws) / 10 + 0.1}, 0, 0.3, {H})",
+             f"plane_stress({thin})", "eos(bulk, linear, 8, 160)"]  # fmt: skip
+    for k, (name, law) in enumerate(laws.items()):
         lines += [
             f"region({name}, block, {k / 10}, {(k + 1) / 10}, 0.1, 0.2)",
-            f"strength({name}, {law})",
-            f"material({name}, eos-strength, bulk, {name})",
+            *(
+                [f"strength({name}, {law})", f"material({name}, eos-strength, bulk, {name})"]
+                if laws is FLOWS
+                else [f"material({name}, {law})"]
+            ),
             f"solid({name}, region, {name}, 1, {name}, {H})",
         ]
     lines += [
         "region(everywhere, block, INF, INF, INF, INF)",
         "group(nodes, nodes, region, everywhere, all)",
         "fix(pull, velocity_nodes, nodes, x0 + y0, -x0)",
-        "dump(d, all, particle, 1, d.*.txt, ep, epdot, s11, s12)",
+        f"dump(d, all, particle, 1, d.*.txt, s11, s12{', ep, epdot' * (laws is FLOWS)})",
         "set_dt(0.003)",
         "run(6)",
     ]
@@ -223,11 +238,12 @@ SCENES = {
     "rigid": pushed().replace("run_time(3)", "set_dt(0.05)\nrun(16)"),
     "rigid by a formula": pushed("ulmpm/contacts").replace("initial_velocity_particles, tool, 0.5",
         "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(6)"),
-    "flow": flowing("ulmpm, FLIP, linear, 1"),
-    "flow in the total frame": flowing("tlmpm, APIC, linear"),
-    "flow with averaged volumes": flowing("ulmpm, FLIP, linear, 1").replace(
+    "flow": of_laws("ulmpm, FLIP, linear, 1", FLOWS),
+    "flow in the total frame": of_laws("tlmpm, APIC, linear", FLOWS),
+    "flow with averaged volumes": of_laws("ulmpm, FLIP, linear, 1", FLOWS).replace(
         "dimension(", "scheme(usf)\nanti_volumetric_locking(true)\ndimension("
     ),
+    "elastic laws": of_laws("tlmpm, FLIP, linear, 1", ELASTIC, "true"),
     "rate of plastic strain": sheared(", epdot"),
     "step that varies": block(
         2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",
