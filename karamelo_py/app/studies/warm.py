@@ -32,7 +32,7 @@ PATIENCE = 20.0  # seconds for an answer: a start takes some hundredths, the imp
 SUBREAPER = 36  # of Linux's prctl: adopts processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
-# A script's own functions in Python may keep what the next run must not find.
+# A script's own functions in Python may store what the next run must not find.
 NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
