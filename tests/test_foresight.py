@@ -437,7 +437,7 @@ def test_rules_that_ask_for_concrete_styles_stand_beside_these():
     assert not found
 
 
-ABOVE = ("run", "app", "commands", "scene", "output")
+ABOVE = ("advice", "run", "app", "commands", "scene", "output")
 PART = re.compile(r"karamelo_py\.(styles|schemes|points\.(basis|transfers|laws))\.")
 
 

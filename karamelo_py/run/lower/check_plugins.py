@@ -210,7 +210,7 @@ def _try_functions(part: PartInUse, setup: Setup, points: Any, p: int) -> None:
     at = place_at(basis, kin, points.x[0] if points.home is None else points.home, p)
     line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
     if line is not None:
-        if not isinstance(line, Along):
+        if not all(hasattr(line, name) for name in Along._fields):
             raise fault(part.name, "along has to return an Along", part.place)
         for name in ("weights", "gradients", "affine"):
             got = len(getattr(line, name))
