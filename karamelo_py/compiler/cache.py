@@ -169,7 +169,10 @@ def _stamp(name: str) -> str:
         if one == "__main__" or not file:
             raise Unknown(one)
         known = [(k, v) for k, v in names.items() if k[:2] != "__"]
-        values = [f"{k} = {_value(v)}" for k, v in known if not isinstance(v, _NAMED)]
+        values = []
+        for key, value in known:
+            with contextlib.suppress(Unknown, RecursionError):
+                values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
         if not one.startswith(__package__.partition(".")[0]):  # its rooms import as they may
             named = choices.modules_of(*(v for _, v in known if isinstance(v, _NAMED)))
@@ -185,13 +188,6 @@ def _is_own(module: str, top: str) -> bool:
     """Tell whether a module is of the package `top`, or of no package that is installed."""
     file = _names_in(module).get("__file__") or _INSTALLED[0]
     return module.partition(".")[0] == top or not file.startswith(_INSTALLED)
-
-
-def _value(thing: Any) -> str:
-    try:
-        return _words(thing)
-    except (Unknown, RecursionError):
-        return type(thing).__name__
 
 
 def _words(thing: Any) -> str:

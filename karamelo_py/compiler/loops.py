@@ -24,7 +24,7 @@ from karamelo_py.compiler.failing import Failure, failure_at, noting
 from karamelo_py.compiler.held import HeldTuple, hold, item_of
 from karamelo_py.compiler.lowering import function_type, new_function
 from karamelo_py.compiler.session import current, one_at_a_time
-from karamelo_py.compiler.trace import alone, formula, write_into
+from karamelo_py.compiler.trace import formula, not_inlined, write_into
 from karamelo_py.compiler.values import (
     Untraceable,
     builtin,
@@ -200,19 +200,19 @@ class Kernel:
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
         """Return the machine code for arguments of these types."""
         with one_at_a_time:
-            if self._changes != current().changes:
-                self._find_anew()
+            self._find_changes()
             if kinds not in self.units:
                 self.units[kinds] = self.files.kernel(
                     kinds, result, lambda: _compiled(self.function, kinds, result)
                 )
             return self.units[kinds]
 
-    def _find_anew(self) -> None:
-        """Drop compiled code, because implementations have changed."""
-        with one_at_a_time:
-            self._changes = current().changes
-            self.units, self._plans = {}, {}
+    def _find_changes(self) -> None:
+        """Drop compiled code if implementations have changed."""
+        if self._changes != current().changes:
+            with one_at_a_time:
+                self._changes = current().changes
+                self.units, self._plans = {}, {}
 
     def __call__(self, *arguments: Any) -> Any:
         written = ArgumentBuffer(arguments)
@@ -233,8 +233,7 @@ class Kernel:
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
         """Return how arguments are passed, the entry, and size and reader of the result."""
         kinds = tuple(written.kinds)
-        if self._changes != current().changes:
-            self._find_anew()
+        self._find_changes()
         plans = self._plans
         if kinds not in plans:
             plan = plan_for(arguments)
@@ -273,7 +272,7 @@ def kernel(function: Callable) -> Callable:
 def noinline(function: Callable) -> Callable:
     """Mark a function that is too large to be inlined in kernels."""
     if not choices.INTERPRETED:
-        alone(function)
+        not_inlined.add(function)
         shared(function)
     return function
 

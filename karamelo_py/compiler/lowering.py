@@ -26,6 +26,16 @@ class FunctionType(types.Opaque):
         super().__init__(f"Function({getattr(function, '__qualname__', function)}, {id(function)})")
 
 
+_TRACED = traced.Value, traced.HeldValue
+
+
+@functools.cache
+def _is_of_values(one: type) -> bool:
+    """Tell whether a class of types is of values; to ask Numba's abstract classes takes long."""
+    others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
+    return not issubclass(one, others)
+
+
 class Lowering:
     """Writes code with a builder, or only determines types without one.
 
@@ -45,6 +55,8 @@ class Lowering:
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
         """Wrap a value for point functions."""
+        if _is_of_values(type(kind)):
+            return traced.Value(kind, value)
         if isinstance(kind, types.Literal):
             return kind.literal_value
         if isinstance(kind, types.NoneType):
@@ -60,13 +72,11 @@ class Lowering:
             return made(*inner) if made else tuple(inner)
         if isinstance(kind, types.NamedTupleClass):
             return kind.instance_class
-        if isinstance(kind, FunctionType):
-            return self.seen(kind.function)
-        return traced.Value(kind, value)
+        return self.seen(kind.function)
 
     def kind_of(self, thing: Any) -> types.Type:
         """Return the type of a wrapped thing; integers keep their value in it."""
-        if isinstance(thing, traced.Value | traced.HeldValue):
+        if isinstance(thing, _TRACED):
             return thing._kind
         if isinstance(thing, int):
             return types.literal(thing)
@@ -83,7 +93,7 @@ class Lowering:
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
         """Return the code of a wrapped thing in the type `wanted`."""
-        if isinstance(thing, traced.Value | traced.HeldValue):
+        if isinstance(thing, _TRACED):
             return code.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]

@@ -103,7 +103,6 @@ class AstFunction:
     def __init__(self, function: Callable, seen: Callable[[Any], Any]):
         self.function, self.seen = function, seen
         self.__code__ = code = function.__code__
-        self.__name__ = function.__name__
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
         # For loops, by all that determines their code: types of initial literals by name; None if a
@@ -114,6 +113,10 @@ class AstFunction:
         )  # the signature of the code object
         plain.__kwdefaults__ = function.__kwdefaults__
         self.signature = inspect.signature(plain)
+        others = code.co_kwonlyargcount or code.co_flags & (
+            inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
+        )
+        self.plain = -1 if others else code.co_argcount  # parameters, where all are positional
 
     def free(self) -> dict[str, Any]:
         """Return the closure variables."""
@@ -128,7 +131,10 @@ class AstFunction:
         return self.seen(true[name] if name in true else getattr(builtins, name))
 
     def __call__(self, *arguments: Any, **keywords: Any) -> Any:
-        names = _bound(self.signature, arguments, keywords, self.seen)
+        if not keywords and len(arguments) == self.plain:
+            names = dict(zip(self.__code__.co_varnames, arguments, strict=False))
+        else:
+            names = _bound(self.signature, arguments, keywords, self.seen)
         return AstCompiler(self, names, self.free()).result()
 
 
@@ -252,7 +258,7 @@ class AstCompiler:
 
     def do(self, node: ast.AST) -> Any:
         """Compile a statement, or an expression to its value."""
-        return getattr(self, type(node).__name__, self.unknown)(node)
+        return _COMPILED.get(type(node), AstCompiler.unknown)(self, node)
 
     def unknown(self, node: ast.AST) -> None:
         """Refuse a construct that kernels do not support."""
@@ -725,5 +731,6 @@ class AstCompiler:
         self.names.pop(_COUNT, None)
 
 
+_COMPILED = {getattr(ast, n): f for n, f in vars(AstCompiler).items() if n in vars(ast)}
 LONGEST = 1000  # range in a comprehension
 _COUNT = "for"  # not a valid function name

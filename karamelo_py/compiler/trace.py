@@ -8,7 +8,7 @@ apart costs nothing. The walk through the text is in :mod:`~karamelo_py.compiler
 import functools
 import itertools
 import types as python
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from traceback import walk_tb
 from typing import Any, NamedTuple
 
@@ -77,11 +77,12 @@ class Module:
         return self._seen(getattr(self._module, name))
 
 
+_NO_TYPES = "a kernel cannot ask for the type of a number: ask for that of a tag"
+
+
 def _class_of(thing: Any) -> type:
     if isinstance(thing, values.Value):
-        raise values.Untraceable(
-            "a kernel cannot ask for the type of a number: ask for that of a tag"
-        )
+        raise values.Untraceable(_NO_TYPES)
     kind = getattr(thing, "_kind", None)
     return type(thing) if kind is None else getattr(kind, "instance_class", tuple)
 
@@ -91,9 +92,7 @@ def _is_instance(thing: Any, kind: Any) -> bool:
     if not isinstance(thing, values.Value):
         return issubclass(_class_of(thing), kinds)
     if not all(issubclass(k, tuple) for k in kinds):
-        raise values.Untraceable(
-            "a kernel cannot ask for the type of a number: ask for that of a tag"
-        )
+        raise values.Untraceable(_NO_TYPES)
     return False
 
 
@@ -103,23 +102,18 @@ def _attribute(thing: Any, *name: Any) -> Any:
     return getattr(thing, *name)
 
 
-INSTEAD = {
-    values.is_literal: values.is_literal,
-    type: _class_of,
-    isinstance: _is_instance,
-    range: range,
-    getattr: _attribute,
-}
+INSTEAD = {type: _class_of, isinstance: _is_instance, getattr: _attribute}
 _SAFE = {
     callable, len, zip, enumerate, tuple, list, dict, set, sum, reversed, any, all, map, slice,
-    hasattr,
+    hasattr, range, values.is_literal,
 }  # fmt: skip
 _CONSTANT = (type(None), type(NotImplemented), bool, int, float, str, np.number, np.bool_)
+_AS_THEY_ARE = (*_CONSTANT, values.Emitted, Module)
 
 
 def _seen(thing: Any) -> Any:
     """Return the replacement of a global in functions that are run here."""
-    if isinstance(thing, (*_CONSTANT, values.Emitted, Module)):
+    if isinstance(thing, _AS_THEY_ARE):
         return thing
     if isinstance(thing, python.ModuleType):
         return Module(thing, _seen)
@@ -129,13 +123,14 @@ def _seen(thing: Any) -> Any:
         return list(map(_seen, thing))
     if isinstance(thing, np.ndarray):
         return values.now().constant(thing)
-    if not isinstance(thing, Hashable):
+    if type(thing).__hash__ is None:
         raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
     known = current().seen
     if thing not in known:
-        known[thing] = _copy(thing)
-    note(modules_of(thing))
-    return known[thing]
+        known[thing] = _copy(thing), modules_of(thing)
+    made, modules = known[thing]
+    note(modules)
+    return made
 
 
 def _copy(thing: Any) -> Any:
@@ -178,7 +173,7 @@ class _Formula(NamedTuple):
 
 
 MOST_FORMULAS = 4000  # cached: about 12 kB each, 800 for a scene with contact
-_own: set[Callable] = set()  # functions that are not inlined
+not_inlined: set[Callable] = set()
 
 
 def _is_plain(thing: Any) -> bool:
@@ -210,28 +205,21 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
 
 def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
     """Return what to run for arguments of these types; None if nothing is selected."""
-    if values.at_work():
-        return _formula(dispatch, kinds)
+    key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
         session = current()
-        if session.outdated or len(session.functions) > MOST_FORMULAS:
+        known = session.functions
+        if not values.at_work() and (session.outdated or len(known) > MOST_FORMULAS):
             session.outdated = False
-            for known in (session.functions, session.seen, session.walked):
-                known.clear()
-        return _formula(dispatch, kinds)
-
-
-def _formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
-    key = dispatch, numbers_of(kinds), values.all_called_in_one()
-    known = current().functions
-    if key not in known:
-        if values.is_begun(key):
-            raise CannotCompile("it calls itself", dispatch)
-        known[key] = _written(key, dispatch, kinds)
-    found = known[key]
-    if found is not None:
-        note(found.modules)
-    return found
+            for cleared in (known, session.seen, session.walked):
+                cleared.clear()
+        if key not in known:
+            if values.is_begun(key):
+                raise CannotCompile("it calls itself", dispatch)
+            known[key] = _written(key, dispatch, kinds)
+        if (found := known[key]) is not None:
+            note(found.modules)
+        return found
 
 
 def forget() -> None:
@@ -328,23 +316,18 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
     return None
 
 
-def alone(dispatch: Callable) -> None:
-    """Let kernels call `dispatch` as a separate function, without inlining."""
-    _own.add(dispatch)
-
-
 def _call(function: Callable, arguments: tuple) -> Any:
     """Call the implementation selected by the argument types, if there is one."""
     if function not in choosers:
         return NotImplemented
     lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))
-    if function in _own:  # one serves all numbers
+    if function in not_inlined:  # one serves all numbers
         kinds = tuple(map(types.unliteral, kinds))
     found = formula(function, kinds)
     if found is None:
         return NotImplemented
-    if function in _own:
+    if function in not_inlined:
         return lowering.call_own(found.name, found.run, kinds, found.result, arguments)
     if lowering.builder is None and found.plain:
         return lowering.wrapped(found.result, None)
