@@ -19,7 +19,7 @@ import pytest
 from listening import listening
 from numba import config
 
-from karamelo_py.compiler import cache, machine
+from karamelo_py.compiler import cache, choices, machine
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.lowering import FunctionType
@@ -469,6 +469,14 @@ def test_a_function_that_a_kernel_is_given_is_not_described():
     """Its number would be another one in each run: kernels would be kept and never found."""
     with pytest.raises(cache.Unknown):
         cache.describe(FunctionType(answer))
+
+
+def test_all_that_the_program_registers_has_words():
+    """Without words for one of them no kernel would be found by its sources."""
+    for made in choices.registered:
+        if not choices.modules_of(made):
+            assert cache._words(made) == cache._words(made)
+    assert len(choices.registered) > 50
 
 
 def test_what_threads_do_is_followed():

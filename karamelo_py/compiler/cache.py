@@ -220,16 +220,19 @@ def _words(thing: Any) -> str:
     return f"{name_of(function)} {code}({','.join(map(_words, parts))})"
 
 
-def _class(one: type) -> str:
-    """Name a class that can be found by its name, with the plain attributes that it was given."""
+def _class(one: type, by_name: bool = False) -> str:
+    """Describe a class by its name, its fields and the plain attributes that it was given.
+
+    Raises `Unknown` for a class that its name does not lead to: one of a plug-in, or any `by_name`.
+    """
     first, *rest = one.__qualname__.split(".")
     found = _names_in(one.__module__).get(first)
     for name in rest:
         found = vars(found).get(name) if isinstance(found, type) else None
-    if found is not one:
+    if found is not one and (by_name or choices.is_elsewhere(one.__module__)):
         raise Unknown(name_of(one))
     plain = [(k, v) for k, v in vars(one).items() if isinstance(v, _PLAIN) and k[:2] != "__"]
-    return f"{name_of(one)} {sorted(plain)}"
+    return f"{name_of(one)} {vars(one).get('_fields')} {sorted(plain)}"
 
 
 def describe(numba_type: Any) -> str:
@@ -238,7 +241,7 @@ def describe(numba_type: Any) -> str:
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
         one = choices.tag_class(numba_type)
-        return f"{how} {one and f'{_class(one)} {one._fields}'}({inner})"
+        return f"{how} {one and _class(one, by_name=True)}({inner})"
     if isinstance(numba_type, (types.Callable, types.Opaque)) and numba_type != types.none:
         raise Unknown(str(numba_type))
     return f"{how}:{numba_type}"
