@@ -488,7 +488,7 @@ QUESTIONS = {
     "retaining wall force": "howto/boundary",
     "free rigid body": "limits",
     "JWL": "limits",
-    "Mooney-Rivlin": "limits",
+    "Mooney-Rivlin": "reference/generated/material/mooney-rivlin",
     "terrain raster": "limits",
     "strength reduction": "howto/safety-factor",
     "LS-DYNA": "coming-from",
