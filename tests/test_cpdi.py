@@ -261,7 +261,7 @@ def test_corners_go_with_the_grid(basis, kin):
     for corner in range(carried(basis(), kin)):
         by = carrier(basis(), kin, grid, stencil, corner)
         u = slope @ (np.array(by.weights) @ positions[np.array(by.rows, int)])
-        new = carry(basis(), kin, new, place, corner, tuple(1e-3 * u))
+        new = carry(basis(), kin, new, corner, tuple(1e-3 * u))
     corners = np.array(place[d:]).reshape(-1, d)
     assert new[:d] == place[:d]
     assert np.array(new[d:]).reshape(-1, d) == pytest.approx(corners @ (np.eye(d) + 1e-3 * slope.T))

@@ -413,7 +413,7 @@ WRONG = [
         "region(corner, block, -INF, 1e-6, -INF, 1e-6)\n    "
         "group(corner, nodes, region, corner, all)"
         "\n    fix(pull, velocity_nodes, corner, 0, 0)",
-        "solid 's' can turn",
+        "solid 's' can rotate",
         "",
     ),
     (
