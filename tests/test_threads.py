@@ -66,3 +66,34 @@ def test_what_fails_in_a_team_is_raised(size):
         assert out.tolist() == [k * k for k in range(size)]
         with pytest.raises(ValueError, match="beyond the limit"):
             by_several(mode, out, size // 2, 5)
+
+
+def count_turn(out, k):
+    out[k] += 1
+
+
+_count_all = shared_out(count_turn)
+
+
+def in_many_loops(mode, out, times):
+    """Loops of few and of many indices in turn."""
+    for turn in range(times):
+        _count_all(mode, 1 + turn % out.size, out)
+    return times
+
+
+_many_by_team = by_team(in_many_loops)
+
+
+@kernel
+def many_loops(mode, out, times):
+    return _many_by_team(mode, out, times)
+
+
+@pytest.mark.parametrize(("threads", "times"), [(2, 4000), (7, 800)])
+def test_stress_of_the_protocol_of_teams(threads, times):
+    """Every index of many loops is done once, also by more threads than there are cores."""
+    team = new_team(threads)
+    mode, out = Threaded(team.ctypes.data), np.zeros(40, np.int64)
+    assert many_loops(mode, out, times) == times
+    assert out.tolist() == [times - times // 40 * k for k in range(40)]

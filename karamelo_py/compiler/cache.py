@@ -135,12 +135,6 @@ def short_hash(*words: str) -> str:
 
 
 @functools.cache
-def target() -> str:
-    """Describe the machine that code is made for."""
-    return repr(machine.describe())
-
-
-@functools.cache
 def _source(path: Path) -> str:
     """Hash a source as Python has read it; of a later state, nothing is known."""
     with contextlib.suppress(OSError):
@@ -282,8 +276,9 @@ class KernelFiles:
         made = [function, *self._called, *choices.registered]
         elsewhere = sorted(choices.modules_of(*made, *classes))
         words = [*map(_words, made), *map(describe, kinds)]
-        words += [describe(result) if result is not None else "", self._processor, target()]
-        words += [_sources(), repr(_VERSIONS), *(f"{one} {_stamp(one)}" for one in elsewhere)]
+        words += [describe(result) if result is not None else "", self._processor, _sources()]
+        words += [machine.describe(), repr(_VERSIONS)]
+        words += [f"{one} {_stamp(one)}" for one in elsewhere]
         name = re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")
         return f"{name}.{short_hash(*words)}"
 

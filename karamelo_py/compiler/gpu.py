@@ -272,7 +272,7 @@ class _Coded:
         with compilation(function.__name__), modules_noted() as modules:
             note(modules_of(function, *called.values()))
             name, text = text_of(function, kinds, self.on_card, called)
-            file = f"{name}.{cache.short_hash(text, self.processor, cache.target())}"
+            file = f"{name}.{cache.short_hash(text, self.processor, machine.describe())}"
             code = cache.machine_code(file, lambda: self.made(text))
         return Code(f"{name}_entry", code, file, (), frozenset(modules))
 

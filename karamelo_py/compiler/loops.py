@@ -154,7 +154,7 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> Un
         module, result = written(function, kinds, result)
         text = str(module)
         readable = re.sub(r"[^\w.]", "_", function.__qualname__, flags=re.ASCII)
-        name = f"{readable}.{cache.short_hash(text, cache.target())}"
+        name = f"{readable}.{cache.short_hash(text, machine.describe())}"
         made = cache.machine_code(name, lambda: machine.compile_text(text.replace(NAME, name)))
     needs = tuple(module.needs.values())
     return Unit(name, result, made, needs, frozenset(modules), module.raises)

@@ -29,10 +29,11 @@ def features() -> str:
     return ""
 
 
-def describe() -> tuple:
+@functools.cache
+def describe() -> str:
     """Everything that determines the code besides the source."""
-    version = llvm.llvm_version_info
-    return version, llvm.get_process_triple(), llvm.get_host_cpu_name(), features(), OPTIONS, LEVEL
+    words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
+    return repr((*words, features(), OPTIONS, LEVEL))
 
 
 @functools.cache

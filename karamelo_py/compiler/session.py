@@ -12,15 +12,13 @@ class Session:
     """Memory of the compiler; one thread of Python at a time compiles (`one_at_a_time`)."""
 
     def __init__(self) -> None:
-        # Functions of kernels: by themselves, and compiled for types of arguments.
         self.seen: dict[Any, Any] = {}
         self.walked: dict[Callable, Any] = {}
-        self.functions: dict[tuple, Any] = {}
+        self.functions: dict[tuple, Any] = {}  # compiled for types of arguments
         self.operations: dict[tuple, Any] = {}
         self.outdated = False  # functions have to be found anew
         self.changes = 0  # of implementations that compiled kernels may contain
-        # Machine code in memory: addresses by the names of kernels, and of functions by types.
-        self.loaded: dict[str, list[int]] = {}
+        self.loaded: dict[str, list[int]] = {}  # addresses, by names of kernels
         self.addresses: dict[tuple, int] = {}
         self.interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
         # Arrays that kernels were called with, by id, and numbers of their types.

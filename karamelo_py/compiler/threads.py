@@ -5,8 +5,7 @@ The arguments of a loop stay in memory; the body is a function of their address 
 Waking sleeping threads takes as long as a small loop. A kernel with many loops is therefore run by
 a *team* (`by_team`): its first thread executes the kernel, the others wait for its loops. Each
 thread has a fixed range of the indices of a loop, the same in each step, and takes indices of
-threads that make no progress. The leader waits for indices that were taken, never for threads, so a
-thread that is preempted delays nobody.
+threads that make no progress (work stealing).
 """
 
 import ctypes
@@ -254,6 +253,16 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 
 # --- teams ------------------------------------------------------------------------------------
 
+# Only the leader writes _STATE: it waits, leads, has ended. Why a loop is done exactly once:
+# 1. A ticket is the number of the loop and the indices left in a range. An index is taken by a
+#    compare-and-swap of the ticket, so by one thread; a ticket of another loop is never equal.
+# 2. The leader releases task, arguments and count before the tickets, and every swap continues that
+#    release: who has taken an index has acquired the words of its loop.
+# 3. A taken index is missing in _DONE until it is finished, and the leader stays in the loop until
+#    _DONE and its own indices are the count: the words cannot change meanwhile, and by acquiring
+#    _DONE it sees all that the others stored.
+# 4. It takes what is left itself, and so waits for taken indices, never for a thread: one that was
+#    preempted, woke late or left, since no leader came in time, delays nothing and takes nothing.
 # Words, each in a separate cache line.
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
@@ -281,9 +290,7 @@ def _take_part(team, k):
     """
     size = read(team + _SIZE)
     epoch = read(team + _TICKETS + 64 * k) >> 32
-    mine = 0
-    looks = 0
-    seen = 0
+    mine = looks = seen = 0
     while True:
         part = k
         word = read(team + _TICKETS + 64 * k)
@@ -332,8 +339,7 @@ def _share(team, count, task, arguments):
 @noinline
 def _serve(team, k):
     """Take part in loops until the leader ends, if there is one."""
-    seen = -1
-    pauses = 0
+    seen, pauses = -1, 0
     while True:
         state = read(team + _STATE)
         if state == _ENDED or (state == _WAITS and pauses > _PATIENCE):
