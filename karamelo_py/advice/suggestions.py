@@ -14,8 +14,6 @@ from karamelo_py.points.laws import parameter
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
-from karamelo_py.styles.regions import Cylinder
-from karamelo_py.styles.solids import RegionSolid
 
 Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
 
@@ -173,8 +171,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
         most = max(most, len(across))
         first, last = solid.x0[:, k].min(), solid.x0[:, k].max()
         apart = len(across) - 1
-        ppc = solid.ppc if isinstance(solid, RegionSolid) else 1
-        half = (last - first) / apart / 2 if apart else solid.h / ppc / 2
+        half = (last - first) / apart / 2 if apart else solid.h / (solid.ppc or 1) / 2
         ends.add((round((first - half) / solid.h, 6), round((last + half) / solid.h, 6)))
     return most if len(ends) == 1 and _faces_held(hub, k, *ends.pop()) else 0
 
@@ -200,11 +197,9 @@ def _round(hub: Hub, simulation: Any) -> Words:
     """Find cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
-    solids = hub.solids.values()
-    regions = [solid.region for solid in solids if isinstance(solid, RegionSolid)]
-    cylinders = [region for region in regions if isinstance(region, Cylinder)]
-    axes = {cylinder.axis for cylinder in cylinders}
-    if len(axes) != 1 or len(cylinders) < len(solids):
+    regions = [solid.region for solid in hub.solids.values() if solid.region is not None]
+    axes = {region.axis for region in regions}
+    if len(axes) != 1 or None in axes or len(regions) < len(hub.solids):
         return
     along, middle = axes.pop()
     across = [axis for axis in range(3) if axis != along]
@@ -223,7 +218,7 @@ def _round(hub: Hub, simulation: Any) -> Words:
             return
         if not _alike(hub, fix, turned):
             return
-    radius = max(cylinder.radius for cylinder in cylinders)
+    radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
     yield (

@@ -25,6 +25,7 @@ class Region(Named):
     """
 
     radius = 0.0
+    axis: Any = None  # of a cylinder in 3D: its direction, and its two middle coordinates
     skin: Any = None  # the surface of a region from a file
     catalogue = "regions"
 
