@@ -163,12 +163,14 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     monkeypatch.setattr(cache, "machine_code", lambda name, make: b"")
     monkeypatch.setattr(cache.KernelFiles, "kernel", lambda self, kinds, result, made: made())
     found = []
-    for kinds in steps:
+    for kinds in reversed(steps):  # those of other tests, too
         forget()
         outdate_kernels()
         words.clear()
         advance.unit(kinds)
         found.append({*words})
+        if found[-1] == IN_KERNEL:
+            break
     outdate_kernels()
     assert IN_KERNEL in found
 
