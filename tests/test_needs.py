@@ -521,6 +521,48 @@ def test_wide_functions_where_no_point_crosses(advice):
     assert advice(plane(method="ulmpm, FLIP, cubic-spline, 1")) == ""
 
 
+PULLED = "fix(pull, body_force, all, 0, -1)"
+
+
+def test_a_scene_with_two_equal_sides(advice):
+    """A square of 4 x 4 cells about x = 4, a plane of nodes; its weight acts along y."""
+    said = advice(plane(more=PULLED))
+    assert said.startswith("the scene is the same on both sides of x = 4: twice the points")
+    assert said.endswith("half of it, and the nodes at x = 4 held in x")
+    assert "y = 4" in advice(plane(more=PULLED.replace("0, -1", "-1, 0")))
+
+
+@pytest.mark.parametrize(("hi", "mirrored"), [("INF", True), ("3", False)])
+def test_a_box_with_two_equal_sides(advice, hi, mirrored):
+    """A floor below all of it, or below its left half."""
+    text = f"""
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 6, 0, 6, 0, 6, 1)
+region(b, block, 1, 5, 1, 4, 0, 3)
+material(m, neo-hookean, 1, 1000, 0.3)
+solid(s, region, b, 1, m, 1, 0)
+region(f, block, -INF, {hi}, -INF, INF, 0, 0)
+group(floor, nodes, region, f, all)
+fix(h, velocity_nodes, floor, 0, 0, 0)
+fix(g, body_force, all, 0, 0, -0.1)
+run(1)
+"""
+    assert ("on both sides of x = 3" in advice(text)) == mirrored
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        PULLED.replace("0, -1", "1, -1"),
+        PULLED.replace("-1)", "-x)"),
+        "region(left, block, 2, 3, 2, 6)\ngroup(left, nodes, region, left, all)\n"
+        + PULLED.replace("all", "left"),
+    ],
+)
+def test_what_acts_on_one_side_more_is_no_mirror(advice, more):
+    assert "both sides" not in advice(plane(more=more))
+
+
 def test_half_of_a_scene_gives_the_results_of_the_whole(state_interpreted):
     """With linear functions, a falling square whose floor holds it: the points beyond x = 4."""
     floor = "region(floor, block, -INF, INF, -INF, 2)\ngroup(floor, nodes, region, floor, all)\n"
@@ -535,6 +577,10 @@ def test_half_of_a_scene_gives_the_results_of_the_whole(state_interpreted):
         beyond = np.sort(all_of[name][all_of["x"] > 4])
         assert np.ptp(beyond) > 0
         assert np.sort(right[name]) == pytest.approx(beyond, rel=1e-9, abs=1e-12)
+
+
+def test_no_mirror_between_nodes(advice):
+    assert "both sides" not in advice(plane(more=PULLED, n=3))
 
 
 def test_double_precision_of_a_large_scene(lowered):

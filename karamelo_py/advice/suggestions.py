@@ -34,7 +34,7 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
     """Find all that is known to be paid for without need, before anything has run."""
-    rules = _unread, _of_parts, _averaging, _flat, _round, _precision, _output
+    rules = _unread, _of_parts, _averaging, _flat, _round, _mirrored, _precision, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
@@ -227,6 +227,54 @@ def _round(hub: Hub, simulation: Any) -> Words:
         f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
         "and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
     )
+
+
+def _mirrored(hub: Hub, simulation: Any) -> Words:
+    """Find scenes that are the same on both sides of a plane across an axis."""
+    domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
+    if len(hub.lattices) > 1 or not _acting(hub):
+        return
+    if not all(solid.region for solid in solids):
+        return  # they may come with velocities
+    for k in range(1 if domain.axisymmetric else 0, domain.dimension):
+        ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
+        middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
+        cells = (middle - domain.lo[k]) / domain.h
+        rest = [axis for axis in range(domain.dimension) if axis != k]
+        if abs(cells - round(cells)) > 1e-6 or not all(_given_alike(hub, k, rest)):
+            continue
+
+        def sides(x: np.ndarray, k: int = k, middle: float = middle) -> np.ndarray:
+            folded = x.copy()
+            folded[:, k] = np.abs(x[:, k] - middle)
+            return folded
+
+        if all(_both_sides(solid, sides) for solid in solids) and all(
+            _alike(hub, fix, sides) for fix in _acting(hub)
+        ):
+            yield (
+                f"the scene is the same on both sides of {AXES[k]} = {middle:g}: twice the points "
+                "(unless it is to buckle or to break unevenly); energies are halved, and bases "
+                "wider than linear change results by some per cent on coarse grids",
+                f"half of it, and the nodes at {AXES[k]} = {middle:g} held in {AXES[k]}",
+            )
+            return
+
+
+def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
+    """Tell of each fix whether it does nothing along direction k, and depends on no place there."""
+    for fix in _acting(hub):
+        given = _given(fix)
+        others = [given[j] for j in rest if j < len(given)]
+        yield (len(given) <= k or is_zero(given[k])) and not any(
+            _depends(act, AXES[k]) for act in (*others, fix.wall_friction)
+        )
+
+
+def _both_sides(solid: Any, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Tell whether each point of a solid has one on the other side."""
+    places = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
+    return bool((np.unique(places, axis=0, return_counts=True)[1] == 2).all())
 
 
 def _precision(hub: Hub, simulation: Any) -> Words:
