@@ -168,6 +168,40 @@ def test_stress_is_the_slope_of_the_energy(kin, law):
     assert (ends[0] - ends[1]) / (2 * h) == pytest.approx(work, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    "law",
+    [
+        MooneyRivlin.given(1, 0.15, 0.05, 4),
+        MooneyRivlin.given(1, 0.01, 0.2, 4),
+        Yeoh.given(1, 4, 0.2, -0.01, 0.02),
+        Gent.given(1, 0.4, 30, 4),
+        Ogden.given(1, 4, 0.6, 1.3, -0.1, -2),
+        SaintVenantKirchhoff.given(1, 1.0, 0.5),
+        *(ready(1, form, G=1.0, lam=1.5) for form in (FORMULA, IN_STRETCHES)),
+    ],
+)
+@pytest.mark.parametrize(
+    "stretches", [(1, 1, 1), (2, 2, 0.25), (3, 0.6, 0.6), (0.5, 1.4, 1.4), (1.2, 0.9, 1.05)]
+)
+def test_waves_are_no_faster_than_their_bound(law, stretches):
+    """rho c^2 = d2W/de2 of F + e u n.F for unit vectors u and n, of all directions (Ogden 1997)."""
+    rng, F, h = np.random.default_rng(0), np.diag(stretches).astype(float), 1e-4
+
+    def energy(F):
+        return energy_density(law, SPACE, State(flat(SPACE, F)))
+
+    fastest, middle = 0.0, energy(F)
+    ways = [*np.eye(3), *rng.normal(size=(40, 3))]
+    for n in ways:
+        for u in (n, *np.eye(3), rng.normal(size=3)):
+            G = np.outer(u / np.linalg.norm(u), n / np.linalg.norm(n)) @ F
+            fastest = max(fastest, (energy(F + h * G) + energy(F - h * G) - 2 * middle) / h**2)
+    bound = wave_speed_squared(law, SPACE, State(flat(SPACE, F)))
+    assert bound > 0.98 * fastest - 1e-6
+    if stretches == (1, 1, 1):
+        assert bound == pytest.approx(fastest, rel=1e-3)
+
+
 def test_rest_is_without_stress_and_energy():
     for law in (*LAWS.values(), Ogden.given(1, 5, 0.6, 1.3), Yeoh.given(1, 9, 1, -0.1, 0.1)):
         state = initial_state(law, SPACE, 1.0)

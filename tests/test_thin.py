@@ -7,6 +7,8 @@ import pytest
 from conftest import INPUTS
 from scipy.optimize import brentq
 
+from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.kernels.implicit import nominal_stress, stress_and_tangent
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, large
 from karamelo_py.points.laws import (
     advance,
@@ -143,6 +145,61 @@ def test_a_thin_disk_spins(run_script):
     """(3 + nu)/8 rho w^2 R^2 at its centre (Timoshenko & Goodier 1970, section 32)."""
     result = run_script(INPUTS / "models" / "in.disk", "-var", "n", "8")
     assert result.log["err"][-1] < 0.005
+
+
+SHEET = """
+    method(tlmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 1, 0, 1, 0.5)
+    plane_stress(true)
+    region(all, block, 0, 1, 0, 1)
+    material(m, neo-hookean, 1000, 1e6, 0.49)
+    solid(s, region, all, 2, m, 0.5, 0)
+    group(s, particles, region, all, solid, s)
+    group(nodes, nodes, region, all, all)
+    fix(pull, velocity_nodes, nodes, 0.2*x0, 0.2*y0)
+    set_dt(1)
+    compute(Es, strain_energy, s)
+    compute(a, average_stress, s)
+    log_modify(custom, Es, a_11, a_33)
+    run(1)
+"""
+
+
+def test_one_load_step_stretches_a_sheet_exactly(run_interpreted):
+    """As in `test_a_sheet_of_rubber_is_stretched`: a law of F in a load step of any size."""
+    lam, shear = lame_parameters(1e6, 0.49)
+    c = brentq(lambda c: shear * (c * c - 1) + lam * log(1.44 * c), 0.1, 1)
+    J = 1.44 * c
+    table = run_interpreted(SHEET).log
+    stress = (shear * (1.44 - 1) + lam * log(J)) / J
+    assert table["a_11"][-1] == pytest.approx(stress, rel=1e-8)
+    assert abs(table["a_33"][-1]) < 1e-6 * stress
+    energy = shear / 2 * (2.88 + c * c - 3) - shear * log(J) + lam / 2 * log(J) ** 2
+    assert table["Es"][-1] == pytest.approx(energy, rel=1e-8)
+
+
+@pytest.mark.parametrize("law", [LINEAR, PLASTIC, NeoHookean(1 / RHO, LAM, G)])
+@pytest.mark.parametrize("kin", [Line(), PLANE])
+def test_tangents_of_thin_laws(law, kin):
+    """Against central differences, at rest and after a step."""
+    law = Thin(law)
+    state = initial_state(law, kin, 1.0)
+    for size in (0.0, 2e-4):
+        H = kin.Tensor._make([size] * kin.tensor_size)
+        _, C = on_numbers(stress_and_tangent)(law, kin, state, H, 1.0)
+        for k in range(kin.tensor_size):
+            ends = []
+            for h in (1e-7, -1e-7):
+                moved = kin.Tensor._make([x + h * (j == k) for j, x in enumerate(H)])
+                ends.append(nominal_stress(law, kin, state, moved, 1.0))
+            slopes = [(a - b) / 2e-7 for a, b in zip(*ends, strict=True)]
+            assert [row[k] for row in C] == pytest.approx(slopes, abs=2e-4 * E)
+
+
+def test_loads_by_sizes_of_points_are_refused_with_a_thickness(run_interpreted):
+    script = PLATE.replace("restart(", "fix(w, contact/surface, plate, box)\n    restart(")
+    assert "sizes of points" in run_interpreted(script, status=1).err
 
 
 PLATE = """

@@ -194,7 +194,7 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
             f"more points per cell{instead}, method tlcpdi, or {smaller}",
             "tangled",
         )
-    law = solid_with(hub, number).material.law
+    law = solid_with(hub, number).material.whole
     other = ", or a law that resists the compression (neo-hookean)" if by_rates(law) else ""
     return Trouble(
         f"{name} at {where(old)} is turned inside out (det F <= 0)",

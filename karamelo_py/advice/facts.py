@@ -124,7 +124,8 @@ class SceneFacts:
     @property
     def locks(self) -> bool:
         """Return True if linear cells contain several points whose volumes hardly change."""
-        return self.hats and self.d > 1 and not (self.sparse or self.hub.update.anti_locking)
+        free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
+        return self.hats and self.d > 1 and not free
 
     @property
     def grid_viscosity(self) -> float:

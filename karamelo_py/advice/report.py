@@ -43,7 +43,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
     set_up = machine_memory.age()
     say = hub.console.say
     s = simulation.setup
-    say(f"dimension      {s.kin.dimension} ({s.kin.word})")
+    thin = {1: "uniaxial stress", 2: "plane stress"}
+    word = thin[s.kin.dimension] if hub.domain.thin else s.kin.word
+    say(f"dimension      {s.kin.dimension} ({word})")
     say(f"method         {hub.update.words}")
     say(f"precision      {hub.settings.precision}")
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")

@@ -120,6 +120,11 @@ def _define(
     _check_names(hub, kind, ID, target)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
     new.style = style
+    if kind == "fix" and new.by_sizes and hub.domain.thickness != 1:
+        raise ScriptError(
+            "it takes the sizes of points from their volumes, which contain the thickness",
+            expected="plane_stress(true) with the thickness 1, and loads per thickness",
+        )
     replaces = own is hub.fixes
     if replaces and ID in own:
         hub.warn(

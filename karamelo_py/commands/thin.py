@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.laws import law_parts, law_traits, moves_as_told, parameter
+from karamelo_py.points.laws import is_round, law_parts, law_traits, moves_as_told, parameter
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -110,5 +110,11 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
             "without stress across the body this material has no strength",
             argument="style",
             expected="a solid that sustains tension, or plane strain",
+        )
+    if hub.domain.dimension == 1 and not is_round(material.whole):
+        raise ScriptError(
+            "the material is not the same in y and z, so that a bar of it would bend or flatten",
+            argument="style",
+            expected="plane_stress in 2D, or a material with equal axes y and z",
         )
     material.thin = True

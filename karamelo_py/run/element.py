@@ -323,6 +323,9 @@ class Point:
         after = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.work += float(weights * (before + after) / 2 @ increment)
         self.strain = self.strain + increment
+        across = laws.stretch_across(self.law, self.state)
+        if across != 1:
+            self.strain[self.kin.dimension : 3] = np.log(across)
 
 
 WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank

@@ -98,6 +98,7 @@ class Fix(Publisher):
     # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
+    by_sizes = False  # takes the sizes of points from their volumes, and no thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
     follows_points = False  # the force depends on positions of points, as for tools

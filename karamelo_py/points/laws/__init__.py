@@ -38,6 +38,7 @@ class LawTraits(NamedTuple):
     rings: bool = True  # vibrates, unless it has no shear modulus
     any_speed: bool = False  # may move many times faster than its waves, as gases
     least_density: float = 10.0  # kg/m^3, below which units are likely wrong
+    wraps: bool = False  # can what the law within can
 
 
 def law_traits(part: Any) -> LawTraits:
@@ -75,7 +76,8 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 def can(law: NamedTuple, function: Callable) -> bool:
     """Check that a point function is defined for a law, or for one of its parts."""
-    return any(function.defined(kind) for kind in law_kind(law))
+    kinds = (kind for kind in law_kind(law) if not law_traits(kind).wraps)
+    return any(function.defined(kind) for kind in kinds)
 
 
 _columns: dict[type, dict[str, NamedTuple]] = {}
@@ -180,6 +182,18 @@ def wave_speed_squared(law, kin, state):
 def wave_speed_bound(law, kin, state):
     """Upper bound of `wave_speed_squared`, if that is cheaper: most points are slower anyway."""
     return wave_speed_squared(law, kin, state)
+
+
+@point_function(otherwise=True)
+def stretch_across(law, state):
+    """Stretch across a thin body, thickness over initial thickness; 1 for all other laws."""
+    return 1
+
+
+@point_function(otherwise=True)
+def is_round(law):
+    """Return True if a bar along x that is pulled contracts by the same in y and z."""
+    return True
 
 
 @point_function(otherwise=True)

@@ -1,9 +1,10 @@
 """Hyperelastic laws given by their stored energy, a formula.
 
 The formula is differentiated once, when a script defines the material. Its structure belongs to the
-class of the law, so that kernels contain it as code; its numbers are parameters, so that laws that
-differ only in them have the same kernels. Formulas of invariants need no principal directions and
-are computed in lanes; formulas of principal stretches take points one by one.
+class of the law, so that kernels contain it as code; its numbers are parameters. Laws that differ
+only in numbers have the same kernels, unless some of these are equal or small whole exponents.
+Formulas of invariants need no principal directions and are computed in lanes; formulas of principal
+stretches take points one by one.
 """
 
 import hashlib
@@ -16,6 +17,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.compiler.trace import one_at_a_time
 from karamelo_py.points import laws
@@ -247,7 +249,7 @@ class OfStretches(ByEnergy):
     """The energy depends on the principal stretches."""
 
     __slots__ = ()
-    scalarised = ("kirchhoff_stress", "wave_speed_squared", "energy_density")
+    scalarised = ("kirchhoff_stress", "wave_speed_squared", "shear_part", "energy_density")
     first: ClassVar[tuple[Code, ...]]  # derivatives by l1, l2, l3
     second: ClassVar[tuple[Code, ...]]  # by 11, 12, 13, 22, 23, 33
 
@@ -434,12 +436,29 @@ def _energy_density_of_invariants(law, kin, state):
 
 @laws.wave_speed_squared.on(OfInvariants)
 def _wave_speed_squared_of_invariants(law, kin, state):
-    # The second derivative of W by the logarithm of the stretch with the square x, without the
-    # change of its first; the largest row sum bounds the largest x.
+    # Bounds of l^2 d2W/dl^2 (`along_direction`) and of shear, 2 x_a (W_1 + x_c W_2), term by term:
+    # the squares x of principal stretches lie between the bounds of Gershgorin, and above J^2/I2.
     b = state.F.left_cauchy_green()
-    at = invariants(b, det(state.F))
-    x = b.largest_row_sum()
-    return max(along_direction(law, at, x, max(at[0] - x, 0)), 0) * law.specific_volume
+    I1, I2, J = at = invariants(b, det(state.F))
+    low, high = max(J * J / I2, least_of_rows(b)), b.largest_row_sum()
+    most = min(0.25 * I1 * I1, high * (I1 - low))  # of x (I1 - x)
+    least = max(min(low * (I1 - low), high * (I1 - high)), 0)
+    W1, W2, _ = [evaluated(code, law, at) for code in law.first]
+    W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
+    along = 2 * high * max(W1, 0) + 2 * most * max(W2, 0) + 2 * least * min(W2, 0)
+    along += 4 * high * high * max(W11, 0) + 4 * low * low * min(W11, 0)
+    along += 8 * high * most * max(W12, 0) + 4 * most * most * max(W22, 0) + J * J * WJJ
+    along += 4 * J * (high * max(W1J, 0) + low * min(W1J, 0))
+    along += 4 * J * (most * max(W2J, 0) + least * min(W2J, 0))
+    shear = 2 * high * (max(W1, 0) + high * max(W2, 0))
+    return max(along, shear, 0) * law.specific_volume
+
+
+def least_of_rows(s):
+    """min_i (s_ii - sum_j |s_ij|): a bound of the smallest eigenvalue (Gershgorin)."""
+    a = s.at()
+    rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
+    return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
 
 
 def along_direction(law, at, x, rest):
@@ -479,17 +498,22 @@ def _kirchhoff_stress_of_stretches(law, kin, state):
     at, directions = stretches_of(b)
     slopes = [evaluated(code, law, at) for code in law.first]
     tau = tuple([x * slope for x, slope in zip(at, slopes, strict=True)])
+    return from_principal(b, tau, directions, PairLimits(*limits_of(law, at, slopes)))
+
+
+PAIRS = tuple(combinations(range(3), 2))
+CLOSE = 1e-5  # squares of stretches that count as equal
+
+
+def limits_of(law, at, slopes):
+    """(tau_a - tau_b) / (l_a^2 - l_b^2) of the pairs of stretches, where they are equal."""
     W11, W12, W13, W22, W23, W33 = [evaluated(code, law, at) for code in law.second]
-    # At equal stretches a and b, (tau_a - tau_b) / (l_a^2 - l_b^2).
     twice = (W11 + W22 - 2 * W12, W11 + W33 - 2 * W13, W22 + W33 - 2 * W23)
     limits = []
     for (i, j), curve in zip(PAIRS, twice, strict=True):
         mean = slopes[i] / at[i] + slopes[j] / at[j]
         limits.append(0.25 * (mean + curve))
-    return from_principal(b, tau, directions, PairLimits(*limits))
-
-
-PAIRS = tuple(combinations(range(3), 2))
+    return limits
 
 
 @laws.energy_density.on(OfStretches)
@@ -503,7 +527,28 @@ def _wave_speed_squared_of_stretches(law, kin, state):
     at, _ = stretches_of(state.F.left_cauchy_green())
     W11, _, _, W22, _, W33 = [evaluated(code, law, at) for code in law.second]
     l1, l2, l3 = at
-    return max(l1 * l1 * W11, l2 * l2 * W22, l3 * l3 * W33, 0) * law.specific_volume
+    along = max(l1 * l1 * W11, l2 * l2 * W22, l3 * l3 * W33, 0)
+    return max(along, shear_between(law, at)) * law.specific_volume
+
+
+@laws.shear_part.on(OfStretches)
+def _shear_part_of_stretches(law, kin, state):
+    at, _ = stretches_of(state.F.left_cauchy_green())
+    return 2 * shear_between(law, at) * law.specific_volume
+
+
+def shear_between(law, at):
+    """The largest rho c^2 of shear waves: l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
+    slopes = [evaluated(code, law, at) for code in law.first]
+    limits = limits_of(law, at, slopes)
+    found = []
+    for (i, j), limit in zip(PAIRS, limits, strict=True):
+        apart = at[i] * at[i] - at[j] * at[j]
+        alike = abs(apart) < CLOSE
+        tau = at[i] * slopes[i] - at[j] * slopes[j]
+        ratio = where(alike, limit, tau / where(alike, 1, apart))
+        found.append(max(at[i] * at[i], at[j] * at[j]) * ratio)
+    return max(*found, 0)
 
 
 @laws.elastic_strain.on(ByEnergy)

@@ -51,7 +51,8 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
         path, stretch = unstable
         yield (
             f"it loses its stiffness in {path} at a stretch of {stretch:.2g}",
-            "stay below, or add terms that stiffen: beyond, strain localizes in one cell",
+            f"stay {'below' if stretch > 1 else 'above'}: beyond, strain localizes in one cell; "
+            "terms that stiffen prevent it",
         )
 
 

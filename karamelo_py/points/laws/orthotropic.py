@@ -194,18 +194,27 @@ def fastest(C: np.ndarray) -> float:
 
 
 def couples(law: Any, scene: Any) -> bool:
-    """Return True if a body in 2D would shear out of its plane."""
-    shears = [law[STIFFNESS[a][b]] for a in (0, 1, 2, 5) for b in (3, 4)]
-    return scene.d == 2 and max(map(abs, shears)) > COUPLED * law.fastest
+    """Return True if a body in 2D or 1D would shear out of its plane or line."""
+    inside, outside = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}[scene.d]
+    shears = [abs(law[STIFFNESS[a][b]]) for a in inside for b in outside]
+    return max(shears, default=0) > COUPLED * law.fastest
+
+
+@laws.is_round.on(Directional)
+def _is_round_directional(law):
+    equal = (((0, 1), (0, 2)), ((1, 1), (2, 2)), ((4, 4), (5, 5)))
+    apart = [law[STIFFNESS[a][b]] - law[STIFFNESS[c][d]] for (a, b), (c, d) in equal]
+    coupled = [law[STIFFNESS[a][b]] for a in (0, 1, 2) for b in (3, 4, 5)]
+    return max(map(abs, (*apart, *coupled))) <= COUPLED * law.fastest
 
 
 known_failure(
     Directional,
     "directions out of the plane",
     when=couples,
-    reason="no axis of material '{owner.id}' is z: the body would shear out of its plane, which a "
-    "2D scene prevents",
-    cure="a 3D scene, or tilt 0 or 90 with spin 0",
+    reason="the axes of material '{owner.id}' lean: the body would shear out of its plane, which "
+    "{scene.d}D prevents",
+    cure="a 3D scene, or axes along x, y and z (in 2D, tilt 0 or 90 with spin 0)",
 )
 
 

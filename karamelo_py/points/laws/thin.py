@@ -31,6 +31,7 @@ class Thin(NamedTuple):
     law: Any
 
     in_lanes = True
+    traits = laws.LawTraits(wraps=True)
     trials = 3  # of q in a step: increments are small
 
 
@@ -54,10 +55,11 @@ class Within(NamedTuple):
     column: Any
 
 
-def across(kin, dl, q):
-    """The increment `dl` in the body, with q across it."""
+def across(law, kin, dl, q):
+    """The increment `dl` in the body, with q across it, as the wrapped law takes it."""
     if isinstance(dl, LargeIncrement):
-        return large(across(kin, dl.dl, q))
+        step = across(law, kin, dl.dl, q)
+        return large(step) if laws.by_rates(law) else step
     none = real(0, q)
     numbers = (*dl, q) if kin.dimension == 2 else (dl[0], none, none, q, q)
     return WHOLE.Tensor._make(numbers)
@@ -72,13 +74,17 @@ def _initial_state_thin(law, kin, like):
 def _advance_thin(law, kin, state, dl, dt):
     inner, old = law.law, state.whole
     volume = laws.specific_volume(inner) * laws.jacobian(inner, WHOLE, old)
-    modulus = laws.wave_speed_squared(inner, WHOLE, old) / volume
+    squared = laws.wave_speed_squared(inner, WHOLE, old)
+    modulus = squared / volume
+    # Stress across per strain q: 2 G + lambda in a plate, 2 G + 2 lambda in a bar.
+    rest = squared - min(laws.shear_part(inner, WHOLE, old), squared)
+    first = modulus + (2 - kin.dimension) * rest / volume
 
     def tried(q):
-        new = laws.advance(inner, WHOLE, old, across(kin, dl, q), dt)
+        new = laws.advance(inner, WHOLE, old, across(inner, kin, dl, q), dt)
         return new, laws.cauchy_stress(inner, WHOLE, new)[2]
 
-    q, slope = modulus - modulus, modulus
+    q, slope = modulus - modulus, first
     new, stress = tried(q)
     for _ in range((ENOUGH if isinstance(dl, LargeIncrement) else law.trials) - 1):
         furthest, left = FURTHEST * (1 + q), stress
@@ -119,8 +125,14 @@ for _function in (
     laws.plastic_strain,
 ):
     _by_state(_function)
-for _function in (laws.by_rates, laws.specific_volume, laws.heat_capacity, laws.conductivity):
+for _function in (laws.specific_volume, laws.heat_capacity, laws.conductivity):
     _by_law(_function)
+
+
+@laws.by_rates.on(Thin)
+def _by_rates_thin(law):
+    """Ask for the logarithm in load steps, which need more trials, whatever the wrapped law."""
+    return True
 
 
 @laws.wave_speed_squared.on(Thin)
@@ -202,4 +214,10 @@ def _thickness_thin(law, kin, state):
     return state.across
 
 
-laws.column(Thin, "thickness", thickness)
+@laws.stretch_across.on(Thin)
+def _stretch_across_thin(law, state):
+    return state.across
+
+
+for _kind in (Thin, ThinInLargeIncrements):
+    laws.column(_kind, "thickness", thickness)

@@ -308,7 +308,7 @@ class InitialStress(Fix):
         super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
         for solid in hub.solids.values():
-            if group.touches(solid) and not can(elastic_law(solid.material.law), with_stress):
+            if group.touches(solid) and not can(elastic_law(solid.material.whole), with_stress):
                 raise ScriptError(
                     f"the stress of solid '{solid.id}' follows from its deformation "
                     "and cannot be set",
@@ -337,7 +337,7 @@ def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
     found = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():
-        law = elastic_law(law_on(solid.material.law, solid.h, solid.T0))
+        law = elastic_law(law_on(solid.material.whole, solid.h, solid.T0))
         ids = np.arange(solid.first_id, solid.first_id + solid.count)
         x = solid.x0[fix.group.has(ids)]
         if not len(x) or not can(law, with_stress):

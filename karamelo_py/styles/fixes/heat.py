@@ -149,6 +149,8 @@ def heat(capacity, T, face, supply, value, other, dt):
 class FacesOfPoints(HeatFix):
     """A fix that acts through one face of each point."""
 
+    by_sizes = True
+
     def defined(self) -> None:
         """Print the area that the group covers."""
         hub, d = self.hub, self.hub.domain.dimension

@@ -43,6 +43,8 @@ class PairContact(Gripping):
     With several processes, the first one searches for pairs among all points that may touch.
     """
 
+    by_sizes = True
+
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = True
@@ -123,12 +125,12 @@ class PairContact(Gripping):
             found.append(rows[:count].copy())
         return found
 
-    def _known(self, simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
+    @staticmethod
+    def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
         """Numbers, masses, radii, positions and velocities of some points, and their grip."""
         kin, x = simulation.kin, block.points.x[simulation.now]
         found = np.empty((len(rows), 3 + 2 * kin.dimension))
         pairs.collect(kin, x, block.points, block.laws, rows, found)
-        found[:, 2] *= self.hub.domain.thickness ** (-1 / kin.dimension)
         return found if grip is None else np.concatenate([found, grip[:, rows].T], axis=1)
 
     def _push(

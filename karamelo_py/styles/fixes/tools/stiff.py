@@ -16,6 +16,8 @@ CLOSE = 0.5  # radii off the surface, within which bouncing points retain their 
 class StiffTool(Gripping, ToolFix):
     """Base of tools that stop a point within a step, with friction."""
 
+    by_sizes = True
+
     impulsive = True
     kind_of_grip = GripOfTool
 
