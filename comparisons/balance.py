@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py import Simulation
+from karamelo_py.advice import energy
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import moves_as_told
-from karamelo_py.run.diagnosis import energy
+from karamelo_py.run.energy import share_lost, unknown_work
 
 ROOT = Path(__file__).parent.parent
 INPUTS, PAGE = ROOT / "inputs", ROOT / "docs" / "balance.md"
@@ -128,7 +129,7 @@ def measure(script: Path, *, full: bool = False) -> Balance:
     )
     size = max(np.sqrt(2 * mass * log["E_balance"].max()), np.abs(impulse).max())
     watched = simulation.control.clock[0].watch_energy
-    lost = energy.share_lost(simulation) if watched else np.nan
+    lost = share_lost(simulation) if watched else np.nan
     # Forces of implicit steps are those of their ends.
     momentum = np.nan if simulation.implicit else 100 * left / size if size else 0.0
     return Balance(len(dt), -100 * lost, momentum, why(hub, simulation, lost))
@@ -138,7 +139,7 @@ def why(hub: Any, simulation: Any, lost: float) -> str:
     """The program's own words on energy that is not kept, or not known."""
     if not simulation.moves:
         return "load steps have no inertia"
-    if unknown := energy.unknown_work(hub):
+    if unknown := unknown_work(hub):
         return f"energy {energy.not_watched(unknown)}"
     if abs(100 * lost) <= CLOSES:
         return ""

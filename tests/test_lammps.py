@@ -56,7 +56,9 @@ def test_every_line_is_told_at_once_with_what_to_write(run_interpreted):
         assert written in hints[str(line)], line
 
 
-@pytest.mark.parametrize(("wrong", "more"), [(43, ""), (201, ""), (202, "1 more mistake behind")])
+@pytest.mark.parametrize(
+    ("wrong", "more"), [(43, ""), (201, ""), (202, "1 more mistake after these")]
+)
 def test_of_a_long_script_every_line_is_told_or_how_many_more_there_are(
     run_interpreted, wrong, more
 ):

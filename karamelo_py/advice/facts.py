@@ -25,6 +25,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
 from karamelo_py.script.parser import read_script
 
 PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities that come from the grid
@@ -250,4 +251,7 @@ def script_text(hub: Hub) -> str:
 
 def is_zero(formula: Any) -> bool:
     """Tell whether a formula is not given, or always 0."""
-    return formula is None or (formula.is_constant and formula.constant == 0)
+    if formula is None:
+        return True
+    formula = Expression(formula)
+    return formula.is_constant and formula.constant == 0
