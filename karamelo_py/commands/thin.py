@@ -31,7 +31,9 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
     szz vanishes. The column ``thickness`` is the present thickness over the initial one. Masses,
     forces and energies refer to the whole thickness. Liquids, gases and loose grains are
     refused: without stress across they have no strength. anti_volumetric_locking is refused too;
-    plane stress does not lock.
+    plane stress does not lock. With a thickness other than 1, fixes that take the size of a point
+    from its volume are refused: contact between points and with surfaces, and fluxes through faces
+    of points.
 
     See Also
     --------
@@ -59,8 +61,8 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
     -----
     Comes before the first material. Each law finds the strain across the bar, equal in y and z, for
     which the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces
-    and energies refer to the whole cross-section. The same materials are refused as in
-    plane_stress.
+    and energies refer to the whole cross-section. The same materials and fixes are refused as in
+    plane_stress, and orthotropic materials that are not the same in y and z.
 
     See Also
     --------
