@@ -440,17 +440,22 @@ def _wave_speed_squared_of_invariants(law, kin, state):
     # the squares x of principal stretches lie between the bounds of Gershgorin, and above J^2/I2.
     b = state.F.left_cauchy_green()
     I1, I2, J = at = invariants(b, det(state.F))
-    low, high = max(J * J / I2, least_of_rows(b)), b.largest_row_sum()
-    most = min(0.25 * I1 * I1, high * (I1 - low))  # of x (I1 - x)
-    least = max(min(low * (I1 - low), high * (I1 - high)), 0)
+    high = b.largest_row_sum()
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
-    along = 2 * high * max(W1, 0) + 2 * most * max(W2, 0) + 2 * least * min(W2, 0)
-    along += 4 * high * high * max(W11, 0) + 4 * low * low * min(W11, 0)
-    along += 8 * high * most * max(W12, 0) + 4 * most * most * max(W22, 0) + J * J * WJJ
-    along += 4 * J * (high * max(W1J, 0) + low * min(W1J, 0))
-    along += 4 * J * (most * max(W2J, 0) + least * min(W2J, 0))
-    shear = 2 * high * (max(W1, 0) + high * max(W2, 0))
+    along, shear = 2 * high * max(W1, 0) + J * J * WJJ, 2 * high * max(W1, 0)
+    _, second, _ = law.first
+    if max(*[len(code) for code in (second, *law.second[:5])]) > 0:
+        low = max(J * J / I2, least_of_rows(b))
+        along += 4 * high * high * max(W11, 0) + 4 * low * low * min(W11, 0)
+        along += 4 * J * (high * max(W1J, 0) + low * min(W1J, 0))
+    if len(second):
+        most = min(0.25 * I1 * I1, high * (I1 - low))  # of x (I1 - x)
+        least = max(min(low * (I1 - low), high * (I1 - high)), 0)
+        along += 2 * most * max(W2, 0) + 2 * least * min(W2, 0)
+        along += 8 * high * most * max(W12, 0) + 4 * most * most * max(W22, 0)
+        along += 4 * J * (most * max(W2J, 0) + least * min(W2J, 0))
+        shear += 2 * high * high * max(W2, 0)
     return max(along, shear, 0) * law.specific_volume
 
 
