@@ -283,7 +283,9 @@ class EdgeTraction(EdgeFix):
     The points of the group are boxes that fill the region. Boxes with an outer face in the
     direction of `side` take the traction on the initial area of this face. The load has constant
     magnitude and direction (a dead load) and acts half a box inside the edge. The sum over a plane
-    side is exactly traction times area. In axisymmetry, area and force are per radian.
+    side is exactly traction times area. Faces of a hole that look in this direction are loaded too:
+    for a plate with a hole, name the region without the hole. In axisymmetry, area and force are
+    per radian.
 
     See Also
     --------
