@@ -17,7 +17,7 @@ from karamelo_py.points.laws import (
     kirchhoff_stress,
     wave_speed_squared,
 )
-from karamelo_py.points.laws.by_energy import derivative, first_instability, value_at
+from karamelo_py.points.laws.by_energy import first_instability, value_at
 from karamelo_py.points.laws.elastic import State
 from karamelo_py.points.laws.hyperelastic import (
     Gent,
@@ -29,6 +29,7 @@ from karamelo_py.points.laws.hyperelastic import (
 )
 from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.parameters import lame_parameters
+from karamelo_py.script.derivatives import derivative
 
 LAM, G = lame_parameters(1e6, 0.3)
 BUILT_IN = NeoHookean(1e-3, LAM, G)
@@ -200,6 +201,13 @@ def test_waves_are_no_faster_than_their_bound(law, stretches):
     assert bound > 0.98 * fastest - 1e-6
     if stretches == (1, 1, 1):
         assert bound == pytest.approx(fastest, rel=1e-3)
+
+
+def test_a_power_of_0_is_1():
+    law = ready(1, f"({FORMULA})*J^n", G=1.0, lam=1.5, n=0)
+    state = deformed(SPACE, 5)
+    exact = energy_density(NeoHookean(1.0, 1.5, 1.0), SPACE, state)
+    assert energy_density(law, SPACE, state) == pytest.approx(exact, rel=1e-12)
 
 
 def test_rest_is_without_stress_and_energy():

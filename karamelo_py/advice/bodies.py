@@ -41,7 +41,7 @@ def yields(law: Any) -> bool:
     return not any(law_traits(kind).rebounds for kind in law_kind(law))
 
 
-def _bodies(s: Any) -> list[tuple[BodyMotion, Any]]:
+def vibrating(s: Any) -> list[tuple[BodyMotion, Any]]:
     """List the solids that may vibrate, with their motions."""
     solids = list(s.hub.solids.values())
     bodies = [(one, solids[one.number].material.whole) for one in s.motions if s.waves > 0]
@@ -57,7 +57,7 @@ def drift_of(s: Any) -> Noise | None:
     bound = (known.averaged if averages else known.drift)[s.sparse]
     bound /= known.line if s.d == 1 else 1
     speed = cells = 0.0
-    for one, law in _bodies(s):
+    for one, law in vibrating(s):
         velocity = one.drift(s.hub.domain.axisymmetric)
         if np.linalg.norm(velocity) <= SLOW * s.waves:
             continue
@@ -94,7 +94,7 @@ def turn_of(s: Any) -> Noise | None:
     dt, one_point, most = s.simulation.dt, s.sparse, None
     averages = s.scheme.traits.bears_drift
     bound = (known.rim_averaged if averages else known.rim)[one_point]
-    for one, _ in _bodies(s):
+    for one, _ in vibrating(s):
         speed, angle = one.spin * one.reach / s.waves, one.spin * s.duration
         if speed <= SLOW or held(s, one).any():
             continue

@@ -39,7 +39,7 @@ class Narrator(Listener):
         hub, halve = self.hub, run.rollback.point.halve
         self.smaller = ""
         if resumed:
-            if not simulation.control.clock[0].watch_limit and simulation.step > run.first_step:
+            if run.ruined:
                 self.smaller = "a smaller time step"  # the state of the file may be spoilt
             if not (run.rollback.point.halvings or simulation.implicit):  # else not the script's
                 known_failures.warn_about_steps(hub, simulation, halve, again=True)
@@ -57,8 +57,6 @@ class Narrator(Listener):
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
         """Begin the record of this run, and print it."""
         hub, why = self.hub, unknown_work(self.hub)
-        if not simulation.implicit:
-            self.limits, self.least = {simulation.ruling_limit}, simulation.limit
         # Said of the first state: a later one is ruined, and its limit with it.
         if simulation.too_large:
             self.smaller = self.smaller or own_step_instead(hub)
@@ -89,6 +87,7 @@ class Narrator(Listener):
             facts["own_dt"] = own = own_step_instead_of(hub, simulation)
             shown["own dt"] = words_of_own_step(hub, simulation, own) if own else None
             facts["limited_by"] = simulation.ruling_limit
+            self.limits, self.least = {facts["limited_by"]}, simulation.limit
             shown["limited by"] = f"{facts['limited_by']}; {words_of_share(hub)}"
         if why and simulation.moves:
             facts["energy_unwatched"], shown["energy"] = why, energy.not_watched(why)

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.advice.bodies import held, rings
+from karamelo_py.advice.bodies import held, vibrating
 from karamelo_py.advice.crossing import BodyBoxes, boxes_of, meetings
 from karamelo_py.points.laws import can, constrained_velocity, specific_volume
 from karamelo_py.run import timestep
@@ -96,7 +96,7 @@ def uneven(scene: Any) -> Uneven:
     if not (scene.moves and scene.linear and scene.waves > 0 and lasting):
         return most
     solids = list(scene.hub.solids.values())
-    bodies = [one for one in scene.motions if rings(solids[one.number].material.whole)]
+    bodies = [one for one, _ in vibrating(scene)]
     if not bodies:
         return most
     own = [solids[one.number] for one in bodies]

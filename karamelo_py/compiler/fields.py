@@ -10,17 +10,17 @@ attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check
 
 shape
     function of the kinematics: the number of components (`scalar` by default, `vector`, `tensor`,
-    kept
-        whether it outlives a step (the default): it is carried from run to run;
-    start
-        initial value: a number (default 0), or a function of the kinematics with one number per
-        component;
-    summed
-        whether points contribute to this nodal field (default `False`): contributions are summed
-        tile by tile (:mod:`karamelo_py.kernels.sums`);
-    columns
-        names of its components in dumps, the log, plots and pictures.
-
+    `planar`);
+kept
+    whether it outlives a step (the default): it is carried from run to run;
+start
+    initial value: a number (default 0), or a function of the kinematics with one number per
+    component;
+summed
+    whether points contribute to this nodal field (default `False`): contributions are summed tile
+    by tile (:mod:`karamelo_py.kernels.sums`);
+columns
+    names of its components in dumps, the log, plots and pictures.
 
 A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points have the shape
 (components, points), arrays of nodes (nodes, components).

@@ -2,6 +2,7 @@
 
 import contextvars
 import itertools
+import sys
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -31,3 +32,12 @@ class Session:
 _session = contextvars.ContextVar("session", default=Session())  # noqa: B039
 current = _session.get
 one_at_a_time = threading.RLock()
+
+
+def importable(module: str, name: str, make: Callable[[], type]) -> type:
+    """Return the class of this name in a module; `make` it first, where cached kernels find it."""
+    names = vars(sys.modules[module])
+    with one_at_a_time:
+        if name not in names:
+            names[name] = make()
+        return names[name]

@@ -49,9 +49,7 @@ STAGES = {
     "sum_node": "sums at nodes",
     "visit_node": "updates of nodes",
     "visit_member": "fixes at nodes",
-    "visit_whole_member": "fixes at nodes",
     "visit_point": "fixes at points",
-    "visit_whole_point": "fixes at points",
     "visit_each_node": "contact, axis",
     "visit_each_point": "contact, axis",
     **dict.fromkeys(

@@ -12,7 +12,7 @@ from numba import types
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.compiler.fields import field, load_vector, store
 from karamelo_py.compiler.loops import caller_of, noinline
-from karamelo_py.compiler.session import one_at_a_time
+from karamelo_py.compiler.session import importable
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.surfaces import depth, slopes
@@ -109,15 +109,17 @@ def touch_kind(grip: type | None) -> type[Touch]:
     if grip is None:
         return Touch
     name = f"Touch{grip.__name__}"
-    with one_at_a_time:
-        if name not in globals():  # where kernels, which are cached, find it
-            globals()[name] = type(name, (Touch,), {"__module__": __name__})
 
-            @grip_of.on(globals()[name])
-            def _grip_of(tag, what):
-                return field(what.points.fields, grip)
+    def made() -> type[Touch]:
+        kind = type(name, (Touch,), {"__module__": __name__})
 
-        return globals()[name]
+        @grip_of.on(kind)
+        def _grip_of(tag, what):
+            return field(what.points.fields, grip)
+
+        return kind
+
+    return importable(__name__, name, made)
 
 
 def touch_hook(tag: Callable) -> hooks.CompiledHook:

@@ -71,9 +71,9 @@ class RunLoop:
         started, simulation.rollback = time.perf_counter(), self.rollback.point
         self.first_step, self.first_time = simulation.step, simulation.time
         self.last_step = inf if self.steps is None else self.first_step + self.steps
-        ruined, resumed = False, hub.restart is not None
+        self.ruined, resumed = False, hub.restart is not None
         if resumed:
-            ruined = self._take_up(simulation)
+            self._take_up(simulation)
         else:
             simulation.begin(self.end_time)
             self.tell(lambda to: to.begun(self, simulation))
@@ -85,7 +85,8 @@ class RunLoop:
                 hub.output.begin(within=resumed)
             hub.console.begin_run(simulation.step, 0.0)
             try:
-                self.rollback.begin(simulation, self.first_step, ruined, self.condition is not None)
+                looks = self.condition is not None
+                self.rollback.begin(simulation, self.first_step, self.ruined, looks)
                 self._loop(simulation)
                 with counted("output"):
                     hub.console.end_run()
@@ -105,13 +106,14 @@ class RunLoop:
             simulation.comm.end_together()
             raise Interrupted(self.interrupted)
 
-    def _take_up(self, simulation: Simulation) -> bool:
-        """Take the state of a file; say whether a step above the limit has spoilt it."""
+    def _take_up(self, simulation: Simulation) -> None:
+        """Take the state of a file; note whether a step above the limit has spoilt it."""
         hub, file = self.hub, self.hub.restart.path
         hub.restart.take(hub, self.rollback.point, outputs=True)
         hub.restart = hub.interpreter.replay = None
-        watched, point = simulation.control.clock[0].watch_limit, self.rollback.point
-        simulation.go_on(self.end_time, point.halvings)
+        watched = simulation.control.clock[0].watch_limit
+        self.ruined = not watched and simulation.step > self.first_step
+        simulation.go_on(self.end_time, self.rollback.point.halvings)
         self.tell(lambda to: to.begun(self, simulation, resumed=True))
         # It may hold the end of this run already, or later states.
         step, time, last_step = simulation.step, simulation.time, self.last_step
@@ -124,7 +126,6 @@ class RunLoop:
         elif step == last_step or time == self.end_time or not self._condition_allows():
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
-        return not watched and simulation.step > self.first_step
 
     def _loop(self, simulation: Simulation) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings

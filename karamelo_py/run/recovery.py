@@ -151,7 +151,7 @@ class RollBack:
         the last state that has no fault itself. If the step was too large from the start, it is the
         initial state: no later state is good.
         """
-        too_large = self.too_large and not self.simulation.control.clock[0].watch_limit
+        too_large = self.too_large and self.simulation.too_large
         found = self._explained(status, too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):

@@ -14,7 +14,6 @@ import numpy as np
 from karamelo_py.compiler import formula
 from karamelo_py.script import terms
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
@@ -170,16 +169,7 @@ def shown(value: Value) -> str:
 
 
 def _evaluate(root: terms.Term, values: Values) -> float:
-    found: dict[int, float] = {}
-    for term in terms.in_order(root):
-        if term.operation == "number":
-            result = term.value
-        elif term.operation == "name":
-            result = values.get(_published(term.value, values))
-        else:
-            result = compute_quietly(term.operation, *[found[id(t)] for t in term.operands])
-        found[id(term)] = result
-    return found[id(root)]
+    return terms.evaluated(root, lambda name: values.get(_published(name, values)))
 
 
 def _published(name: str, values: Values) -> str:

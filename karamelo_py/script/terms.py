@@ -9,7 +9,7 @@ import numpy as np
 from karamelo_py.compiler import formula
 from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.functions import TAIL
+from karamelo_py.script.functions import TAIL, compute_quietly
 
 # Number of operations, at most; and the number shown in messages.
 _MAX_SIZE = 20000
@@ -106,6 +106,20 @@ def in_order(root: Term) -> list[Term]:
             open_terms.append((term, True))
             open_terms += [(operand, False) for operand in reversed(term.operands)]
     return list(found.values())
+
+
+def evaluated(root: Term, value_of: Callable[[str], float]) -> float:
+    """Compute a formula from the values of its names."""
+    found: dict[int, float] = {}
+    for term in in_order(root):
+        if term.operation == "number":
+            result = term.value
+        elif term.operation == "name":
+            result = value_of(term.value)
+        else:
+            result = compute_quietly(term.operation, *[found[id(t)] for t in term.operands])
+        found[id(term)] = result
+    return found[id(root)]
 
 
 def constant(value: float) -> Term:

@@ -543,6 +543,12 @@ class SymmetricTensor(Matrix):
         rows = [[(i, i), *[(i, j) for j in range(3) if j != i]] for i in range(3)]
         return max(*[total([abs(a[place]) for place in row if place in a]) for row in rows])
 
+    def smallest_row_difference(self):
+        """min_i (s_ii - sum_j |s_ij|), j not i: a bound of the smallest eigenvalue (Gershgorin)."""
+        a = self.at()
+        rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
+        return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
+
     def nominal(self, F):
         """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress.
 

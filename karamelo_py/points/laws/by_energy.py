@@ -7,125 +7,42 @@ Formulas of invariants need no principal directions and are computed in lanes; f
 stretches take points one by one.
 """
 
-import hashlib
-import sys
 from collections import namedtuple
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from math import cos, cosh, isfinite, sin, sinh, sqrt, tan, tanh
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.cache import short_hash
 from karamelo_py.compiler.compile import where
 from karamelo_py.compiler.powers import exponential, logarithm, power
-from karamelo_py.compiler.trace import one_at_a_time
+from karamelo_py.compiler.session import importable
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import I, det, total, tr
+from karamelo_py.points.kinematics import I, det, inner, total, tr
 from karamelo_py.points.kinematics.principal import PairLimits, from_principal, real_principal
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.script import terms
+from karamelo_py.script.derivatives import (
+    OF_ONE,
+    derivative,
+    is_number,
+    plus,
+    replaced,
+    times,
+    to_power,
+)
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.terms import Term
 
 INVARIANTS = ("I1", "I2", "J")
 STRETCHES = ("l1", "l2", "l3")
-WHOLE = 8  # exponents up to it are code, not parameters
+WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
 
 Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
-
-# --- differentiation ----------------------------------------------------------------------------
-
-ZERO, ONE, TWO = map(terms.constant, (0.0, 1.0, 2.0))
-
-
-def _is(term: Term, value: float) -> bool:
-    return term.operation == "number" and term.value == value
-
-
-def _plus(a: Term, b: Term) -> Term:
-    return b if _is(a, 0) else a if _is(b, 0) else terms.applied("+", a, b)
-
-
-def _times(a: Term, b: Term) -> Term:
-    if _is(a, 0) or _is(b, 0):
-        return ZERO
-    return b if _is(a, 1) else a if _is(b, 1) else terms.applied("*", a, b)
-
-
-def _power(base: Term, exponent: float) -> Term:
-    if exponent in (0, 1):
-        return base if exponent else ONE
-    return terms.applied("^", base, terms.constant(exponent))
-
-
-def _of(operation: str, term: Term) -> Term:
-    return terms.applied(operation, term)
-
-
-OF_ONE = {
-    "neg": lambda x, f: terms.constant(-1),
-    "sqrt": lambda x, f: terms.applied("/", terms.constant(0.5), f),
-    "exp": lambda x, f: f,
-    "log": lambda x, f: terms.applied("/", ONE, x),
-    "sin": lambda x, f: _of("cos", x),
-    "cos": lambda x, f: _of("neg", _of("sin", x)),
-    "tan": lambda x, f: _plus(ONE, _power(f, 2)),
-    "tanh": lambda x, f: terms.applied("-", ONE, _power(f, 2)),
-    "sinh": lambda x, f: _of("cosh", x),
-    "cosh": lambda x, f: _of("sinh", x),
-}
-
-
-def derivative(root: Term, name: str) -> Term:
-    """Differentiate a formula with respect to a name."""
-    found: dict[int, Term] = {}
-    for term in terms.in_order(root):
-        found[id(term)] = _derivative(term, name, [found[id(x)] for x in term.operands])
-    return found[id(root)]
-
-
-def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
-    operation, operands = term.operation, term.operands
-    if name not in term.names:
-        return ZERO
-    if operation == "name":
-        return ONE
-    if operation in OF_ONE:
-        return _times(OF_ONE[operation](operands[0], term), slopes[0])
-    (a, b), (s, t) = operands, slopes
-    if operation == "+":
-        return _plus(s, t)
-    if operation == "-":
-        return s if _is(t, 0) else _plus(s, _of("neg", t))
-    if operation == "*":
-        return _plus(_times(s, b), _times(a, t))
-    if operation == "/":
-        return _plus(
-            terms.applied("/", s, b) if not _is(s, 0) else ZERO,
-            _of("neg", terms.applied("/", _times(term, t), b)) if not _is(t, 0) else ZERO,
-        )
-    if b.operation == "number":
-        return _times(_times(b, _power(a, b.value - 1)), s)
-    of_base = _times(terms.applied("/", _times(b, term), a), s)
-    return _plus(of_base, _times(_times(term, _of("log", a)), t))
-
-
-def replaced(root: Term, by: Mapping[str, Term]) -> Term:
-    """Put formulas for names."""
-    found: dict[int, Term] = {}
-    for term in terms.in_order(root):
-        if term.operation == "name":
-            found[id(term)] = by.get(term.value, term)
-        elif term.operands:
-            found[id(term)] = terms.applied(term.operation, *[found[id(x)] for x in term.operands])
-        else:
-            found[id(term)] = term
-    return found[id(root)]
-
 
 # --- stack programs -----------------------------------------------------------------------------
 
@@ -139,7 +56,7 @@ class _ProgramWriter:
 
     def code(self, root: Term) -> Code:
         """Write a formula; () if it is 0."""
-        if _is(root, 0):
+        if is_number(root, 0):
             return ()
         made: list[tuple[str, Any]] = []
         self._append(root, made)
@@ -151,17 +68,13 @@ class _ProgramWriter:
             made.append(("name", self.names.index(term.value)))
         elif operation == "number":
             made.append(("number", self.numbers.setdefault(term.value, len(self.numbers))))
-        elif operation == "^" and _is_small(operands[1]):
+        elif operation == "^" and operands[1].value in WHOLE:
             self._append(operands[0], made)
             made.append(("whole power", int(operands[1].value)))
         else:
             for operand in operands:
                 self._append(operand, made)
             made.append((operation, None))
-
-
-def _is_small(term: Term) -> bool:
-    return term.operation == "number" and term.value in range(-WHOLE, WHOLE + 1)
 
 
 def applied(operation, a, b):
@@ -235,14 +148,14 @@ class ByEnergy(OfDeformation):
     traits = LawTraits(rebounds=True)
     in_lanes = True
     energy: ClassVar[Code]
+    first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
+    second: ClassVar[tuple[Code, ...]]  # by aa, ab, ac, bb, bc, cc
 
 
 class OfInvariants(ByEnergy):
     """The energy depends on I1, I2 and J."""
 
     __slots__ = ()
-    first: ClassVar[tuple[Code, ...]]  # derivatives by I1, I2, J
-    second: ClassVar[tuple[Code, ...]]  # by 11, 12, 1J, 22, 2J, JJ
 
 
 class OfStretches(ByEnergy):
@@ -250,22 +163,17 @@ class OfStretches(ByEnergy):
 
     __slots__ = ()
     scalarised = ("kirchhoff_stress", "wave_speed_squared", "shear_part", "energy_density")
-    first: ClassVar[tuple[Code, ...]]  # derivatives by l1, l2, l3
-    second: ClassVar[tuple[Code, ...]]  # by 11, 12, 13, 22, 23, 33
 
 
 FIELDS = ("specific_volume", "lam", "G", "at_rest")
 FIRST = len(FIELDS)  # index of the first number of the formula
 
 _L = [Term("name", (), name) for name in STRETCHES]
-_SQUARES = [_power(one, 2) for one in _L]
+_A, _B, _C = [to_power(one, 2) for one in _L]
 IN_STRETCHES = {
-    "I1": _plus(_plus(_SQUARES[0], _SQUARES[1]), _SQUARES[2]),
-    "I2": _plus(
-        _plus(_times(_SQUARES[0], _SQUARES[1]), _times(_SQUARES[1], _SQUARES[2])),
-        _times(_SQUARES[2], _SQUARES[0]),
-    ),
-    "J": _times(_times(_L[0], _L[1]), _L[2]),
+    "I1": plus(plus(_A, _B), _C),
+    "I2": plus(plus(times(_A, _B), times(_B, _C)), times(_C, _A)),
+    "J": times(times(_L[0], _L[1]), _L[2]),
 }
 
 
@@ -304,28 +212,19 @@ def law_of(rho: float, energy: Expression) -> NamedTuple:
 
 
 def _class_of(kind: type, codes: dict, count: int) -> type:
-    """The class of laws with these programs; its name is a digest, so that kernels find it."""
-    digest = hashlib.sha256(repr((kind.__name__, codes, count)).encode()).hexdigest()[:16]
-    name, module = f"{kind.__name__}_{digest}", sys.modules[__name__]
-    with one_at_a_time:
-        if not hasattr(module, name):
-            fields = namedtuple(name, (*FIELDS, *[f"number{k}" for k in range(count)]))
-            made = type(name, (kind, fields), {**codes, "__slots__": (), "__module__": __name__})
-            setattr(module, name, made)
-    return getattr(module, name)
+    """The class of laws with these programs; a digest of them is its name."""
+    name = f"{kind.__name__}_{short_hash(repr((codes, count)))[:16]}"
+
+    def made() -> type:
+        fields = namedtuple(name, (*FIELDS, *[f"number{k}" for k in range(count)]))
+        return type(name, (kind, fields), {**codes, "__slots__": (), "__module__": __name__})
+
+    return importable(__name__, name, made)
 
 
 def value_at(root: Term, stretches: Sequence[float]) -> float:
     """The value of a formula of stretches."""
-    at = dict(zip(STRETCHES, stretches, strict=True))
-    found: dict[int, float] = {}
-    for term in terms.in_order(root):
-        if term.operands:
-            numbers = [found[id(one)] for one in term.operands]
-            found[id(term)] = compute_quietly(term.operation, *numbers)
-        else:
-            found[id(term)] = at[term.value] if term.operation == "name" else term.value
-    return found[id(root)]
+    return terms.evaluated(root, dict(zip(STRETCHES, stretches, strict=True)).__getitem__)
 
 
 def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float, float, float]:
@@ -415,7 +314,7 @@ def squared(s):
 def invariants(b, J):
     """I1, I2 and J of b = F F^T."""
     first = tr(b)
-    return first, 0.5 * (first * first - tr(squared(b))), J
+    return first, 0.5 * (first * first - inner(b, b)), J
 
 
 @laws.kirchhoff_stress.on(OfInvariants)
@@ -446,7 +345,7 @@ def _wave_speed_squared_of_invariants(law, kin, state):
     along, shear = 2 * high * max(W1, 0) + J * J * WJJ, 2 * high * max(W1, 0)
     _, second, _ = law.first
     if max(*[len(code) for code in (second, *law.second[:5])]) > 0:
-        low = max(J * J / I2, least_of_rows(b))
+        low = max(J * J / I2, b.smallest_row_difference())
         along += 4 * high * high * max(W11, 0) + 4 * low * low * min(W11, 0)
         along += 4 * J * (high * max(W1J, 0) + low * min(W1J, 0))
     if len(second):
@@ -457,13 +356,6 @@ def _wave_speed_squared_of_invariants(law, kin, state):
         along += 4 * J * (most * max(W2J, 0) + least * min(W2J, 0))
         shear += 2 * high * high * max(W2, 0)
     return max(along, shear, 0) * law.specific_volume
-
-
-def least_of_rows(s):
-    """min_i (s_ii - sum_j |s_ij|): a bound of the smallest eigenvalue (Gershgorin)."""
-    a = s.at()
-    rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
-    return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
 
 
 def along_direction(law, at, x, rest):
@@ -514,11 +406,8 @@ def limits_of(law, at, slopes):
     """(tau_a - tau_b) / (l_a^2 - l_b^2) of the pairs of stretches, where they are equal."""
     W11, W12, W13, W22, W23, W33 = [evaluated(code, law, at) for code in law.second]
     twice = (W11 + W22 - 2 * W12, W11 + W33 - 2 * W13, W22 + W33 - 2 * W23)
-    limits = []
-    for (i, j), curve in zip(PAIRS, twice, strict=True):
-        mean = slopes[i] / at[i] + slopes[j] / at[j]
-        limits.append(0.25 * (mean + curve))
-    return limits
+    each = zip(PAIRS, twice, strict=True)
+    return [0.25 * (slopes[i] / at[i] + slopes[j] / at[j] + curve) for (i, j), curve in each]
 
 
 @laws.energy_density.on(OfStretches)

@@ -205,7 +205,7 @@ class LoadSteps:
             if loads is not None:
                 # Their work uses the mean of both, like Newmark's velocities.
                 own.loads[:] = 0.5 * (loads + own.loads)
-            found = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
+            found = self._equilibrium(dt, before if self.dynamic else None, after)
             self._tell_of_long_way(found)
             self._publish(found, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
@@ -250,7 +250,7 @@ class LoadSteps:
         return s.nodes.sums[:, force : force + s.kin.dimension]
 
     def _equilibrium(
-        self, hooks: Any, dt: float, before: np.ndarray | None, after: np.ndarray
+        self, dt: float, before: np.ndarray | None, after: np.ndarray
     ) -> "Equilibrium":
         """Find the displacements at which forces are in balance.
 

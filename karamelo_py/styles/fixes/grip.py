@@ -1,7 +1,7 @@
 """Memory of fixes for the points held by friction: see `points.bodies.rub`."""
 
 from karamelo_py.compiler.fields import Field, field
-from karamelo_py.compiler.trace import one_at_a_time
+from karamelo_py.compiler.session import importable
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.styles.fixes.formulas import judge_friction
@@ -26,10 +26,7 @@ def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
     while globals().get(f"{kind.__name__}{k}") in taken:
         k += 1
     name = f"{kind.__name__}{k}"
-    with one_at_a_time:
-        if name not in globals():  # for cached kernels to find it
-            globals()[name] = type(name, (kind,), {"__module__": __name__})
-        return globals()[name]
+    return importable(__name__, name, lambda: type(name, (kind,), {"__module__": __name__}))
 
 
 class Gripping(Fix):

@@ -1,0 +1,92 @@
+"""Derivatives of formulas, and formulas put for names."""
+
+from collections.abc import Mapping
+
+from karamelo_py.script.terms import Term, applied, constant, in_order
+
+ZERO, ONE = constant(0.0), constant(1.0)
+
+
+def is_number(term: Term, value: float) -> bool:
+    """Return True if a formula is this constant."""
+    return term.operation == "number" and term.value == value
+
+
+def plus(a: Term, b: Term) -> Term:
+    """Add formulas; 0 is left out."""
+    return b if is_number(a, 0) else a if is_number(b, 0) else applied("+", a, b)
+
+
+def times(a: Term, b: Term) -> Term:
+    """Multiply formulas; 0 and 1 are left out."""
+    if is_number(a, 0) or is_number(b, 0):
+        return ZERO
+    return b if is_number(a, 1) else a if is_number(b, 1) else applied("*", a, b)
+
+
+def to_power(base: Term, exponent: float) -> Term:
+    """Raise a formula to a constant power; 0 and 1 are left out."""
+    if exponent in (0, 1):
+        return base if exponent else ONE
+    return applied("^", base, constant(exponent))
+
+
+# Functions of one number, by the number x and their value f.
+OF_ONE = {
+    "neg": lambda x, f: constant(-1),
+    "sqrt": lambda x, f: applied("/", constant(0.5), f),
+    "exp": lambda x, f: f,
+    "log": lambda x, f: applied("/", ONE, x),
+    "sin": lambda x, f: applied("cos", x),
+    "cos": lambda x, f: applied("neg", applied("sin", x)),
+    "tan": lambda x, f: plus(ONE, to_power(f, 2)),
+    "tanh": lambda x, f: applied("-", ONE, to_power(f, 2)),
+    "sinh": lambda x, f: applied("cosh", x),
+    "cosh": lambda x, f: applied("sinh", x),
+}
+
+
+def derivative(root: Term, name: str) -> Term:
+    """Differentiate a formula with respect to a name."""
+    found: dict[int, Term] = {}
+    for term in in_order(root):
+        found[id(term)] = _derivative(term, name, [found[id(x)] for x in term.operands])
+    return found[id(root)]
+
+
+def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
+    operation, operands = term.operation, term.operands
+    if name not in term.names:
+        return ZERO
+    if operation == "name":
+        return ONE
+    if operation in OF_ONE:
+        return times(OF_ONE[operation](operands[0], term), slopes[0])
+    (a, b), (s, t) = operands, slopes
+    if operation == "+":
+        return plus(s, t)
+    if operation == "-":
+        return s if is_number(t, 0) else plus(s, applied("neg", t))
+    if operation == "*":
+        return plus(times(s, b), times(a, t))
+    if operation == "/":
+        first = s if is_number(s, 0) else applied("/", s, b)
+        second = ZERO if is_number(t, 0) else applied("neg", applied("/", times(term, t), b))
+        return plus(first, second)
+    if b.operation == "number":
+        return times(times(b, to_power(a, b.value - 1)), s)
+    of_base = times(applied("/", times(b, term), a), s)
+    return plus(of_base, times(times(term, applied("log", a)), t))
+
+
+def replaced(root: Term, by: Mapping[str, Term]) -> Term:
+    """Put formulas for names."""
+    found: dict[int, Term] = {}
+    for term in in_order(root):
+        if term.operation == "name":
+            found[id(term)] = by.get(term.value, term)
+        elif term.operands:
+            found[id(term)] = applied(term.operation, *[found[id(x)] for x in term.operands])
+        else:
+            found[id(term)] = term
+    return found[id(root)]
