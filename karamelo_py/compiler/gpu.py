@@ -251,8 +251,7 @@ class _Coded:
         key = function, kinds, current().changes, *called.values()
         if key not in self._known:
             code = self._found(function, kinds, called)
-            if code.name not in self._entries:
-                self._entries[code.name] = self.loaded(code)
+            self._load(code)
             if "<locals>" in function.__qualname__:  # created for each scene
                 return self._entries[code.name]
             self._known[key] = self._entries[code.name]
@@ -260,12 +259,14 @@ class _Coded:
 
     def _found(self, function: Callable, kinds: tuple, called: dict) -> Code:
         """Read code from the disk, or make it and write it there."""
-        files = cache.KernelFiles(function, self._with_content, self.processor, *called.values())
-        found = files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
-        return self._with_content(found)
+        files = cache.KernelFiles(function, self._load, self.processor, *called.values())
+        return files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
 
-    def _with_content(self, code: Code) -> Code:
-        return code if code.code else code._replace(code=cache.code_of(code.file))
+    def _load(self, code: Code) -> None:
+        """Load code once; the content that a file lacks is read."""
+        if code.name not in self._entries:
+            content = code.code or cache.code_of(code.file)
+            self._entries[code.name] = self.loaded(code._replace(code=content))
 
     def _compiled(self, function: Callable, kinds: tuple, called: dict) -> Code:
         """Trace a function, and make the code that no file has."""
