@@ -94,19 +94,16 @@ class Volumes(eq.NodalQuantity):
 def mean_stress(pt):
     """Return volume times mean Kirchhoff stress of a point, and its present volume."""
     law, state = pt.law_and_state
-    return _mean_stress(pt.kin, law, state, eq.mass(pt) * laws.specific_volume(law))
-
-
-def _mean_stress(kin, law, state, volume):
-    tau = laws.kirchhoff_stress(law, kin, state).mean_of_stretching()
-    return volume * tau, volume * laws.jacobian(law, kin, state)
+    volume = eq.mass(pt) * laws.specific_volume(law)
+    tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()
+    return volume * tau, volume * laws.jacobian(law, pt.kin, state)
 
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
     """Minus volume times the averaged mean stress less the point's, a tensor."""
-    law, state, f = pt.law_state_F
-    own, present = _mean_stress(pt.kin, law, state, eq.mass(pt) * laws.specific_volume(law))
+    _, _, f = pt.law_state_F
+    own, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - own
     return force_stress(pt.w.frame, pt.kin, nothing(pt.kin) - change * I, f)
 
