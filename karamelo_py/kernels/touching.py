@@ -110,7 +110,7 @@ def touch_kind(grip: type | None) -> type[Touch]:
         return Touch
     name = f"Touch{grip.__name__}"
 
-    def made() -> type[Touch]:
+    def made() -> type:
         kind = type(name, (Touch,), {"__module__": __name__})
 
         @grip_of.on(kind)
