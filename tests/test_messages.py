@@ -44,6 +44,11 @@ def test_help_explains_a_code(capsys, code, said):
         (wrong.SCENE + "region(q, sphere)", "arguments", None, None),
         (wrong.SCENE + "set_dt(-1)", "argument", None, None),
         (wrong.SCENE + "region(b, block, 0, 1, 0, 1)", "already-used", None, None),
+        ("a = sqrt(-1)", "operand", None, None),
+        ('print("a" - 1)', "argument", None, None),
+        (wrong.SCENE + "material(q, linear, 1, 1, 0.7)", "argument", None, None),
+        (wrong.SCENE + "dimension(1, 0, 1, 0.1)", "too-late", None, None),
+        ("region(q, block, 0, 1)", "not-possible", None, None),
     ],
 )
 def test_mistakes_have_codes_and_fields(tmp_path, script, code, name, alike):

@@ -57,6 +57,19 @@ def test_what_follows_from_a_missing_part_is_not_told(run_interpreted, wrong, ot
     assert [text.split(": ")[-1] for _, text in found[1:]] == others
 
 
+def test_what_follows_from_a_refused_setting_or_deletion_is_not_told(run_interpreted):
+    lines = [
+        "plane_stres(true)",  # 1: wrong
+        "compute(Ek, kinetic_energy, all)",
+        "delete_compute(Ek, 1)",  # 3: wrong
+        "compute(Ek, kinetic_energy, all)",
+        "dump(d, all, particle, 10, d.*, thickness, x)",
+        "dump(d2, all, particle, 10, e.*, x, dmg)",  # 6: wrong
+    ]
+    err = run_interpreted(block(2, *lines), status=1).err
+    assert [line - HEAD for line, _ in places(err)] == [1, 3, 6]
+
+
 @pytest.mark.parametrize(
     ("unknown", "wrong"),
     [

@@ -151,6 +151,7 @@ def axisymmetric(hub: Hub, active: bool) -> None:
             "the points of solids are made already",
             argument="active",
             expected="axisymmetric(true) before the first solid",
+            code="too-late",
         )
     domain.axisymmetric = active
 
@@ -234,10 +235,10 @@ def _refuse_second(hub: Hub) -> None:
         raise ScriptError(
             f"the domain cannot change once solid '{first}' is in it",
             expected="the domain before all regions, solids and groups",
+            code="too-late",
         )
-    raise ScriptError(
-        "the domain is set already", expected="one dimension(...) or create_domain(...) in a scene"
-    )
+    expected = "one dimension(...) or create_domain(...) in a scene"
+    raise ScriptError("the domain is set already", expected=expected, code="too-late")
 
 
 def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:

@@ -71,6 +71,7 @@ def method(
             "the method cannot change once there are solids",
             expected="method(...) before the first solid",
             hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
+            code="too-late",
         )
     before = hub.update.method
     if before is not None:
@@ -179,6 +180,7 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
         raise ScriptError(
             "the precision cannot change after the first run",
             expected="precision(...) before the first run",
+            code="too-late",
         )
     hub.settings.precision = kind
 

@@ -130,6 +130,7 @@ def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument,
                 f"the density of material '{after.id}' cannot change: its points have their masses",
                 place=numbers[0].place,
                 expected="a density before the first solid of the material",
+                code="too-late",
             )
         kin = Space()
         if law_kind(after.law) != law_kind(before.law):
@@ -144,4 +145,5 @@ def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument,
                 "cannot change any more",
                 place=numbers[0].place,
                 expected="the number before the first solid of the material",
+                code="too-late",
             )

@@ -133,7 +133,8 @@ def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> N
             raise ScriptError(
                 "the form of the log cannot change after the first run",
                 argument="form",
-                expected="set_output(..., csv) in front of the first run",
+                expected="set_output(..., csv) before the first run",
+                code="too-late",
             )
         hub.output.log.file = hub.output.log.file.with_suffix(".csv")
 

@@ -157,6 +157,7 @@ def translate_particles(
             argument="solids",
             expected="translate_particles before the first run",
             hint="fix(ID, velocity_particles, ...) moves points in a run",
+            code="too-late",
         )
     for solid in solids:
         inside = region.inside(solid.x0)
@@ -280,6 +281,7 @@ def populate_cylindrical_coordinates(
             f"the points of solid '{solid.id}' have been in a run",
             argument="solid",
             expected="populate_cylindrical_coordinates before the first run",
+            code="too-late",
         )
     refuse_chosen(hub, solid, "populate_cylindrical_coordinates")
     values = FORMS.read(hub, lattice, require_domain(hub).dimension)

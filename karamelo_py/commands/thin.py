@@ -92,12 +92,14 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
             f"material '{first}' is defined already",
             argument="active",
             expected=f"{command}({'true' if active else 'false'}) before the first material",
+            code="too-late",
         )
     if hub.solids:
         raise ScriptError(
             "the points of solids have their masses already",
             argument="active",
             expected=f"{command} before the first solid",
+            code="too-late",
         )
     domain.thin, domain.thickness = active, float(thickness) if active else 1.0
 

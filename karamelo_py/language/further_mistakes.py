@@ -24,6 +24,8 @@ _BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "inc
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
+# Points have further columns by these.
+_COLUMNS = _SCENE | {"plane_stress", "uniaxial_stress", "scheme", "fix"}
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
 _PLAIN = {"group", "plot", "load_path", "element"}  # without a style
 # Index of the style among the arguments.
@@ -36,8 +38,10 @@ class Dependents:
 
     def __init__(self) -> None:
         self.names: set[str] = set()
-        # Kinds of parts that may be missing under an unknown name.
+        # Kinds of parts that may be missing under an unknown name, and that were not deleted.
         self.kinds: set[str] = set()
+        self.undeleted: set[str] = set()
+        self.lacks_columns = False
 
     def note(self, statement: Statement) -> bool:
         """Record what `statement` would define; return False if nothing else can be checked."""
@@ -50,6 +54,9 @@ class Dependents:
             name = self._meant(name, statement)
         if name in _BASIS:
             return False
+        self.lacks_columns |= name in _COLUMNS
+        if name.startswith("delete_"):
+            self.undeleted.add(name.removeprefix("delete_"))
         if name in _SCENE:
             self.names |= _RUNS
         if name == "scheme":
@@ -92,14 +99,21 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     passed_over: list[Statement] = []
     dependents = Dependents()
 
-    def tell(error: ScriptError) -> None:
-        # An unknown name may appear in many lines. It is a consequence if an ID was given twice
-        # (the second was meant to have another name), or after a command of another program, which
-        # names things differently.
-        for one in (error, *error.others):
+    def follows(error: ScriptError) -> bool:
+        """Tell if an error is a consequence of an earlier one."""
+        if error.code == "unknown-ID":
+            # The second of two equal IDs was meant to be another; and other programs name things
+            # differently.
             twice = {other.kind for other in seen.values() if other.code == "already-used"}
-            follows = one.code == "unknown-ID" and one.kind in twice | dependents.kinds
-            if one.message not in seen and not follows:
+            return error.kind in twice | dependents.kinds
+        if error.code == "already-used":
+            return error.kind in dependents.undeleted
+        return error.code == "unknown-column" and not error.alike and dependents.lacks_columns
+
+    def tell(error: ScriptError) -> None:
+        # An unknown name may appear in many lines.
+        for one in (error, *error.others):
+            if one.message not in seen and not follows(one):
                 found.append(one)
             seen[one.message] = one
         error.others = []

@@ -26,6 +26,19 @@ class _Frame:
     next: int = 0
 
 
+def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
+    """Return the code of an error that was raised without one, by what it marks."""
+    code = "operand"
+    if isinstance(statement, syntax.CommandCall):
+        code = "not-possible"
+        lines = {argument.place[:2] for argument in statement.arguments}
+        place = error.place
+        inside = place and place[:2] in lines and place != statement.place
+        if inside or error.argument is not None:
+            code = "argument"
+    return code
+
+
 class Interpreter:
     """Executes a script on a hub, whose ``interpreter`` and ``place`` it sets."""
 
@@ -210,6 +223,7 @@ class Interpreter:
             self.presets.blame(statement, error)
             for wrong in (error, *error.others):
                 wrong.included = wrong.included or self._including(depth - 1)
+                wrong.code = wrong.code or _code_of(wrong, statement)
             error.complete = True
             raise
         except RecursionError:

@@ -122,7 +122,7 @@ def call(
             return make(target, hub, name, *values, **named)
         except OSError as error:
             what = f"{error.filename}: " if error.filename else ""
-            raise ScriptError(f"{what}{error.strerror or error}") from error
+            raise ScriptError(f"{what}{error.strerror or error}", code="file") from error
         except OverflowError as error:
             message = "a number is too large for what is done with it"
             raise ScriptError(message, expected="numbers in proportion to each other") from error

@@ -34,7 +34,8 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
     known = ["quit", *registry.names("command"), *script.variables]
     message = f"'{name}' is neither a command nor a variable"
     hint = instead("command", name) or meant(meaning, known)
-    return ScriptError(message, expected="name = expression, or command(arguments)", hint=hint)
+    expected, code = "name = expression, or command(arguments)", "unknown-command"
+    return ScriptError(message, expected=expected, hint=hint, code=code)
 
 
 def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
@@ -45,7 +46,8 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
     if script.knows(name) and not other:
         message = f"'{name}' is not a {what} but a variable"
         expected = "an operator between the name and the parenthesis"
-        return ScriptError(message, place=place, expected=expected, hint=f"{name}*(...)")
+        hint, code = f"{name}*(...)", "unknown-command"
+        return ScriptError(message, place=place, expected=expected, hint=hint, code=code)
     shown = commands if statement else sorted(FUNCTIONS)
     known = commands if statement else [*FUNCTIONS, *commands]
     return ScriptError(

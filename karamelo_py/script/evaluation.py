@@ -89,7 +89,8 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
         wanted = "at least " * (signature.most > signature.least)
         wanted += plural(signature.least, "operand")
         message = f"{node.name} takes {wanted}, not {count}"
-        raise ScriptError(message, place=mark(raw, node), expected=usage(node.name))
+        expected = usage(node.name)
+        raise ScriptError(message, place=mark(raw, node), expected=expected, code="arguments")
     if node.name == "if":
         condition = _numeric(node.operands[0], raw, scope, "if")
         if isinstance(condition, float):

@@ -23,7 +23,8 @@ def read_script(path: Path) -> str:
     try:
         return reading.read_text(path)
     except IsADirectoryError:
-        raise ScriptError(f"{path} is a folder", expected="the name of a script") from None
+        expected = "the name of a script"
+        raise ScriptError(f"{path} is a folder", expected=expected, code="file") from None
     except FileNotFoundError:
         parent = path.parent
         files = parent.iterdir() if parent.is_dir() else ()
@@ -39,7 +40,9 @@ def read_script(path: Path) -> str:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise ScriptError(
-            f"{path} cannot be read: {reason}", expected="a script, which is a text file"
+            f"{path} cannot be read: {reason}",
+            expected="a script, which is a text file",
+            code="file",
         ) from None
 
 
