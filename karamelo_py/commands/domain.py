@@ -29,19 +29,19 @@ CREATE_DOMAIN_WITHOUT_H = Forms(
 def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
-    All points must stay inside the domain. A point that leaves it ends the run, unless boundary
-    says otherwise. Strain is uniaxial in 1D and plane (unit thickness) in 2D. The grid starts at
-    the lower corner and covers the whole domain. If a side is not a multiple of the cell size, no
-    node lies at its upper end, and a wall there would be too far out.
+    A point that leaves the domain ends the run, unless boundary says otherwise. Strain is uniaxial
+    in 1D and plane (unit thickness) in 2D. The grid starts at the lower corner and covers the whole
+    domain. If a side is not a multiple of the cell size, no node lies at its upper end: a wall
+    there would be too far out.
 
     Parameters
     ----------
     dimensions
         1, 2 or 3.
     bounds
-        In 1D ``xmin, xmax, h``; in 2D ``xmin, xmax, ymin, ymax, h``; in 3D
-        ``xmin, xmax, ymin, ymax, zmin, zmax, h``, with the cell size h. Omit them in older
-        scripts that use create_domain.
+        ``xmin, xmax, h`` in 1D; ``xmin, xmax, ymin, ymax, h`` in 2D; ``xmin, xmax, ymin, ymax,
+        zmin, zmax, h`` in 3D; h is the cell size. Omit them in older scripts that use
+        create_domain.
 
     Example
     -------
@@ -78,8 +78,8 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
     Parameters
     ----------
     bounds
-        ``xmin, xmax``, in 2D and 3D followed by ``ymin, ymax``, in 3D followed by
-        ``zmin, zmax``; then optionally the cell size h. Without h the first solid sets it.
+        ``xmin, xmax``, in 2D and 3D then ``ymin, ymax``, in 3D then ``zmin, zmax``; optionally the
+        cell size h. Without h the first solid sets it.
 
     Example
     -------
@@ -119,9 +119,8 @@ def axisymmetric(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Comes before the first solid. Needs two dimensions and a domain with x >= 0. Points carry the
-    volume and mass of one radian: multiply forces and energies in the log by 2 pi for the whole
-    body.
+    Before the first solid, in a 2D domain with x >= 0. Points carry the volume and mass of one
+    radian: multiply forces and energies by 2 pi for the whole body.
 
     See Also
     --------
@@ -163,8 +162,8 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     ----------
     style
         ``error`` (the default): the run ends with an explanation. ``delete``: the point is removed,
-        with its mass and momentum. ``reflect``: the point is mirrored back inside at the edge, and
-        its normal velocity is reversed.
+        with its mass and momentum. ``reflect``: the point is mirrored back inside, and its normal
+        velocity is reversed.
 
     Example
     -------
@@ -172,14 +171,13 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
 
     Notes
     -----
-    ``delete`` and ``reflect`` are for splashes. For a body that rests against a wall, use fix
-    velocity_nodes. A warning names the first point, and the end of a run reports the number of
-    points.
+    ``delete`` and ``reflect`` are for splashes. For a body against a wall use fix velocity_nodes. A
+    warning names the first point, and the end of a run reports their number.
 
-    A point is deleted before the step in which it would leave. Dumps omit it. The other ids do not
+    A point is deleted before the step in which it would leave: dumps omit it, other ids do not
     change. The run returns to its last stored state, at most a hundred steps back, and repeats
-    these steps with their Python hooks. A run in which points leave in every step takes about six
-    times as long.
+    these steps with their Python hooks. If points leave in every step, a run takes about six times
+    as long.
 
     A reflected point retains its stress and tangential velocity. Neighbours that still push
     outwards may return it to the edge. A body that hits the edge as a whole loses most of its
@@ -203,12 +201,8 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
 
     Parameters
     ----------
-    ID
-        Name of the region.
     style
         The shape, or how other regions are combined.
-    arguments
-        Arguments of the style; see its page.
 
     Example
     -------
@@ -216,8 +210,8 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
 
     Notes
     -----
-    A region includes its surface. The word ``exterior`` at the end of block, cylinder and sphere
-    inverts the region, for groups and for solids.
+    A region includes its surface. A last word ``exterior`` inverts block, cylinder and sphere, for
+    groups and for solids.
 
     See Also
     --------
@@ -283,15 +277,13 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
 
     Parameters
     ----------
-    ID
-        Name of the solid.
     kind
         Where the points come from.
     arguments
-        Arguments of the style; see its page. For ``region``:
-        ``regionID, ppc, material, h[, T0]``: the region to fill, the points per cell in each
-        direction, the material, the cell size of the domain, and the initial temperature (default:
-        the material's). For ``mesh``: ``file, material, h[, T0]``.
+        For ``region``: ``regionID, ppc, material, h[, T0]``: the region to fill, the points per
+        cell in each direction, the material, the cell size of the domain, the initial temperature
+        (default: the material's). For ``mesh``: ``file, material, h[, T0]``. For others see the
+        page of the style.
 
     Example
     -------
@@ -299,7 +291,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
 
     Notes
     -----
-    The method, domain, region and material must already be defined.
+    After the method, domain, region and material.
 
     See Also
     --------
@@ -361,9 +353,9 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    Points belong to a group by their reference positions when the command is read. Nodes belong by
-    their positions. The separate nodes of solids that are made later also belong, unless solids are
-    named. The group ``all`` always exists.
+    Points belong to it by their reference positions when the command is read, nodes by their
+    positions. Separate nodes of later solids also belong, unless solids are named. The group
+    ``all`` always exists.
 
     Parameters
     ----------
@@ -376,9 +368,9 @@ def group(
     region
         ID of the region that selects the members.
     of
-        ``all``, or ``solid`` followed by the IDs of the solids whose points may belong.
+        ``all``, or ``solid`` followed by IDs of solids.
     solids
-        IDs of solids. For nodes, solids that use the same grid give the same group.
+        Only their points may belong. For nodes, solids on the same grid give the same group.
 
     Example
     -------

@@ -26,7 +26,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     style
         What it does.
     arguments
-        Arguments of the style, beginning with the group it acts on; see its page.
+        The group it acts on, then arguments of the style; see its page.
 
     Example
     -------
@@ -44,11 +44,6 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
 def delete_fix(hub: Hub, ID: str) -> None:
     """Remove a fix. Its published values stay available.
 
-    Parameters
-    ----------
-    ID
-        Name of the fix.
-
     Example
     -------
     delete_fix(gravity)
@@ -65,12 +60,10 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
 
     Parameters
     ----------
-    ID
-        Name of the compute.
     style
         What it measures.
     arguments
-        Arguments of the style, beginning with the group it measures; see its page.
+        The group it measures, then arguments of the style; see its page.
 
     Example
     -------
@@ -85,11 +78,6 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
 
 def delete_compute(hub: Hub, ID: str) -> None:
     """Remove a compute. Its published values stay available.
-
-    Parameters
-    ----------
-    ID
-        Name of the compute.
 
     Example
     -------
@@ -140,7 +128,6 @@ def _define(
 
 
 def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argument, ...]) -> None:
-    """Explain that the style comes before the group, unlike in LAMMPS."""
     if registry.knows(kind, style) or registry.knows(kind, ID):
         return
     third = arguments[0].word() if arguments else None
@@ -225,8 +212,8 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
     -----
     Nodes: the sum of the forces from the points, i.e. the divergence of stress and the forces of
     fixes on points (contact, tools, tractions). At held nodes with little acceleration it is minus
-    the reaction. Points: the rate of change of their momentum in the last step, sum m a. Before the
-    first step it is 0.
+    the reaction. Points: the rate of change of their momentum in the last step, sum m a. 0 before
+    the first step.
 
     See Also
     --------
@@ -257,10 +244,9 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Nodes: the forces that fixes such as body_force and force_nodes add to the nodes. Points: the
-    forces of fixes on the points (contact, tools, tractions). Prescribed velocities are not
-    included: those fixes publish their reactions. Before the first step it is 0. Karamelo gives
-    the internal force here.
+    Nodes: the forces of fixes on nodes, such as body_force and force_nodes. Points: the forces of
+    fixes on points (contact, tools, tractions). Prescribed velocities are not included: those fixes
+    publish their reactions. 0 before the first step. Karamelo gives the internal force here.
 
     See Also
     --------
@@ -275,7 +261,6 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
 
 def _total(hub: Hub, name: str, group: AnyGroup, direction: str) -> Expression:
-    """The value of the fix that measures it, which is made on first use."""
     ID = f"{name}({group.id})"
     if ID not in hub.fixes:
         _file(hub, hub.fixes, ID, Measuring(hub, group, name), name)
@@ -289,6 +274,5 @@ def _file(hub: Hub, catalogue: Any, ID: str, item: Any, style: str) -> None:
 
 
 def _component(hub: Hub, formula: Expression, direction: str) -> Expression:
-    """`formula`, or 0 in a direction that the domain lacks."""
     d = require_domain(hub).dimension
     return Expression(formula if "xyz".index(direction) < d else 0.0)

@@ -48,9 +48,7 @@ print_.may_differ = True
 
 
 def value(hub: Hub, expression: Expression) -> float:
-    """Give the present value of a formula, as a constant number.
-
-    ``evaluate`` is another name for it.
+    """Give the present value of a formula, as a constant number; also called ``evaluate``.
 
     Parameters
     ----------
@@ -106,6 +104,5 @@ def quit_(hub: Hub) -> None:
 
 
 def _refresh(hub: Hub, formula: Expression) -> None:
-    """Update fixes and computes whose published values the formula reads."""
     if formula.names - SEEDS and not hub.rehearsing:
         hub.refresh_values()

@@ -27,12 +27,8 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
 
     Parameters
     ----------
-    ID
-        Name of the material.
     style
         The law.
-    arguments
-        Arguments of the style; see its page.
 
     Example
     -------
@@ -59,8 +55,6 @@ def judge(hub: Hub, made: Material) -> None:
 
 
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:
-    """The command that defines a part of this kind."""
-
     def command(hub: Hub, ID: str, style: StyleOf(kind), *arguments: Argument) -> None:
         if (kind, style) == ("strength", "JC") and not registry.knows(kind, style):
             raise ScriptError(
@@ -75,12 +69,8 @@ def _part(kind: str, summary: str, example: str, others: str) -> Callable:
 
     Parameters
     ----------
-    ID
-        Name of the {"equation of state" if kind == "eos" else kind}.
     style
         The law.
-    arguments
-        Arguments of the style; see its page.
 
     Example
     -------
@@ -147,13 +137,11 @@ def load_path(
 ) -> None:  # fmt: skip
     """Define one segment of a load path, by its final strains or stresses.
 
-    The segment starts from the current state and reaches its final values in equal increments. A
-    strain component that is not named stays constant.
+    It starts from the current state and reaches its final values in equal increments. A strain
+    component that is not named stays constant.
 
     Parameters
     ----------
-    ID
-        Name of the load path.
     increments
         Number of increments.
     exx, eyy, ezz, exy, exz, eyz
@@ -161,17 +149,16 @@ def load_path(
         strains are tensor components, half the angle.
     gxy, gxz, gyz
         Angle of simple shear, twice the tensor strain. gxy moves x along y and rotates the point by
-        gxy/2. exy does not rotate the point.
+        gxy/2; exy does not rotate it.
     sxx, syy, szz, sxy, sxz, syz
         Cauchy stress, tension positive. The program finds the strain of this component.
     volumetric
-        exx + eyy + ezz: the remaining volumetric strain is split among the unspecified normal
-        strains.
+        exx + eyy + ezz: what remains is split among the unspecified normal strains.
     turn
-        Angle in radians by which the point rotates about z during the segment. Strains and stresses
-        refer to fixed axes.
+        Angle in radians by which the point rotates about z. Strains and stresses refer to fixed
+        axes.
     duration
-        Duration, by default 1, for rate-dependent laws. A segment with only a duration holds the
+        Duration for rate-dependent laws, by default 1. A segment with only a duration holds the
         point.
 
     Example
@@ -236,9 +223,8 @@ def element(
 ) -> None:
     """Take one point of a material along a load path, to check its law before a run.
 
-    Writes the response to the table element_ID.txt and plots it to element_ID.png. Needs no domain
-    and compiles nothing. The point begins at rest and stress-free; cam-clay begins at its pressure
-    p0.
+    Writes the table element_ID.txt and the plot element_ID.png. Needs no domain and compiles
+    nothing. The point begins at rest and stress-free; cam-clay begins at its pressure p0.
 
     Parameters
     ----------
@@ -254,7 +240,7 @@ def element(
         ``1D`` (exx only); ``uniaxial-stress`` (stress sxx only).
     tangent
         Whether to print the tangent of the last increment: derivatives of the Cauchy stress with
-        respect to strains and angles of shear. The angles are twice the tensor strains.
+        respect to strains and angles of shear, which are twice the tensor strains.
 
     Example
     -------
@@ -273,9 +259,9 @@ def element(
 
     The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. The increment of
     a rotation is skew to first order. Its second-order part is chosen for the least stored energy,
-    because laws in rate form and laws in F differ on what is rigid. Prescribed stresses are solved
-    for with Newton's method and the exact tangent. An increment that does not converge is halved,
-    up to eight times. If that fails, the files show the increments so far.
+    because laws in rate form and laws in F differ on what is rigid. Prescribed stresses are found
+    by Newton's method with the exact tangent. An increment that does not converge is halved, up to
+    eight times. If that fails, the files show the increments so far.
 
     See Also
     --------

@@ -32,7 +32,7 @@ def method(
     basis
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
-        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), then those for
+        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), then those of
         the basis and the method. Words in any order. ``thermo-mechanical``: heat flows between
         points (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the
         velocity gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp.
@@ -48,16 +48,15 @@ def method(
 
     Notes
     -----
-    Comes before the first solid.
+    Before the first solid.
 
     ``thermo-mechanical``: before each momentum update, heat flows between points of materials with
-    a temperature. These are ``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, and
+    a temperature: ``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, and
     ``eos-strength`` with a temperature. Points take the temperature increments of the nodes (FLIP,
     for any velocity transfer), so only conduction smears temperatures. `dt` also respects the
     stable step of conduction, h^2/(4 d) rho cp/kappa in d dimensions. Heat flows between bodies
-    with common nodes. Otherwise it leaves a body only by a fix.
-
-    Without that word, points are heated only by their own work.
+    with common nodes. Otherwise it leaves a body only by a fix. Without that word, points are
+    heated only by their own work.
 
     See Also
     --------
@@ -103,8 +102,8 @@ def scheme(
     arguments
         Arguments of the style; explicit schemes have none.
     start
-        Fraction of the first explicit step in which forces act: all of it (``full``), or ``half``.
-        With ``half``, velocities and kinetic energies belong to the logged time.
+        Fraction of the first explicit step in which forces act: ``full``, or ``half``. With
+        ``half``, velocities and kinetic energies belong to the logged time.
 
     Example
     -------
@@ -114,11 +113,10 @@ def scheme(
     Notes
     -----
     In explicit steps, positions belong to the end of a step and velocities to its middle. With
-    ``full`` the initial velocity belongs to half a step before the start, and the log shows
-    velocities half a step early. A projectile is then g dt t/2 too far, and kinetic energies lag by
-    half a step. With ``half`` both are second-order accurate in the step. Points then also store
-    their previous velocity. Velocities set after the first step, such as
-    ``sim.points["vx"] = values``, belong to half a step earlier.
+    ``full`` the initial velocity belongs to half a step before the start: a projectile is g dt t/2
+    too far, and the log shows velocities and kinetic energies half a step early. With ``half`` both
+    are second-order accurate in the step, and points also store their previous velocity. Velocities
+    set after the first step, such as ``sim.points["vx"] = values``, belong to half a step earlier.
 
     See Also
     --------
@@ -161,7 +159,7 @@ scheme.may_vary = "tolerance", "iterations", "solver", "limit"  # type: ignore[a
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
-    """Choose the floating-point precision of points and nodes.
+    """Choose the floating-point precision of points and nodes, before the first run.
 
     Parameters
     ----------
@@ -171,10 +169,6 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
     Example
     -------
     precision(single)
-
-    Notes
-    -----
-    Comes before the first run.
     """
     if hub.has_run:
         raise ScriptError(
@@ -191,7 +185,7 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     Nearly incompressible and plastic bodies are too stiff if the volume of each point is
     constrained: low-order basis functions cannot deform accordingly. Averaging the volume increment
     with the basis weights removes the excess constraints (Coombs et al. 2018). The mean stress is
-    averaged in the same way, so the forces do the work of the averaged strain.
+    averaged likewise, so the forces do the work of the averaged strain.
 
     Parameters
     ----------
@@ -207,10 +201,9 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     Costs one extra pass over the points per stress update and one per force evaluation.
 
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
-    fraction of the difference from the averaged pressure:
-    (sin(phi) - sin(psi))/(sin(phi) (1 - sin(psi))). With the pressure of the point alone,
-    non-dilatant sand would lose half of its strength. Load steps use the pressure of the point:
-    do not use averages there for such sand.
+    fraction of the difference from the averaged pressure: (sin(phi) - sin(psi))/(sin(phi) (1 -
+    sin(psi))). With the pressure of the point alone, non-dilatant sand would lose half of its
+    strength. Load steps use the pressure of the point: do not average there for such sand.
 
     See Also
     --------
@@ -249,7 +242,6 @@ class _Call:
         self.variants["basis"] = self.shapes or _variants(self.styles["basis"])
 
     def _found(self) -> dict[str, type]:
-        """Method and transfer. The error lists all unknown names."""
         styles: dict[str, type] = {}
         errors: list[ScriptError] = []
         for family, name in self.names.items():
@@ -266,7 +258,7 @@ class _Call:
         return styles
 
     def parts(self) -> dict[str, Any]:
-        """Transfer, basis and method, each made with its options."""
+        """Make the transfer, basis and method, each with its options."""
         if self.shapes:
             self._check_shapes()
         rest = self._choose("basis", self._choose("transfer", self.options))
@@ -381,7 +373,6 @@ class _Call:
         return words
 
     def _unknown(self, argument: Argument, slots: list[tuple[str, Parameter]]) -> ScriptError:
-        """Return the error for an option that no style takes."""
         word = argument.word()
         if self._is_number(argument):
             asking = {p.name: self.names[f] for f, p in slots if not p.kind.words}
@@ -413,7 +404,6 @@ class _Call:
 
 
 def _variants(style: type) -> Mapping[str, Any]:
-    """Words that choose another class (or style, by its name) instead of a style."""
     return getattr(style, "variants", {})
 
 

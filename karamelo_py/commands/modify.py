@@ -35,13 +35,13 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
     Notes
     -----
-    The next run uses the new constants in the same compiled loops. Stresses are retained; a stress
-    outside the new yield surface returns to it in the first step. If an elastic modulus changes,
-    the stress of an incremental law is retained, and the stress of a law of the total deformation
-    changes at once. Not changeable: the density, because points have their masses, and a constant
-    that sets the initial state of points, such as pc of cam-clay.
+    The next run uses the new constants in the same compiled loops. A stress outside the new yield
+    surface returns to it in the first step. If an elastic modulus changes, an incremental law
+    retains its stress; the stress of a law of the total deformation changes at once. Not
+    changeable: the density, because points have their masses, and constants that set the initial
+    state of points, such as pc of cam-clay.
 
-    ``kind`` material also finds constants of the parts of eos-strength if only one part has the
+    ``kind`` material also finds constants of the parts of eos-strength, if only one part has the
     name.
 
     See Also
@@ -77,7 +77,6 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
 
 def _parts(material: Material) -> list[MaterialPart]:
-    """List the parts of a material."""
     found: list[Any] = []
     for value in material.given.values():
         found += value if isinstance(value, tuple) else [value]

@@ -23,16 +23,13 @@ def dump(
 
     Parameters
     ----------
-    ID
-        Name of the dump.
     group
         Always the word ``all``.
     style
         The content and format of the files.
     arguments
-        Arguments of the style, beginning with the interval and the file name; see its page. The
-        interval is a number of steps, or ``time(T)``: the first step at or after each multiple of
-        the time T.
+        The interval, the file name, then arguments of the style; see its page. The interval is a
+        number of steps, or ``time(T)``: the first step at or after each multiple of the time T.
 
     Notes
     -----
@@ -84,11 +81,6 @@ dump.syntax = "ID, all, style, every, file[, ...]"  # the style defines the rest
 def delete_dump(hub: Hub, ID: str) -> None:
     """Stop a dump. Its files remain.
 
-    Parameters
-    ----------
-    ID
-        Name of the dump.
-
     Example
     -------
     delete_dump(d1)
@@ -107,8 +99,8 @@ def delete_dump(hub: Hub, ID: str) -> None:
 def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> None:
     """Set how often a line is logged, and in which format.
 
-    Each line goes at once to the terminal and to log.mpm in the current folder. The first and last
-    state of each run are always logged. Without this command, every step is logged.
+    Lines go at once to the terminal and to log.mpm in the current folder. The first and last state
+    of each run are always logged. Without this command, every step is.
 
     Parameters
     ----------
@@ -142,7 +134,7 @@ def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> N
 def log(hub: Hub, every: Every) -> None:
     """Set how often a line is logged (older form; see set_output).
 
-    Only as a statement; in an expression log(x) is the natural logarithm.
+    In an expression log(x) is the natural logarithm.
 
     Parameters
     ----------
@@ -225,7 +217,7 @@ def plot(
     scale
         ``log`` for a logarithmic y axis, which omits numbers that are not positive.
     label
-        Label of the y axis, such as "energy (J)". The default is the name of y with its unit.
+        Label of the y axis, such as "energy (J)". Default: the name of y with its unit.
 
     Example
     -------
@@ -253,7 +245,7 @@ def plot(
 def save_plot(hub: Hub, file: OutputFile) -> None:
     """Draw the curves of all plot commands to a file at the end of each run.
 
-    Interrupted and failed runs draw them too. After a run, the command draws the curves at once.
+    Interrupted and failed runs draw them too. After a run, the command draws at once.
 
     Parameters
     ----------
@@ -288,9 +280,8 @@ def units(
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
 
     No number is converted. A scene in mm, g, ms has forces in N, stresses in MPa and energies in
-    mJ. Before the first step, the program warns of densities and wave speeds that no real material
-    has: densities outside 10 to 100000 kg/m^3 (gases: below 0.001), and speeds outside 1 m/s to
-    50 km/s.
+    mJ. Before the first step, the program warns of values that no real material has: densities
+    outside 10 to 100000 kg/m^3 (gases: below 0.001), and wave speeds outside 1 m/s to 50 km/s.
 
     Parameters
     ----------

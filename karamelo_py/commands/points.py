@@ -45,8 +45,8 @@ def delete_particles(
     by
         The word ``region`` or ``where``.
     chosen
-        ID of a region, whose points are deleted by their reference positions. After ``where``: a
-        formula of columns of dump particle. Points for which it is not 0 are deleted.
+        After ``region``: its ID; points are deleted by their reference positions. After ``where``:
+        a formula of columns of dump particle; points for which it is not 0 are deleted.
 
     Example
     -------
@@ -55,10 +55,10 @@ def delete_particles(
 
     Notes
     -----
-    With ``where`` the command comes between runs. The mass and energy of the deleted points are
-    printed. Before the first run, the remaining points are renumbered, so the command must come
-    before the groups of particles and contact fixes of these solids. Between runs the numbers do
-    not change. A solid cannot lose all of its points before the first run.
+    ``where`` is for between runs. The mass and energy of the deleted points are printed. Before the
+    first run, the remaining points are renumbered, so the command must come before the groups of
+    particles and contact fixes of these solids; between runs numbers do not change. A solid cannot
+    lose all of its points before the first run.
 
     See Also
     --------
@@ -92,7 +92,6 @@ def delete_particles(
 
 
 def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
-    """Delete the points of solids that meet a condition now."""
     if not hub.has_run:
         raise ScriptError(
             "points have no such columns before the first run",
@@ -142,9 +141,9 @@ def translate_particles(
 
     Notes
     -----
-    The reference positions move, so the points start there. Volumes do not change, except in
-    axisymmetry, where they follow the radius. A separate grid of a solid covers the new positions.
-    The points stay in their groups.
+    The reference positions move, so the points start there. Volumes do not change, except that they
+    follow the radius in axisymmetry. A separate grid of a solid covers the new positions. The
+    points stay in their groups.
 
     See Also
     --------
@@ -168,7 +167,6 @@ def translate_particles(
 
 
 def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
-    """Move the points of `solid` by `step` (n, d)."""
     moved = _chosen(solid, np.ones(solid.count, np.bool_))
     x0 = moved.x0 + step
     if not hub.domain.contains(x0).all():
@@ -252,10 +250,10 @@ def populate_cylindrical_coordinates(
         ID of the region. Points outside it are dropped.
     lattice
         In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: the centre, the outer radius, the number of rings,
-        the number of points in each ring, and the initial temperature. In 3D
-        ``axis, c1, c2, R, lo, hi, Ndx, Ndr, Ndtheta, T0``: the word x, y or z, the centre in the
-        other two directions (in the order x, y, z), the outer radius, the ends along the axis, the
-        number of slices along it, and then as in 2D.
+        the number of points in each ring, the initial temperature. In 3D ``axis, c1, c2, R, lo, hi,
+        Ndx, Ndr, Ndtheta, T0``: the word x, y or z, the centre in the other two directions (in the
+        order x, y, z), the outer radius, the ends along the axis, the number of slices along it,
+        then as in 2D.
 
     Example
     -------
@@ -263,13 +261,13 @@ def populate_cylindrical_coordinates(
 
     Notes
     -----
-    Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``. Its points have
-    the angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx``
-    with ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``.
-    The sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo puts rings at ``j dr`` with a point
-    in the centre, and slices at ``lo + i dx``. Their volumes do not give this sum.
+    Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``, and points at the
+    angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx`` with
+    ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``; the
+    sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo puts rings at ``j dr`` with a point in
+    the centre, and slices at ``lo + i dx``, whose volumes do not give this sum.
 
-    Comes before the first run, and before groups that select from these points. T0 replaces the
+    Before the first run, and before groups that select from these points. T0 replaces the
     temperature of the solid.
 
     See Also

@@ -24,10 +24,10 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 
 
 def carry_out(hub: Hub, **length: Any) -> None:
-    """Carry out a run command of a `length` (see `RunLoop`), or what stands for it now.
+    """Carry out a run command of a `length` (see `RunLoop`), or what stands for it.
 
-    A rehearsal takes note of it, a program stops in front of it, and ``check`` reports in its
-    place; a run that was over in the file that a script continues from is skipped.
+    A rehearsal notes the run, a `Pause` stops before it, and ``check`` reports instead. A run that
+    was over in the restart file of a resumed script is skipped.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)
@@ -92,9 +92,9 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Above 0. A run warns of unstable factors. The default is 0.9. It is 0.4 (0.2 with one point
-        per cell) where a drifting body would gain energy: linear basis in ulmpm, FLIP coefficient
-        above 0.99, and musl or usf. Until a point has moved a quarter of a cell, the default is
+        Above 0, by default 0.9; a run warns of unstable factors. The default is 0.4 (0.2 with one
+        point per cell) where a drifting body would gain energy: linear basis in ulmpm, FLIP
+        coefficient above 0.99, and musl or usf. Until a point has moved a quarter of a cell, it is
         0.9, and more with splines. A given factor always refers to the stable step of moving
         bodies.
 
@@ -125,11 +125,11 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     steps
         Exact number of steps.
     on_trouble
-        ``stop``, or ``halve``. With ``halve`` the run returns to its last good state and halves the
-        step, at most five times, with a message. This happens when a point fails, when energy
-        appears that no load supplied (a warning without ``halve``), and when the step becomes
-        unstable. Log, dumps, curves and computes are rewound too. Points that leave the domain
-        without an energy gain stop the run (see `boundary`).
+        ``stop``, or ``halve``: when a point fails, when energy appears that no load supplied
+        (otherwise a warning), or when the step becomes unstable, the run returns to its last good
+        state and halves the step, at most five times, with a message. Log, dumps, curves and
+        computes are rewound too. Points that leave the domain without an energy gain stop the run
+        (see `boundary`).
 
     Example
     -------
@@ -269,23 +269,23 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     bit-identical to an uninterrupted run, with any number of threads. The log and the dumps are
     continued; lines written after that step are cut off.
 
-    The script must be unchanged up to this run, with three exceptions. Commands that only control
-    how a run proceeds or its output may change (set_dt, dt_factor, set_output, dump, plot), and
-    ``boundary(delete)`` may be added. The length of the last run may change, as a number in its own
-    line. Variables that were set with ``-var`` come from the file. A longer ``run(n)`` is
-    bit-identical to a run that had this length from the start. A longer ``run_time(T)`` is too, if
-    the file was written before the last two steps of the shorter run, which are shortened.
+    The script must be unchanged up to this run, except for commands that only control how a run
+    proceeds or its output (set_dt, dt_factor, set_output, dump, plot), an added
+    ``boundary(delete)``, and the length of the last run, as a number in its own line. Variables
+    that were set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run
+    that had this length from the start. A longer ``run_time(T)`` is too, if the file was written
+    before the last two steps of the shorter run, which are shortened.
 
     A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
     plots, and the values that the script has read. A run that is killed while writing leaves the
     previous file intact. The last state of each run is written too. A run that fails writes
-    last_good.<step>.h5 instead. If its energy has grown, this is the last state before the growth,
-    to within ten steps. If its step was above the stable limit from the start, it is the state
-    before the first step. No such file is written with boundary(delete), or if the run was resumed
-    from a file at that step.
+    last_good.<step>.h5 instead: if its energy has grown, the last state before the growth, to
+    within ten steps; if its step was above the stable limit from the start, the state before the
+    first step. No such file is written with boundary(delete), or if the run was resumed from a file
+    at that step.
 
     Dumps include the state in which a run was interrupted or failed. A resumed run removes this
-    state from files with several snapshots. Snapshots in separate files remain.
+    state from files with several snapshots, not snapshots in separate files.
 
     Example
     -------
@@ -355,10 +355,10 @@ def read_restart(hub: Hub, file: str) -> None:
 
     Notes
     -----
-    Before this command, repeat the domain, method and solids of the script that wrote the file, and
-    the fixes and computes to continue. Those with the same ID and style retain their values.
-    Initial velocities are not applied again. Anything else may differ: constants of materials,
-    fixes, the time step, outputs. Time and step continue from the file.
+    First repeat the domain, method and solids of the script that wrote the file, and the fixes and
+    computes to continue: those with the same ID and style retain their values. Initial velocities
+    are not applied again. Anything else may differ: constants of materials, fixes, the time step,
+    outputs. Time and step continue from the file.
 
     The run starts new output files. A picture or movie with the same ID, style and field retains
     the earlier colour scale.

@@ -27,13 +27,12 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
 
     Notes
     -----
-    Comes before the first material. Each law finds the strain across the plate for which the stress
-    szz vanishes. The column ``thickness`` is the present thickness over the initial one. Masses,
-    forces and energies refer to the whole thickness. Liquids, gases and loose grains are
-    refused: without stress across they have no strength. anti_volumetric_locking is refused too;
-    plane stress does not lock. With a thickness other than 1, fixes that take the size of a point
-    from its volume are refused: contact between points and with surfaces, and fluxes through faces
-    of points.
+    Before the first material. Each law finds the strain across the plate for which the stress szz
+    vanishes. The column ``thickness`` is the present thickness over the initial one. Masses, forces
+    and energies refer to the whole thickness. Refused are liquids, gases and loose grains, which
+    have no strength without stress across, and anti_volumetric_locking: plane stress does not lock.
+    With a thickness other than 1, fixes that take the size of a point from its volume are refused:
+    contact between points and with surfaces, and fluxes through faces of points.
 
     See Also
     --------
@@ -59,10 +58,10 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 
     Notes
     -----
-    Comes before the first material. Each law finds the strain across the bar, equal in y and z, for
-    which the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces
-    and energies refer to the whole cross-section. The same materials and fixes are refused as in
-    plane_stress, and orthotropic materials that are not the same in y and z.
+    Before the first material. Each law finds the strain across the bar, equal in y and z, for which
+    the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces and
+    energies refer to the whole cross-section. Refused are the materials and fixes that plane_stress
+    refuses, and orthotropic materials that differ in y and z.
 
     See Also
     --------

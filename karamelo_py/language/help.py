@@ -33,7 +33,8 @@ def describe(target: Callable, name: str) -> Help:
     """Make the help for a command or style, from its signature and docstring, and its bases."""
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
-    descriptions: dict[str, str] = {}
+    noun = name.removeprefix("delete_").replace("_", " ")
+    descriptions = {"ID": f"Name of the {noun}.", "arguments": "See the page of the style."}
     # Descriptions in a base class hold for derived styles.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
         for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):

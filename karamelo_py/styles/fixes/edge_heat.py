@@ -34,7 +34,6 @@ class EdgeHeat(OnEdge, HeatFix):
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
-        """Give the points their heat, and publish the sum and the area."""
         faces = self.faces_at(points.ids - 1)
         x, known = faces.middle, self.hub.values
         heat = self.flows(points, faces, [f.evaluate_points(known, x, x) for f in self.formulas])
@@ -63,13 +62,13 @@ class EdgeHeatFlux(EdgeHeat):
 
     Notes
     -----
-    Each point gets the heat through the part of the region's surface next to it. The area is the
-    initial area of the smooth surface (for a mesh, of the faces of its points). To load a part of
-    an edge, restrict the group, or set q to 0 elsewhere. If the region ends at the edge of the
-    domain or at a symmetry plane, extend it beyond: then it has no surface there.
+    Each point gets the heat through the part of the region's surface next to it: the initial area
+    of the smooth surface (for a mesh, of the faces of its points). To load a part of an edge,
+    restrict the group, or set q to 0 elsewhere. If the region ends at the edge of the domain or at
+    a symmetry plane, extend it beyond: then it has no surface there.
 
-    Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in
-    axisymmetry per radian).
+    Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in axisymmetry
+    per radian).
 
     See Also
     --------
@@ -92,7 +91,7 @@ class EdgeConvection(EdgeHeat):
         Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z
         (initial position of the edge), time and published values.
     T_inf
-        Temperature of the surrounding fluid; a number or a formula likewise.
+        Temperature of the surrounding fluid, likewise.
 
     Example
     -------
@@ -100,9 +99,9 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    The area is defined as in edge_heat_flux. T is the temperature of the points next to the surface
-    after the step, so no coefficient cools them below the fluid. Publishes the heat per time into
-    all points as ID_s, and the area as ID_area.
+    Areas are as in edge_heat_flux. T is the temperature of the points next to the surface after the
+    step, so no coefficient cools them below the fluid. Publishes the heat per time into all points
+    as ID_s, and the area as ID_area.
 
     See Also
     --------

@@ -75,7 +75,6 @@ Columns = TypeVar("Columns", Faces, EdgePieces)
 
 
 def joined(found: Sequence[Columns]) -> Columns:
-    """Join tables of faces, or of pieces, one after another."""
     return type(found[0])(*map(np.concatenate, zip(*found, strict=True)))
 
 
@@ -185,7 +184,6 @@ class OnEdge(Fix):
     _seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
-        """Warn if there is nothing to load."""
         if not self.hub.rehearsing and not self.region.unknown:
             pieces = self.group.pieces()
             if len(self.group) and not any(len(self._find(ids).point) for ids in pieces):
@@ -268,9 +266,8 @@ class EdgeTraction(EdgeFix):
         The loaded side, by its outward direction: xlo and xhi for left and right, ylo and yhi, zlo
         and zhi.
     traction
-        tx, ty, tz, one per dimension of the domain: force per area. Numbers or formulas of x, y, z
-        (initial position of the edge), time and published values. NULL leaves a component
-        unchanged.
+        tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z (initial
+        position of the edge), time and published values. NULL leaves a component unchanged.
 
     Example
     -------
@@ -328,13 +325,13 @@ class EdgePressure(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
 
-    Points are boxes. The pressure acts inwards on each of their outer faces, on its initial area.
-    The forces have constant magnitude and direction. A curved edge is stair-stepped, but the force
-    along each axis is that on the projected area, as on the smooth edge. With points=cut the forces
-    are those on the smooth edge itself. In axisymmetry, forces are per radian.
+    Points are boxes. The pressure acts inwards on each outer face, on its initial area, with
+    constant magnitude and direction. A curved edge is stair-stepped, but the force along each axis
+    is that on the projected area, as on the smooth edge. With points=cut the forces are those on
+    the smooth edge itself. In axisymmetry, forces are per radian.
 
-    For a part of an edge, define a separate region. A region such as
-    ``region(top, block, 0, 1, 0.9, 1)`` also has other sides, which the group may have to exclude.
+    For a part of an edge, define a separate region. A region such as ``region(top, block, 0, 1,
+    0.9, 1)`` also has other sides, which the group may have to exclude.
 
     See Also
     --------

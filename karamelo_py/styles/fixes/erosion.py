@@ -20,9 +20,10 @@ class Erosion(Fix):
     ----------
     condition
         A formula of columns of dump particle (damage, volume, x, ep, T, ...), names of groups and
-        solids, time and published values; points for which it is not 0 are deleted.
+        solids, time and published values; points for which it is not 0 are deleted. A column name
+        means the column even if the script has a variable of that name.
     every
-        Steps between two checks.
+        Steps between two checks, after each step whose number is a multiple.
 
     Example
     -------
@@ -32,11 +33,8 @@ class Erosion(Fix):
     Notes
     -----
     Publishes sums since the start: ID_points, ID_mass, and ID_energy, the kinetic, stored and
-    dissipated energy of the deleted points. The energy balance counts it as work of the fix.
-
-    A column name means the column even if the script has a variable of that name. Points are
-    deleted after each step whose number is a multiple of `every`. Log and dumps at this step omit
-    them.
+    dissipated energy of the deleted points, which the energy balance counts as work of the fix. Log
+    and dumps at this step omit the points.
 
     See Also
     --------

@@ -90,14 +90,12 @@ class BodyForce(Fix):
 
 
 def _is_gravity(formula: Expression) -> bool:
-    """Return True if a formula is, or contains, the acceleration of gravity in m/s^2."""
     if formula.is_constant:
         return 9.7 < abs(formula.constant) < 9.9
     return re.search(r"(?<![\d.])9\.8\d*(?![\d.eE])", formula.text) is not None
 
 
 def share_out(mass, v, v_star, force, value, before, dt, share):
-    """Add the member's fraction of the value to its force."""
     return v, v_star, force + value * share, value * share
 
 
@@ -180,9 +178,9 @@ class ForceParticles(PointForces):
 
     Notes
     -----
-    A point of mass m gets m/M of the force at its position. M is the mass of the group. Unlike fix
-    force_nodes, the load moves with the points. In axisymmetry, forces are per radian. Publishes
-    the sum as ID_x, ID_y, ID_z.
+    A point of mass m gets m/M of the force at its position, where M is the mass of the group.
+    Unlike fix force_nodes, the load moves with the points. In axisymmetry, forces are per radian.
+    Publishes the sum as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -236,17 +234,17 @@ class LocalDamping(Fix):
     Notes
     -----
     The force f of a node becomes f - alpha |f| sign(v), component by component (Cundall 1987).
-    Balanced forces cause no damping. The state of rest is therefore the same as without damping,
-    for any stiffness, and steady motion is not damped. With 0.8 a scene comes to rest within about
-    ten periods of its slowest vibration.
+    Balanced forces cause no damping: the state of rest is the same as without it, for any
+    stiffness, and steady motion is not damped. With 0.8 a scene comes to rest within about ten
+    periods of its slowest vibration.
 
-    It acts after all other fixes, wherever it is in the script. Held nodes, and nodes with a
-    prescribed constant velocity, are not damped, and their reactions are correct. Publishes the sum
+    It acts after all other fixes, wherever it is in the script. Nodes that are held or have a
+    prescribed constant velocity are not damped, and their reactions are correct. Publishes the sum
     of the damping forces as ID_x, ID_y, ID_z.
 
-    In method ulmpm/contacts it acts before solids push each other. Bodies in contact then stick as
-    with friction, between 1 - alpha and 1 + alpha of the load. Reduce alpha to 0 there, as in
-    0.8*max(1 - time/T, 0).
+    In method ulmpm/contacts it acts before solids push each other: bodies in contact stick as with
+    friction, between 1 - alpha and 1 + alpha of the load. Reduce alpha to 0 there, as in 0.8*max(1
+    - time/T, 0).
 
     See Also
     --------
@@ -282,7 +280,7 @@ class InitialStress(Fix):
     Parameters
     ----------
     sxx, syy, szz, syz, sxz, sxy
-        Components: numbers or formulas of x, y, z, x0, y0, z0; tension is positive. NULL leaves a
+        Components, tension positive: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a
         component unchanged. Shear components outside the dimension must be NULL or 0.
 
     Example
@@ -292,8 +290,8 @@ class InitialStress(Fix):
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
-    set. Compression is negative. A warning is given for tension that a material cannot sustain,
-    such as in soil without cohesion.
+    set. A warning is given for tension that a material cannot sustain, such as in soil without
+    cohesion.
     """
 
     published = ()
@@ -324,7 +322,6 @@ class InitialStress(Fix):
 
 
 def _is_borne(law: Any, mean: float) -> bool:
-    """Return True if a law sustains half of a mean stress in all directions."""
     kin = Space()
     stress = tuple(nothing(kin))
     state = with_stress(law, kin, initial_state(law, kin, 1.0), (*3 * (mean,), *stress[3:]))

@@ -39,7 +39,6 @@ class HeatFix(Fix):
             )
 
     def _look_inside(self) -> None:
-        """Warn of groups that are more than a surface layer: inner points have no outer face."""
         for solid in self.hub.solids.values():
             if not 0 < solid.count < MANY:
                 continue
@@ -53,7 +52,6 @@ class HeatFix(Fix):
 
 
 def check_coefficient(h: Expression) -> None:
-    """Refuse a heat transfer coefficient below 0."""
     if h.is_constant and not h.constant >= 0:
         raise ScriptError(
             f"the heat transfer coefficient is {h.constant:g}",
@@ -85,8 +83,8 @@ class TemperatureNodes(HeatFix):
 
     Notes
     -----
-    Publishes the heat per time that this needs as ID_s. If several such fixes hold a node, the last
-    of them decides and gets the heat of that node.
+    Publishes the heat per time that this needs as ID_s. Of several such fixes on a node, the last
+    decides and gets its heat.
 
     See Also
     --------
@@ -189,9 +187,9 @@ class HeatFluxParticles(FacesOfPoints):
     Notes
     -----
     A point has one outer face, the side of a cube of its volume; in 1D, the whole section. A point
-    at an edge of the body has two outer faces and needs two fixes. In axisymmetry the face is at
-    the radius of the point, slightly inside the surface. The program prints the area that the group
-    covers: on curved surfaces it depends on the layer in the group (0.66 to 1.44 of the surface).
+    at an edge of the body has two and needs two fixes. In axisymmetry the face is at the radius of
+    the point, slightly inside the surface. The program prints the area that the group covers: on
+    curved surfaces it depends on the layer in the group (0.66 to 1.44 of the surface);
     edge_heat_flux uses the area of the surface. Publishes the heat per time (in 2D per thickness,
     in axisymmetry per radian) as ID_s.
 

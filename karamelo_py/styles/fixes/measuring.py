@@ -11,7 +11,6 @@ from karamelo_py.styles.fixes.formulas import per_direction
 
 
 def force_of_nodes(mass, v, v_star, force, value, before, dt, share):
-    """The total is the force."""
     return v, v_star, force, force
 
 

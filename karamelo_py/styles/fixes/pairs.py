@@ -28,7 +28,6 @@ SENT = 350  # bytes per point that are sent to the process that searches for pai
 
 
 def check_pair(solid1: Solid, solid2: Solid) -> None:
-    """Refuse a pair of a solid with itself."""
     if solid1 is solid2:
         raise ScriptError(
             f"'{solid2.id}' is named twice",
@@ -178,21 +177,21 @@ class ContactMinimizePenetration(PairContact):
 
     Notes
     -----
-    Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite.
+    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite.
 
     Points are spheres (in 2D disks). Their radius R is half the side of a cube (in 2D a square) of
-    their present volume. Their penetration is p = R1 + R2 - |x2 - x1|. Two points with p > 0 get
-    the force m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction
-    is at most mu times this force, against the slip (de Vaucorbeil & Nguyen 2021, "Modelling
-    contacts with a total Lagrangian material point method"). It stops and reverses the slip: a load
-    that friction can hold stays at rest, and yields by mu p before it slides.
+    their present volume. Two points with the penetration p = R1 + R2 - |x2 - x1| > 0 get the force
+    m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction is at most
+    mu times this force, against the slip (de Vaucorbeil & Nguyen 2021, "Modelling contacts with a
+    total Lagrangian material point method"). It stops and reverses the slip: a load that friction
+    can hold stays at rest, and yields by mu p before it slides.
 
-    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
-    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
+    dt is the step of the scene, not a step that is shortened to end a run on time. If steps drop
+    suddenly, as by set_dt, it drops by 1 % of the time.
 
     A surface of spheres is rough and resists sliding. The force on a block (two points per cell and
     direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces
-    inclined to the grid lock. On a slope of 20 degrees with mu = 0 a block sticks, and with
+    inclined to the grid lock: on a slope of 20 degrees with mu = 0 a block sticks, and with
     points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
     For correct friction use method ulmpm/contacts.
 
@@ -256,13 +255,12 @@ class ContactHertz(PairContact):
 
     Notes
     -----
-    Points are spheres (in 2D disks) with a radius R of half the side of a cube (in 2D a square) of
-    their present volume. Two points that overlap by p repel each other with 4/3 E* sqrt(R p^3) in
-    3D and pi/4 E* sqrt(R p^3) otherwise. Here R = R1 R2 / (R1 + R2) and 1/E* = (1 - nu1^2)/E1 + (1
-    - nu2^2)/E2. The force is for single points, so bodies overlap noticeably before it is large,
-    and a fast body may pass through.
+    Points are spheres as in contact/minimize_penetration. Two points that overlap by p repel each
+    other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 +
+    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. The force is for single points: bodies overlap
+    noticeably before it is large, and a fast body may pass through.
 
-    Publishes the force on solid1 as ID_x, ID_y, ID_z. The force on solid2 is the opposite. With
+    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. With
     several processes, the first one searches among all points that may touch.
 
     See Also
@@ -304,8 +302,8 @@ class ContactFriction(Fix):
     Publishes the contact force of solid2 on solid1 as ID_x, ID_y, ID_z.
 
     Frictional work heats solids with a temperature: half each, or all of it if only one has a
-    temperature. In methods with ``thermo-mechanical`` it is divided by the effusivities
-    sqrt(kappa rho cp), as between half-spaces.
+    temperature; with ``thermo-mechanical`` by the effusivities sqrt(kappa rho cp), as between
+    half-spaces.
 
     See Also
     --------

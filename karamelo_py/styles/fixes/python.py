@@ -100,17 +100,16 @@ class Python(Fix):
     ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins describes the views in full. A step
     costs some ten microseconds more, plus the time of the function.
 
-    With several processes all points are gathered in each step. Write ``pull.point_by_point =
-    True`` after a function that treats each point or node separately and moves no points. Each
+    With several processes all points are gathered in each step. If the function treats each point
+    or node separately and moves no points, write ``pull.point_by_point = True`` after it: each
     process then calls it for its own points, in any order. ``points.total(terms)`` sums terms (n,)
     or (n, k) over all points.
 
-    Restart files hold values that the function stores between steps, if they are named.
-    ``remembers = ("taken", "left")`` names variables in the module, or attributes in the class of a
-    callable object. Possible values: numbers, texts, arrays, NumPy generators, and lists, tuples,
-    sets and dictionaries of these. The first restart file warns of other such data that has
-    changed. Defaults of arguments, other objects, other modules, and ``np.random`` itself are not
-    checked.
+    Restart files hold values that the function stores between steps, if ``remembers = ("taken",
+    "left")`` names them: variables in the module, or attributes in the class of a callable object.
+    Possible values: numbers, texts, arrays, NumPy generators, and lists, tuples, sets and
+    dictionaries of these. The first restart file warns of other such data that has changed.
+    Defaults of arguments, other objects, other modules, and ``np.random`` itself are not checked.
 
     Example
     -------

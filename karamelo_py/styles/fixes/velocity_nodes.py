@@ -31,7 +31,6 @@ def prescribe_motion(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_mapped(mass, v, v_star, force, value, before, dt, share):
-    """Set the re-mapped velocity to the present value."""
     return value, value, force, 0.0
 
 
@@ -118,11 +117,11 @@ class VelocityNodes(Fix):
     Publishes ID_x, ID_y, ID_z: the force that holds the nodes, with friction. Frictional work heats
     points with a temperature. The wall takes no heat.
 
-    Several such fixes may hold a node in one direction. The last one decides: it has the whole
-    reaction of the node, and only its friction acts. A bound that is not reached exerts no force.
+    Of several such fixes on a node in one direction, the last decides: it has the whole reaction of
+    the node, and only its friction acts. A bound that is not reached exerts no force.
 
     A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
-    in cells next to faces whose nodes are all held or bounded. A group should extend to the last
+    in cells next to faces whose nodes are all held or bounded, so a group should extend to the last
     cell in which a body has points.
 
     In ulmpm/contacts, if the fix gives all components and all corners of a solid's cells are in the
@@ -178,7 +177,6 @@ class VelocityNodes(Fix):
         return self.hub.update.method.held_with(self.hub, self.group.nodes)
 
     def _one_bound(self) -> str:
-        """Return the bound of all components: a fix has one function for all of them."""
         bounds = dict.fromkeys(v.bound for v in self.formulas if v is not None)
         if len(bounds) > 1:
             lines = []
@@ -270,8 +268,7 @@ class Reaction(Compute):
 
     Notes
     -----
-    The sum of the reactions of the fixes velocity_nodes in the group. If two fixes hold the same
-    nodes, it is the force of both. Before the first step it is 0.
+    The sum of the reactions of the fixes velocity_nodes in the group; 0 before the first step.
 
     See Also
     --------
@@ -291,7 +288,6 @@ class Reaction(Compute):
         self.publish_components(total)
 
     def _contains(self, fix) -> bool:
-        """Return True if the nodes that a fix holds belong to the group."""
         if self.group.all:
             return True
         inside = np.isin(fix.group.members, self.group.members)

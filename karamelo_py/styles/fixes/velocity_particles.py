@@ -31,8 +31,6 @@ def carry(mass, v, x_old, x, value, before, dt, kick):
 
 
 class VelocityOfPoints(Fix):
-    """Base of fixes that set a point velocity by a formula per component."""
-
     syntax = "group, vx[, vy[, vz]]"
 
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
@@ -55,9 +53,9 @@ class VelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    Publishes the force that holds the points as ID_x, ID_y, ID_z. If several such fixes act on a
-    point in one direction, the last one decides. It also overrides initial velocities and held
-    nodes. A run warns of this before its first step.
+    Publishes the force that holds the points as ID_x, ID_y, ID_z. Of several such fixes on a point
+    in one direction, the last decides. It also overrides initial velocities and held nodes; a run
+    warns of this before its first step.
 
     Use two cells of points or more: the rest of a solid can slip past a grip of one cell. This
     happened in ulmpm when a slab was squeezed by 20 % (linear, quadratic-spline, cubic-spline).
@@ -164,7 +162,6 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
 
 
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
-    """Return the data for a fix that is overridden in these directions, for these point ids."""
     held = other.prescribes_velocity
     return {
         "other": other,
@@ -178,13 +175,11 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
 
 
 def _shared(simulation: Any, other: Any, fix: Any) -> np.ndarray:
-    """Return the ids of the points on which both act."""
     ids = simulation.points.members(other.group)
     return ids[fix.group.has(ids)]
 
 
 def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -> bool:
-    """Return True if two fixes give some of the points different velocities now."""
     ids = ids[:: max(1, len(ids) // SAMPLE)]
     x, x0 = simulation.hub.fields.position[ids], places_before(simulation.hub, ids)
     values = simulation.hub.values

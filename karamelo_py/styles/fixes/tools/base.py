@@ -42,11 +42,9 @@ class ToolFix(PointForces):
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
     def now(self, *formulas: Expression) -> np.ndarray:
-        """Return the present values (n,) of formulas of time."""
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
 
     def of_time(self, name: str, formulas: Sequence[Expression]) -> tuple[Expression, ...]:
-        """Check that there is a formula of time per direction."""
         found = per_direction(self.hub, name, formulas, all_given=True)
         self.now(*found)
         return found
@@ -54,7 +52,6 @@ class ToolFix(PointForces):
     def from_place(
         self, points: PointsView | PointTable, place: Sequence[Expression]
     ) -> np.ndarray:
-        """Vectors (n, d) from a position to the points."""
         return points.position.astype(float) - self.now(*place)
 
     def side(self, points: PointsView) -> np.ndarray:
@@ -113,7 +110,6 @@ class PlaneTool(ToolFix):
         return -(self.from_place(points, self.origin) @ normal), normal
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Return the present depth (n,) of points behind the plane."""
         return self.depth(points)[0]
 
 
@@ -145,7 +141,6 @@ class BallTool(ToolFix):
     centre: tuple[Expression, ...]
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Return the present depth (n,) of points in the ball."""
         return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
 
 

@@ -35,13 +35,9 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     Notes
     -----
     Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
-    volume. A point with penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2, which moves
-    a free point out within one step. Friction is at most mu times this force, against the slip (de
-    Vaucorbeil & Nguyen 2021). It stops and reverses the slip: a load that friction can hold stays
-    at rest, and yields by mu p before it slides. A moving plane does not drag.
-
-    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
-    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
+    volume. A point with the penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2, which
+    moves a free point out within one step. Friction and dt are as in contact/minimize_penetration
+    (de Vaucorbeil & Nguyen 2021). A moving plane does not drag.
 
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 

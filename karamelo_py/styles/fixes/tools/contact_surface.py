@@ -55,15 +55,13 @@ class ContactSurface(StiffTool):
     -----
     Publishes the force on the points as ID_x, ID_y, ID_z.
 
-    Points are spheres (in 2D disks). Their radius is half the side of a cube of their present
-    volume. A point at the depth p that approaches with the speed v gets the force
-    m (v / dt + p / (10 dt^2)) out of the region. This stops the point within one step and removes
-    10 % of p. The force never pulls. Friction is at most mu times this force. It stops the slip on
-    the moving region and reverses 10 % of the slip distance per step, whatever loads the point: a
-    load that friction can hold stays at rest. Before a point slides it yields by mu p.
-
-    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
-    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
+    Points are spheres (in 2D disks) with a radius of half the side of a cube of their present
+    volume. A point at the depth p that approaches with the speed v gets the force m (v / dt + p /
+    (10 dt^2)) out of the region. This stops it within one step and removes 10 % of p. The force
+    never pulls. Friction is at most mu times this force. It stops the slip on the moving region and
+    reverses 10 % of the slip distance per step, whatever loads the point: a load that friction can
+    hold stays at rest, and yields by mu p before it slides. dt is as in
+    contact/minimize_penetration.
 
     The force acts in the direction in which the depth decreases fastest. A point deeper than a
     cell, or in the middle of a thin region, ends the run. A region does not rotate.
@@ -117,7 +115,6 @@ class ContactSurface(StiffTool):
         return self.region.depth(x, self.hub.domain.h)
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Return the present depth (n,) of points in the region."""
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
 
     def faces_of(self) -> np.ndarray | None:
@@ -126,7 +123,6 @@ class ContactSurface(StiffTool):
         return None if skin is None else skin.faces + self.moved(1.0)[0]
 
     def _touch(self, row: int, values: tuple) -> Touch:
-        """Make the representation of this fix for kernels."""
         self.begin_to_touch()
         shape, h = self.region.outline(), float(self.hub.domain.h)
         return touch_kind(self.grip)(row, values, shape, float(self.mu), h, self._address)

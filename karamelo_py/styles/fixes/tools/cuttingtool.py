@@ -35,9 +35,9 @@ class CuttingTool(ToolFix):
 
     Notes
     -----
-    The tool lies between the two faces. A point inside, at the depth p from the nearer face, gets
-    the force K G (1 - D) p out of that face (de Vaucorbeil & Nguyen 2021). G is the shear modulus
-    and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
+    A point between the two faces, at the depth p from the nearer one, gets the force K G (1 - D) p
+    out of it (de Vaucorbeil & Nguyen 2021). G is the shear modulus and D the damage. Publishes the
+    force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -78,7 +78,6 @@ class CuttingTool(ToolFix):
         return (tip - points.position.astype(float)) @ normals.T, normals
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Return the present depth (n,) of points in the tool, below the nearer face."""
         return self._depths(points)[0].min(axis=1)
 
     def forces(self, points: PointsView) -> np.ndarray:

@@ -31,15 +31,11 @@ class IndentMinimizePenetration(StiffTool, BallTool):
     -----
     Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
     volume. A point at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets
-    the force m p / dt^2, which moves a free point out within one step. Friction is at most mu times
-    this force, against the slip (de Vaucorbeil & Nguyen 2021). It stops and reverses the slip: a
-    load that friction can hold stays at rest, and yields by mu p before it slides.
+    the force m p / dt^2, which moves a free point out within one step. Friction and dt are as in
+    contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
 
-    dt is the step of the scene. A step that is shortened to end a run on time leaves it unchanged.
-    If steps drop suddenly, as by set_dt, it drops by 1 % of the time.
-
-    Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s. Each
-    touching point counts as one face of its cube.
+    Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s, one face of
+    its cube for each touching point.
 
     See Also
     --------

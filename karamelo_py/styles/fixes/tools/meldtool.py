@@ -75,7 +75,6 @@ class MeldTool(ToolFix):
         return x[:, self.along] - lo, q, q @ turn.T, turn
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        """Return the present depth (n,) of points in the tool."""
         _, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
         height, q, own, _ = self._seen(points, c1, c2, theta, lo)
         ways = height, hi - lo - height, Rmax - np.linalg.norm(q, axis=1), abs(own).max(axis=1) - w
