@@ -33,7 +33,8 @@ myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "_ext"]
 
-# The tutorial is run by each build, which fails with it.
+# Each build runs the tutorials, in a temporary folder, and fails if one of them does.
+nb_execution_in_temp = True
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 600

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 WORDS = {
     "getting-started": "install pip conda Windows quick start resume exit status cache read result",
-    "tutorial": "Jupyter notebook Python API interface numpy pandas interactive script",
+    "tutorials/python": "Jupyter notebook Python API interface numpy pandas interactive script",
+    "tutorials/taylor-bar": "Taylor test copper bar impact validation calibration friction grid convergence",
+    "tutorials/failures": "wrong result instability locking noise fracture energy loss learn",
+    "tutorials/slope": "retaining wall earth pressure active passive landslide blade restart example",
     "choose": "recommendation best method landslide slope impact crash fluid soil metal for",
     "messages/index": "error stop stopped crash ended abort failed reason time step too large",
     "methods": "shape functions kernel particle grid transfer APIC MLS FLIP PIC time step",
@@ -49,7 +52,7 @@ WORDS = {
 # Of questions as people write them, which the search would look for too.
 ASKED = "how do does can i we my me you what which where why run use make it"
 
-ASKED_OF = ("choose", "getting-started", "messages/index", "tutorial", "units", "versions")
+ASKED_OF = ("choose", "getting-started", "messages/index", "tutorials/python", "units", "versions")
 
 
 def add_words(app, doctree) -> None:

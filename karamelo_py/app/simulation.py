@@ -63,7 +63,11 @@ class Quiet(Console):
         super().__init__(quiet=True)
 
     def warn(self, text: str) -> None:
-        warnings.warn(text, KarameloWarning, stacklevel=2)
+        """Warn at the line outside the package that called it."""
+        level, frame = 1, sys._getframe()
+        while frame.f_back and frame.f_globals.get("__name__", "").startswith("karamelo_py."):
+            level, frame = level + 1, frame.f_back
+        warnings.warn(text, KarameloWarning, stacklevel=level)
 
 
 class Columns(Mapping, dict):  # type: ignore[metaclass]
