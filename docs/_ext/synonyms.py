@@ -5,9 +5,9 @@ from __future__ import annotations
 WORDS = {
     "getting-started": "install pip conda Windows quick start resume exit status cache read result",
     "tutorials/python": "Jupyter notebook Python API interface numpy pandas interactive script",
-    "tutorials/taylor-bar": "Taylor test copper bar impact validation calibration friction grid convergence",
+    "tutorials/taylor-bar": "Taylor test copper bar impact validation calibration friction",
     "tutorials/failures": "wrong result instability locking noise fracture energy loss learn",
-    "tutorials/slope": "retaining wall earth pressure active passive landslide blade restart example",
+    "tutorials/slope": "retaining wall earth pressure active passive landslide blade restart",
     "choose": "recommendation best method landslide slope impact crash fluid soil metal for",
     "messages/index": "error stop stopped crash ended abort failed reason time step too large",
     "methods": "shape functions kernel particle grid transfer APIC MLS FLIP PIC time step",
