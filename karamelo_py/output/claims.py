@@ -1,4 +1,4 @@
-"""Lock on an output folder, so that two programs do not write to it at once."""
+"""Lock on an output folder: two programs never write to it at once."""
 
 import errno
 import os
@@ -7,20 +7,20 @@ from pathlib import Path
 
 
 class Claim:
-    """Lock on a folder, held until `release` or the end of the program."""
+    """Lock until `release` or the end of the program."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# One claim per folder and process: simulations of one process may both use it.
+# By device and inode: simulations of one process share a claim.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 
 def claim(folder: Path) -> Claim | None:
-    """Lock a folder; return None if another program has locked it.
+    """Lock a folder; None if another program has locked it.
 
-    On file systems without locks, and on Windows, the folder is always granted.
+    File systems without locks, and Windows, grant every folder.
     """
     try:
         import fcntl
@@ -30,10 +30,10 @@ def claim(folder: Path) -> Claim | None:
         return Claim(os.open(os.devnull, os.O_RDONLY))
     about = os.fstat(handle)
     key = about.st_dev, about.st_ino
-    known = _held.get(key)
-    if known is not None and known.release.alive:
+    current = _held.get(key)
+    if current is not None and current.release.alive:
         os.close(handle)
-        return known
+        return current
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:

@@ -1,7 +1,6 @@
-"""Output on the terminal: banner, log lines, progress, warnings, the table at the end.
+"""Terminal output: banner, log lines, progress, warnings, closing table.
 
-On a terminal Rich draws a progress bar; pipes and files get the same facts as plain lines. Every
-line is flushed.
+Rich draws a progress bar on a terminal; pipes and files get plain lines. Every line is flushed.
 """
 
 import contextlib
@@ -12,20 +11,20 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any, TextIO
 
-# Seconds between two redraws of the bar, and between two plain progress lines in a pipe.
+# Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in a quarter of a millisecond. Lines that come faster than
-# QUICK (seconds) for more than BURST lines are written in bundles, one every LINES seconds.
+# Rich redraws the bar after every line, in 0.25 ms. Lines faster than QUICK (seconds) for more than
+# BURST lines are written in bundles, every LINES seconds.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05
 
 
 class Console:
-    """All output to standard output and standard error, or to `out` and `err`.
+    """Output to standard output and error, or to `out` and `err`.
 
-    `terminal` is detected by default. If `quiet`, only warnings are written.
+    `terminal` is detected by default. `quiet`: only warnings.
     """
 
     def __init__(
@@ -42,7 +41,7 @@ class Console:
         self.quiet = quiet
         self._broken = self._running = False
         self._progress: Any = None
-        self._begin = 0.0, 0, 0.0  # clock, step and fraction
+        self._begin = 0.0, 0, 0.0  # clock, step, fraction
         self._shown = 0.0
         self._waiting: list[str] = []
         self._burst = 0
@@ -50,17 +49,17 @@ class Console:
 
     @property
     def out(self) -> TextIO:
-        """The stream of ordinary lines."""
+        """Ordinary lines."""
         return self._out or sys.stdout
 
     @property
     def err(self) -> TextIO:
-        """The stream of warnings and errors."""
+        """Warnings and errors."""
         return self._err or sys.stderr
 
     @property
     def terminal(self) -> bool:
-        """Tell whether `out` is an interactive terminal."""
+        """Whether `out` is an interactive terminal."""
         if self._terminal is None:
             isatty = getattr(self.out, "isatty", None)
             self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"
@@ -69,12 +68,12 @@ class Console:
     # Lines
 
     def say(self, text: str = "", style: str | None = None) -> None:
-        """Write one or more lines; on a terminal in a style of Rich."""
+        """Write lines; on a terminal in a Rich style."""
         if self.quiet or self._broken:
             return
         self._release()
         if self._progress is not None:
-            # Rich writes it above the bar.
+            # above the bar
             self._progress.console.out(text, highlight=False)
         elif style and self.terminal:
             self._rich.out(text, style=style, highlight=False)
@@ -82,12 +81,11 @@ class Console:
             self._write(text)
 
     def warn(self, text: str) -> None:
-        """Write a warning or an error, already rendered, to standard error."""
+        """Write a rendered warning or error."""
         with contextlib.suppress(OSError, ValueError):
             _print(self.err, text)
 
     def log_line(self, text: str, header: bool = False) -> None:
-        """Write a line of the log."""
         if self._progress is None or self.quiet:
             self.say(text, "bold" if header else None)
         else:
@@ -99,7 +97,7 @@ class Console:
                 self._release()
 
     def banner(self, title: str, facts: Mapping[str, Any]) -> None:
-        """Write the banner of a run: a title and facts, one per line."""
+        """Write a title and facts, one per line."""
         names = max(map(len, facts), default=0)
         rows = [f"  {name.ljust(names)}  {show(value)}" for name, value in facts.items()]
         self.say(title, "bold")
@@ -111,7 +109,7 @@ class Console:
         stages: Sequence[tuple[str, float]] = (),
         title: str = "Run finished",
     ) -> None:
-        """Write the closing table of a run: facts, then its stages and their seconds."""
+        """Write the closing table: facts, then stages and their seconds."""
         total = sum(seconds for _, seconds in stages) or 1.0
         parts = {
             f"  {name}": f"{f'{seconds:.3g} s':>8}  {f'{100 * seconds / total:.0f} %':>8}"
@@ -126,7 +124,7 @@ class Console:
     # Progress
 
     def begin_run(self, step: int = 0, fraction: float = 0.0) -> None:
-        """Start to measure a run's progress from `step`."""
+        """Measure progress from `step`."""
         self._shown = time.perf_counter()
         self._begin = self._shown, step, fraction
         self._running = True
@@ -144,7 +142,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show the progress of the run and the activity `within` a step; fast enough for each step.
+        """Show the progress, and the activity `within` a step; fast enough for each step.
 
         `fraction` is None if the end of the run is unknown (run_until, run_while).
         """
@@ -165,7 +163,7 @@ class Console:
             self.say(f"# {text}")
 
     def end_run(self) -> None:
-        """Remove the progress bar; safe to call at any time."""
+        """Remove the progress bar; safe at any time."""
         self._running = False
         self._release()
         if self._progress is not None:
@@ -185,7 +183,6 @@ class Console:
     # Helpers
 
     def _release(self) -> None:
-        """Write the log lines that wait."""
         if self._waiting:
             lines, self._waiting = self._waiting, []
             self._released = time.perf_counter()
@@ -203,8 +200,8 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe: the run still finishes its files. Without
-            # this the interpreter would complain when it flushes the stream on exit.
+            # The reader (head, less) has closed the pipe; the run still finishes its files.
+            # Otherwise the interpreter would complain on flushing at exit.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
@@ -214,14 +211,14 @@ def _print(stream: TextIO, text: str) -> None:
     try:
         stream.write(text + "\n")
     except UnicodeEncodeError:
-        # Characters that the encoding of the stream (a Windows pipe) lacks are escaped.
+        # Escape what the encoding of the stream (a Windows pipe) lacks.
         encoding = stream.encoding or "ascii"
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()
 
 
 def show(value: Any) -> str:
-    """Format a value for a table: 1 234 567, 0.333333, text unchanged."""
+    """Format for a table: 1 234 567, 0.333333."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, int):

@@ -1,4 +1,4 @@
-"""Fields of points and nodes for output, in the order of their ids."""
+"""Points and nodes of a whole scene for output, ordered by id; formulas of their columns."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -33,14 +33,14 @@ from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, one_of, table, unknown
 from karamelo_py.script.expressions import Expression
 
-LAST = 2**62  # above all numbers of points
-PIECE = 1 << 17  # points that are looked at together
+LAST = 2**62  # above all point numbers
+PIECE = 1 << 17  # points per piece
 
 
 class Fields(PointTable):
-    """The points and nodes of a scene: all points as a table, in pieces, and sums over them; names.
+    """All points as a table, pieces of points and nodes, exact sums.
 
-    They are read from one `simulation`, or from the present arrays of the scene.
+    Reads one `simulation`, or the scene's current arrays.
     """
 
     def __init__(self, hub: Scene, simulation: Any = None):
@@ -51,22 +51,20 @@ class Fields(PointTable):
 
     @property
     def simulation(self) -> Any:
-        """The arrays of the scene."""
         return self.hub.simulation if self._own is None else self._own
 
     @property
     def setup(self) -> Setup:
-        """The arrays that kernels take."""
+        """Arrays of kernels."""
         return self.simulation.setup
 
     @property
     def comm(self) -> Any:
-        """The processes that have parts of the points."""
         return self.simulation.comm
 
     @property
     def _rows(self) -> Rows:
-        """All points; the cache of what was made of them is forgotten when they have moved."""
+        """All points; clears the cache after a step."""
         simulation = self.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
@@ -75,7 +73,7 @@ class Fields(PointTable):
         return self.rows()
 
     def rows(self) -> Rows:
-        """Return all points, in the order of their ids, for a table."""
+        """All points, by id."""
         simulation = self.simulation
         setup, present = simulation.setup, simulation.present
         parts = [Part(block, None, block.points.id) for block in setup.blocks]
@@ -83,13 +81,13 @@ class Fields(PointTable):
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: Any) -> np.ndarray:
-        """List the ids (0-based) of a particle group, without deleted points."""
+        """0-based ids of a particle group, without deleted points."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: Any = None) -> float:
-        """Sum a quantity of `SUMMED` over all points, or over a group; without rounding."""
+        """Sum a quantity of `SUMMED` over a group or all points, exactly."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -100,7 +98,7 @@ class Fields(PointTable):
         return rounded(self.comm.allreduce(limbs)[0])
 
     def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
-        """Yield the local points of a group in pieces: a block, and rows of it."""
+        """Yield a group's local points in pieces: block and rows."""
         for block in self.setup.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
@@ -111,7 +109,7 @@ class Fields(PointTable):
                     yield block, rows
 
     def some(self, group: Any) -> Iterator[PointTable]:
-        """Yield the local points of a group in pieces, and finally an empty table."""
+        """Yield a group's local points in pieces, then an empty table."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
         yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
@@ -121,15 +119,19 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
-        """Sum the terms of a part's method `name` over the points of its group; no rounding.
+        """Sum terms over the points of a part's group, exactly.
 
-        Called with tables of some of the points, and the `arguments`, it returns rows of terms
-        (k, n), or the number of sums, the sum (n,) of each term, and terms.
+        The method `name` of `part` is called with tables of some of the points, and `arguments`. It
+        returns rows of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(part.group):
-            found = getattr(part, name)(some, *arguments)
-            count, rows, terms = found if isinstance(found, tuple) else (len(found), None, found)
+            terms_or_rows = getattr(part, name)(some, *arguments)
+            count, rows, terms = (
+                terms_or_rows
+                if isinstance(terms_or_rows, tuple)
+                else (len(terms_or_rows), None, terms_or_rows)
+            )
             if not len(limbs):
                 limbs = np.zeros((count, LIMBS), np.int64)
             if rows is not None:
@@ -138,8 +140,10 @@ class Fields(PointTable):
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        there = totals.any(axis=1)  # few of the thousands for a quantile
-        return np.array([rounded(t) if one else 0.0 for t, one in zip(totals, there, strict=True)])
+        nonzero = totals.any(axis=1)  # few of the thousands for a quantile
+        return np.array(
+            [rounded(t) if one else 0.0 for t, one in zip(totals, nonzero, strict=True)]
+        )
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
         """Sum local terms (n,) or (n, k) over all processes, rounded once."""
@@ -151,113 +155,114 @@ class Fields(PointTable):
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Any, name: str, *arguments: Any) -> list:
-        """Collect the results of a part's method for its group, piece by piece."""
-        found = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
-        own = [one for one in found if one is not None]
-        return [one for of_rank in self.comm.allgather(own) for one in of_rank]
+        """Collect results of a part's method, one per piece of its group."""
+        results = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
+        local = [one for one in results if one is not None]
+        return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def seen(self, say: Callable, *arguments: Any) -> list:
-        """Collect a function's result for the points of each process."""
+        """Collect a function's result of each process."""
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Return the largest value of a function of points, and the first point with it."""
+        """Largest value of a function of points, and the first point that has it."""
 
         def own() -> tuple[float, int]:
-            found = -inf, 0
+            best = -inf, 0
             for some in self.some(None):
                 values = of(some)
                 value = np.fmax.reduce(values, initial=-inf)
                 first = some.numbers[values == value].min(initial=LAST)
-                found = max(found, (float(value), -int(first)))
-            return found
+                best = max(best, (float(value), -int(first)))
+            return best
 
         value, number = max(self.comm.allgather(own()))
         return value, -number
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """Yield all points in pieces; `to_first`: only to the first of several processes."""
+        """Yield all points in pieces; `to_first`: to rank 0 only."""
         s = self.setup
         orders = [np.argsort(block.points.id) for block in s.blocks]
-        known = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
+        ids_by_block = [
+            block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)
+        ]
         gather = self.comm.gather if to_first else self.comm.allgather
         present = self.simulation.present
         for first, end in ranges(len(present)):
             blocks = [
                 some_of(block, order[slice(*np.searchsorted(ids, (first, end)))])
-                for block, order, ids in zip(s.blocks, orders, known, strict=True)
+                for block, order, ids in zip(s.blocks, orders, ids_by_block, strict=True)
             ]
             if self.comm.size > 1:
-                own = [[array for _, array in arrays_of(block.points)] for block in blocks]
-                found = gather(own)
-                if found is None:
+                local = [[array for _, array in arrays_of(block.points)] for block in blocks]
+                gathered = gather(local)
+                if gathered is None:
                     continue
                 blocks = [
                     block._replace(points=_joined(block.points, parts))
-                    for block, parts in zip(blocks, zip(*found, strict=True), strict=True)
+                    for block, parts in zip(blocks, zip(*gathered, strict=True), strict=True)
                 ]
             parts = [Part(block, None, block.points.id - first) for block in blocks]
             ids = np.arange(first, end)
             yield PointTable(self.hub, Rows(s, parts, ids, present[first:end]))
 
     def particle_names(self) -> list[str]:
-        """Names accepted by `particle`."""
-        own = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
-        return list(dict.fromkeys([*point_table.COLUMNS, *own]))
+        """Names for `particle`."""
+        of_scene = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
+        return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """Names accepted by `particle`, then groups and solids (1 for their points, else 0)."""
+        """Names for `particle`, then groups and solids (1 for their points, else 0)."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
-        """Names accepted by `node`."""
-        own = declared_columns(self.hub, "node_fields")
-        return list(dict.fromkeys([*node_columns.COLUMNS, *own]))
+        """Names for `node`."""
+        of_scene = declared_columns(self.hub, "node_fields")
+        return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """Tell whether a dump or a compute uses the column ``epdot``, which points then store."""
+        """A dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
 
     def absent_at_points(self) -> list[str]:
-        """Names accepted by `particle` whose values are 0, because no material has them."""
+        """Names for `particle` that are 0 in this scene."""
         present = self.columns_of_laws() | {*declared_columns(self.hub, "point_fields")}
         if any(has_rate(material.law) for material in self.hub.materials.values()):
             present.add("epdot")
         return absent(point_table.COLUMNS, present)
 
     def absent_at_nodes(self) -> list[str]:
-        """Names accepted by `node` whose values are 0 in this scene."""
+        """Names for `node` that are 0 in this scene."""
         present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
         return absent(node_columns.COLUMNS, present)
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeTable]:
-        """Fields of all nodes, of which `names` are asked for, in pieces, see `pieces`."""
+        """Yield all nodes in pieces, with the columns `names`; see `pieces`."""
         return self.simulation.nodes.pieces(names, to_first=to_first)
 
     @property
     def node_count(self) -> int:
-        """Number of nodes."""
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
-        """The number of nodes with mass, and the last of them."""
+        """Number of nodes with mass, and the last of them."""
         return self.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
-        """A field of all nodes, (n,); nodes without mass are at rest."""
+        """A column (n,) of all nodes; nodes without mass are at rest."""
         return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
 
 
 def ranges(count: int) -> Iterator[tuple[int, int]]:
-    """Yield the begin and end of consecutive pieces of `count` items."""
+    """Yield begin and end of each piece of `count` items."""
     return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
 
 
 def _joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
-    """Join points of the kind of `points` from the arrays that `arrays_of` has given, in parts."""
-    count = sum(part[0].shape[-1] for part in parts)
+    """Concatenate points from the arrays of `arrays_of`."""
+    count = sum(arrays_of_rank[0].shape[-1] for arrays_of_rank in parts)
     made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):
         np.concatenate(same, axis=-1, out=array)
@@ -271,7 +276,7 @@ def _kinetic(s: Any, block: Any) -> np.ndarray:
 
 
 def _of_law(density: Callable) -> Callable:
-    """Make a function for the energy of each point from an energy density."""
+    """Energy of each point from a density per volume."""
 
     def energies(s: Any, block: Any) -> np.ndarray | None:
         if not can(block.laws, density):
@@ -291,9 +296,8 @@ def _bounces(s: Any, block: Any) -> np.ndarray | None:
 
 
 def _born_with(s: Any, block: Any) -> np.ndarray | None:
-    """Return the initial internal energy of a gas.
-
-    Stored energy is measured from it: changes would be lost in the absolute value.
+    """Initial internal energy of a gas: stored energy is relative to it, or its changes would be
+    lost to round-off.
     """
     law = elastic_law(block.laws)
     if not can(law, taken_heat):
@@ -302,7 +306,7 @@ def _born_with(s: Any, block: Any) -> np.ndarray | None:
     return (block.points.mass * of_eos[block.points.material]).astype(float)
 
 
-# Energies of the points of a block; None if the law does not have one.
+# Energies (n,) of a block's points; None if the law has none.
 SUMMED = {
     "mass": lambda s, block: block.points.mass.astype(float),
     "kinetic": _kinetic,
@@ -314,9 +318,9 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """Annotation: a formula of columns of dump particle, time and published values.
+    """Annotation: formula of dump particle columns, time and published values.
 
-    Names of particle groups and solids are columns too: 1 for their points, 0 elsewhere.
+    Particle groups and solids are columns, too: 1 for their points, else 0.
     """
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
@@ -327,12 +331,12 @@ class ColumnFormula:
         sets = hub.fields.shown_names()[len(columns) :]
         of_both = [name for name in sets if name in columns or argument.knows(name)]
         if clash := set(of_both).intersection(re.findall(r"[^\W\d]\w*", argument.text)):
-            what = f"'{min(clash)}' is a group or solid, and a column or another value, too"
-            raise ScriptError(what, place=argument.place, hint="rename the group or solid")
-        known = [*columns, *(name for name in sets if name not in of_both)]
+            message = f"'{min(clash)}' is a group or solid, and a column or another value, too"
+            raise ScriptError(message, place=argument.place, hint="rename the group or solid")
+        names = [*columns, *(name for name in sets if name not in of_both)]
         self.hub, self.text = hub, argument.text
-        self.formula = Expression(argument.value_with(known))
-        self.columns = sorted(self.formula.names & set(known))
+        self.formula = Expression(argument.value_with(names))
+        self.columns = sorted(self.formula.names & set(names))
         for name in self.columns:
             if name in hub.interpreter.variables:
                 hub.warn(
@@ -350,36 +354,34 @@ class ColumnFormula:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "ColumnFormula":
-        """Read the formula from a script argument."""
         return cls(hub, argument)
 
     def of(self, points: PointTable) -> np.ndarray:
-        """Evaluate the formula for each existing point, (n,)."""
+        """Value (n,) at each existing point."""
         columns = {name: points.particle(name) for name in self.columns}
         return self.formula.evaluate_columns(self.hub.values, columns)
 
     def holds(self, points: PointTable) -> np.ndarray:
-        """(n,) whether the formula is nonzero, for each existing point."""
+        """(n,) bool: nonzero, at each existing point."""
         return self.of(points) != 0
 
 
 class ShownColumn(ColumnFormula):
-    """Annotation: the name of a column of dump particle, or a formula of columns."""
+    """Annotation: a dump particle column, or a formula of them."""
 
     script_kind = "a column of dump particle, or a formula of columns, such as sqrt(vx^2 + vy^2)"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """Read the name, or the formula."""
         word = argument.word()
         return word if word is not None and word.isidentifier() else cls(hub, argument)
 
 
-# ---- columns given by name -----------------------------------------------------------------------
+# ---- columns by name ----
 
 
 def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
-    """Refuse names that are not `known`; `first` is the argument index of the first name."""
+    """Refuse unknown names; `first` is the argument index of the first."""
     for index, name in enumerate(columns):
         if name not in known:
             raise unknown_column(f"unknown column '{name}'", name, known, argument=first + index)
@@ -392,14 +394,14 @@ def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) 
     error.expected = one_of(name, known, page="docs/reference/columns.md")
     others = table()["columns"].items()
     quantity = next((columns for columns, words in others if name.lower() in words), "")
-    if there := [column for column in quantity.split() if column in known]:
-        error.hint, error.alike = f"did you mean {', '.join(there)}?", there[0]
+    if columns_present := [column for column in quantity.split() if column in known]:
+        error.hint, error.alike = f"did you mean {', '.join(columns_present)}?", columns_present[0]
     component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())
     if component is not None:
         i, j = sorted("xyz".find(axis) + 1 or int(axis) for axis in component.groups()[1:])
         tensor = "e" if component[1] in ("e", "eps", "strain") else "s"
         error.alike = f"{tensor}{i}{j}"
         error.hint = f"did you mean '{error.alike}'?"
-    if name[:2] in ("v_", "c_"):  # as in LAMMPS
+    if name[:2] in ("v_", "c_"):  # LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
     return error

@@ -1,4 +1,4 @@
-"""Files that are written completely or not at all, including pictures and movies."""
+"""Files written completely or not at all; pictures and movies."""
 
 import json
 import os
@@ -21,7 +21,7 @@ _DISCARDED: ContextVar[Path | None] = ContextVar("discarded", default=None)
 
 @contextmanager
 def discarded() -> Iterator[None]:
-    """Write files to a temporary folder and delete them: another process writes the real ones."""
+    """Write to a temporary folder and delete it: another process writes the real files."""
     with TemporaryDirectory() as folder:
         token = _DISCARDED.set(Path(folder))
         try:
@@ -31,13 +31,13 @@ def discarded() -> Iterator[None]:
 
 
 def folder_of_discarded() -> Path | None:
-    """Return the folder of discarded files, or None if files are kept."""
+    """Folder of discarded files; None if files are kept."""
     return _DISCARDED.get()
 
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a temporary file that takes the name `path` once it is written completely."""
+    """Open a temporary file that becomes `path` once it is complete."""
     if folder_of_discarded() is not None:
         yield BytesIO()
         return
@@ -53,13 +53,13 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text to a file; if that fails, the file retains its old content."""
+    """Write a text; on failure the file keeps its content."""
     with whole(path) as file:
         file.write(text.encode())
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON file; empty if it is missing or incomplete."""
+    """Empty if the file is missing or incomplete."""
     with suppress(OSError, ValueError):
         return json.loads(path.read_text(encoding="utf-8"))
     return {}
@@ -67,9 +67,9 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open `path` to continue at byte `start` (0: a new file).
+    """Open `path` at byte `start` (0: a new file).
 
-    If the block raises, the file is cut back to `start`, plus `tail`.
+    On an error the file is cut back to `start`, plus `tail`.
     """
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
@@ -85,7 +85,7 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
 
 
 def picture_format(path: Path) -> str:
-    """Return the picture format given by a file name: png, pdf or svg."""
+    """png, pdf or svg, by file name."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in FORMATS:
         raise ScriptError(
@@ -97,11 +97,11 @@ def picture_format(path: Path) -> str:
 
 
 def savefig(figure: Any, path: Path) -> None:
-    """Save a Matplotlib figure in the format of its name; equal figures give equal bytes."""
+    """Save a Matplotlib figure by its file name; equal figures give equal bytes."""
     import matplotlib
 
     ending = picture_format(path)
-    # Without a date and with a fixed salt for SVG ids, equal pictures are equal files.
+    # Equal files need no date and a fixed salt of SVG ids.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
     with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), unwarned(), whole(path) as file:
         figure.savefig(file, format=ending, metadata=undated)
@@ -109,23 +109,23 @@ def savefig(figure: Any, path: Path) -> None:
 
 @contextmanager
 def unwarned() -> Iterator[None]:
-    """Suppress Matplotlib's warnings about missing glyphs and tight layouts."""
+    """Suppress Matplotlib's warnings of missing glyphs and tight layouts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 @contextmanager
-def reported(path: Path, what: str = "") -> Iterator[None]:
-    """Convert operating system errors on writing `path` into a ScriptError."""
+def reported(path: Path, kind: str = "") -> Iterator[None]:
+    """Convert OSError on writing `path` to ScriptError."""
     try:
         yield
     except OSError as error:
-        raise ScriptError(f"cannot write {what}{path}: {error.strerror or error}") from error
+        raise ScriptError(f"cannot write {kind}{path}: {error.strerror or error}") from error
 
 
 def movie_format(path: Path) -> str:
-    """Return the movie format given by a file name: gif, or mp4 if ffmpeg is available."""
+    """gif, or mp4 if ffmpeg is available, by file name."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in ("gif", "mp4") or "*" in path.name:
         raise ScriptError(
@@ -144,7 +144,7 @@ def movie_format(path: Path) -> str:
 
 
 class Frames:
-    """Frames of a movie with `fps` frames per second, stored as PNG."""
+    """PNG frames of a movie with `fps` frames per second."""
 
     remembers = ("_frames",)
 
@@ -154,13 +154,13 @@ class Frames:
         self._saved = 0
 
     def add(self, draw: Callable[[BinaryIO], None]) -> None:
-        """Add a frame, which `draw` writes as PNG."""
+        """Add a frame that `draw` writes as PNG."""
         file = BytesIO()
         draw(file)
         self._frames.append(file.getvalue())
 
     def save(self, path: Path) -> None:
-        """Write the movie, if there are new frames."""
+        """Write the movie if there are new frames."""
         if len(self._frames) == self._saved:
             return
         with whole(path) as file:
@@ -179,7 +179,7 @@ class Frames:
             format="GIF",
             save_all=True,
             append_images=others,
-            # GIF times are in hundredths of a second; viewers slow down frames below two of them.
+            # In 1/100 s; viewers slow down below two of them.
             duration=max(20, 10 * round(100 / self.fps)),
             loop=0,
         )
@@ -187,7 +187,7 @@ class Frames:
     def _save_mp4(self, path: Path, file: BinaryIO) -> None:
         command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png"]
         command += ["-framerate", f"{self.fps:g}", "-i", "-"]
-        # Players need even sizes and colours at half the resolution.
+        # Players need even sizes and chroma at half the resolution.
         command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
         command += ["-f", "mp4", file.name]
         done = subprocess.run(command, input=b"".join(self._frames), capture_output=True)

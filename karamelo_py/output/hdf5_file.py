@@ -1,8 +1,7 @@
 """Read HDF5 files that were not closed: being written, left by a killed program, or damaged.
 
-HDF5 opens a file that was not closed only for readers in SWMR mode, which retry damaged data for
-minutes to years. Here the header is presented as if the file were closed,
-which is read once (HDF5 File Format 3.0, II.A and VII.B).
+HDF5 opens them only in SWMR mode, which retries damaged data for minutes to years. Here the header
+is read as if the file were closed (HDF5 File Format 3.0, II.A and VII.B).
 """
 
 from __future__ import annotations
@@ -16,20 +15,14 @@ from pathlib import Path
 from typing import Any
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags, four addresses: 44 bytes
-_NEW = (2, 3)  # versions with such a header
+_HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags, addresses: 44 bytes
+_NEW = (2, 3)  # with such a header
 _MASK = 0xFFFFFFFF
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open an HDF5 file to read its present content.
-
-    Raises
-    ------
-    OSError
-        If the file is not HDF5, is truncated, or is visibly damaged.
-    """
+    """Open an HDF5 file at its present content; OSError if it is none, truncated or damaged."""
     import h5py
 
     with path.open("rb", buffering=0) as raw, h5py.File(_Closed(raw), "r") as root:
@@ -37,7 +30,7 @@ def reading(path: Path) -> Iterator[Any]:
 
 
 class _Closed(io.RawIOBase):
-    """A raw file that appears to have been closed at its present length."""
+    """A raw file that appears closed at its present length."""
 
     def __init__(self, raw: io.RawIOBase):
         self._raw = raw
@@ -52,7 +45,7 @@ class _Closed(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        if whence == os.SEEK_END:  # the file may have grown
+        if whence == os.SEEK_END:  # may have grown
             offset, whence = self._size + offset, os.SEEK_SET
         return self._raw.seek(offset, whence)
 
@@ -69,9 +62,9 @@ class _Closed(io.RawIOBase):
 
 
 def _closed(head: bytes, size: int) -> bytes:
-    """Return the header of a file with cleared flags and its present end."""
+    """Header with cleared flags and the present end."""
     if len(head) < _HEAD.size + 4 or head[:8] != _SIGNATURE or head[8] not in _NEW:
-        return head  # another version, left to HDF5
+        return head  # left to HDF5
     signature, version, offsets, lengths, flags, base, extension, end, root = _HEAD.unpack_from(
         head
     )
@@ -85,7 +78,7 @@ def _closed(head: bytes, size: int) -> bytes:
 
 
 def _checksum(data: bytes) -> int:
-    """Compute the checksum of HDF5: hashlittle of lookup3 (Jenkins 2006)."""
+    """HDF5's hashlittle, lookup3 (Jenkins 2006)."""
 
     def turned(x: int, k: int) -> int:
         return (x << k | x >> (32 - k)) & _MASK

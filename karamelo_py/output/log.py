@@ -1,4 +1,4 @@
-"""The log: one line of numbers per output, in log.mpm (or log.csv) and on the terminal."""
+"""The log: a row of numbers per output, in log.mpm (or log.csv) and on the terminal."""
 
 import errno
 import os
@@ -17,17 +17,17 @@ from karamelo_py.script.terms import number_of
 
 FILE = "log.mpm"
 STEP_WIDTH = 10
-# Sign, ten digits, point and exponent: "-1.234567891e-05" has 16 characters.
+# "-1.234567891e-05": sign, ten digits, point, exponent.
 NUMBER_WIDTH = 16
 
 
 class Log(Rhythmic):
-    """The table of logged quantities.
+    r"""Table of logged quantities.
 
-    The file has one header line and one row per output. Columns are separated by spaces and start
-    at the margin, so that ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm",
-    sep=r"\\s+")`` both read it. Files named .csv are separated by commas. Later runs append to the
-    table; if the columns change, a comment line starting with ``#`` names the new ones.
+    A header, then rows. Columns start at the margin and are separated by blanks, for
+    ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; in
+    .csv by commas. Later runs append; if the columns change, a comment line (``#``) names the new
+    ones.
     """
 
     remembers = ("_header", "_end")
@@ -36,21 +36,20 @@ class Log(Rhythmic):
         self.hub = hub
         self.every: int | ByTime = 1
         self.file = Path(FILE)
-        self.is_asked_for = False  # the user named the file
-        self.columns: list[Quantity] = []  # empty: step, dt and time
+        self.is_asked_for = False  # by the user
+        self.columns: list[Quantity] = []  # empty: step, dt, time
         self.last_step: int | None = None
         self._file: TextIO | None = None
-        self._claim: Claim | None = None  # for the folder of all files
+        self._claim: Claim | None = None  # on the folder
         self._is_kept = True
-        # Names and numbers of the lines, if a program wants them.
+        # Headings and numbers of each row, if a program wants them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
-        self._end = 0  # bytes of the file so far
+        self._end = 0  # bytes written
         self._widths: list[int] = []
 
     @property
     def path(self) -> Path:
-        """The file of the log."""
         return self.hub.folder / self.file
 
     def begin(self) -> None:
@@ -74,35 +73,33 @@ class Log(Rhythmic):
         self.hub.console.log_line(header, header=True)
 
     def write(self) -> None:
-        """Write one line with the present quantities."""
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # A blank reserves the place of the minus sign; the first column starts at the margin for
-        # pandas.
+        # A blank reserves the minus sign; pandas needs the first column at the margin.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
         self._put(cells)
         self.hub.console.log_line(_row(cells, self._widths))
 
     def resumed(self) -> None:
-        """Drop rows after the restored state, if the file is open."""
+        """Drop rows after the restored state."""
         if self._file is not None and self._is_kept:
             self._file.truncate(self._end)
 
     def close(self) -> None:
-        """Close the file; the next `begin` starts a new one."""
+        """Close the file; `begin` starts a new one."""
         if self._file is not None:
             file, self._file, self._claim = self._file, None, None
-            with reported(self.path, "the log file "):  # a failed line is retried here
+            with reported(self.path, "the log file "):  # retries a failed line
                 file.close()
 
     def _go_on(self) -> None:
-        """Continue the file of an earlier run after its last line at that time."""
+        """Continue an earlier run's file after its last row."""
         if not self.hub.output.writes:
             return
-        there = self.path.stat().st_size if self.path.is_file() else 0
-        if there < self._end:
+        size = self.path.stat().st_size if self.path.is_file() else 0
+        if size < self._end:
             self.hub.warn(
                 begins_anew(self.path),
                 hint="karamelo-py SCRIPT -restart FILE in the folder of that run",
@@ -123,10 +120,10 @@ class Log(Rhythmic):
                 f"{self.file} overwrites it",
             )
         with reported(path, "the log file "):
-            # Line buffering: each line reaches the file at once, even if the run is killed.
+            # Line buffered: rows reach the file even if the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            self._is_kept = path.is_file()  # False for devices such as /dev/null
+            self._is_kept = path.is_file()  # False for /dev/null
             self._claim = claim(self.hub.folder)
             if self._claim is None or (self._is_kept and not _claimed(self._file)):
                 where = self.hub.folder.resolve() if self._claim is None else path
@@ -153,7 +150,7 @@ class Log(Rhythmic):
 
 
 def _is_log(path: Path) -> bool:
-    """Tell whether the file looks like a log (names, then numbers), or does not exist."""
+    """The file looks like a log (names, then numbers), or does not exist."""
     try:
         with path.open(encoding="utf-8") as file:
             lines = [file.readline(1 << 16) for _ in range(4)]
@@ -162,7 +159,7 @@ def _is_log(path: Path) -> bool:
     except UnicodeDecodeError:
         return False
     except OSError:
-        return True  # opening it will report the error
+        return True  # reported on opening
     head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
     if not rows:
         return not head or bool({"Step", "dt", "Time"} & set(head))
@@ -175,9 +172,9 @@ def _is_log(path: Path) -> bool:
 
 
 def _claimed(file: TextIO) -> bool:
-    """Lock `file` against other programs; return False if one has locked it.
+    """Lock `file` until the program ends; False if another program has locked it.
 
-    The lock ends with the program. Windows has no lock that lets others read, so none is taken.
+    Not on Windows, whose locks prevent reading.
     """
     try:
         import fcntl
@@ -185,7 +182,7 @@ def _claimed(file: TextIO) -> bool:
         fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except ImportError:
         return True
-    except OSError as error:  # on file systems without locks the file is granted
+    except OSError as error:  # granted on file systems without locks
         return error.errno not in (errno.EACCES, errno.EAGAIN)
     return True
 
@@ -195,7 +192,7 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 
 def begins_anew(path: Path) -> str:
-    """Format the warning that a run continues without this file of the earlier run."""
+    """Warning that a run continues without this file."""
     if not path.is_file():
         return f"there is no {path} of the run that is gone on from: it begins anew"
     return f"{path} is not as the run left it that is gone on from: it begins anew"

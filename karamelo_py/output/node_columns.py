@@ -1,4 +1,4 @@
-"""Fields of nodes for output, in the order of their numbers."""
+"""Columns of nodes for output, by node number."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -18,17 +18,17 @@ from karamelo_py.points.laws import can, constrained_velocity
 
 
 class NodeTable(NamedTuple):
-    """Columns of some nodes with consecutive numbers; nodes without mass are at rest."""
+    """Columns of nodes with consecutive numbers; nodes without mass are at rest."""
 
     hub: Scene
     ids: np.ndarray
     kin: Any
-    arrays: dict[str, np.ndarray]  # by name, as in a restart file
-    brought: dict[str, np.ndarray]  # sums over the points that were asked for (`BROUGHT`)
-    loaded: dict[str, int]  # number of nodes with mass that each fix acts on, by ID
+    arrays: dict[str, np.ndarray]  # by name, as in a restart
+    brought: dict[str, np.ndarray]  # sums over points, see `BROUGHT`
+    loaded: dict[str, int]  # nodes with mass under each force fix, by ID
 
     def node(self, name: str) -> np.ndarray:
-        """Return a field of the nodes, (n,)."""
+        """A column (n,)."""
         if name == "T" and self.hub.update.thermal:
             mass = self.arrays["heat/sums"][:, MASS]
             return np.where(mass > 0, self.arrays["heat/velocity"][:, 0], 0.0)
@@ -42,23 +42,23 @@ class NodeTable(NamedTuple):
         return np.zeros(len(self.ids))
 
     def positions(self) -> np.ndarray:
-        """Return positions (n, 3)."""
+        """(n, 3)."""
         return places_of(self.hub, self.ids)
 
 
 def by_lattice(hub: Scene, nodes: np.ndarray) -> Iterator[tuple[Any, slice]]:
-    """Yield each grid of a scene with the slice of `nodes` (ascending numbers) in it."""
+    """Yield each grid with its slice of ascending `nodes`."""
     for lattice in hub.lattices:
         ends = lattice.first, lattice.first + lattice.node_count
         yield lattice, slice(*np.searchsorted(nodes, ends))
 
 
 def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
-    """(n, 3) positions of nodes, given by ascending numbers."""
-    found = np.empty((len(nodes), 3))
-    for lattice, own in by_lattice(hub, nodes):
-        found[own] = lattice.positions(nodes[own])
-    return found
+    """Positions (n, 3) of ascending node numbers."""
+    positions = np.empty((len(nodes), 3))
+    for lattice, rows in by_lattice(hub, nodes):
+        positions[rows] = lattice.positions(nodes[rows])
+    return positions
 
 
 def mask(nodes: NodeTable) -> np.ndarray:
@@ -71,7 +71,7 @@ def mask(nodes: NodeTable) -> np.ndarray:
 
 
 def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
-    """Find the nodes that are among ascending numbers."""
+    """Indices of the nodes among ascending numbers."""
     first = nodes.ids[0]
     return members[slice(*np.searchsorted(members, (first, nodes.ids[-1] + 1)))] - first
 
@@ -84,25 +84,25 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
     """
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
-    found = np.zeros(len(nodes.ids))
+    kinds = np.zeros(len(nodes.ids))
     if axis >= nodes.hub.domain.dimension:
-        return found
-    for lattice, own in by_lattice(nodes.hub, nodes.ids):
-        i, last = lattice.places(nodes.ids[own])[:, axis], lattice.shape[axis] - 1
+        return kinds
+    for lattice, rows in by_lattice(nodes.hub, nodes.ids):
+        i, last = lattice.places(nodes.ids[rows])[:, axis], lattice.shape[axis] - 1
         if splines:
-            found[own] = np.minimum(2, i) - np.minimum(2, last - i)
+            kinds[rows] = np.minimum(2, i) - np.minimum(2, last - i)
         elif basis.traits.nodes_per_cell == 2:
-            found[own] = i % 2
-    return found
+            kinds[rows] = i % 2
+    return kinds
 
 
 def load(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Add up the loads of fixes on nodes, and on points, whose weights bring them to the nodes."""
+    """Loads of fixes on nodes, and of fixes on points, transferred by the basis."""
     hub = nodes.hub
     out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
         return out
-    mass, place = nodes.node("mass"), nodes.positions()
+    mass, positions = nodes.node("mass"), nodes.positions()
     dt = float(hub.values.array[TIME + 2])
     momentum = nodes.arrays["nodes/sums"][:, of_momentum(nodes.kin) + axis]
     for ID, count in nodes.loaded.items():
@@ -111,7 +111,7 @@ def load(axis: int, nodes: NodeTable) -> np.ndarray:
             continue
         members = np.arange(len(out)) if fix.group.all else _among(fix.nodes, nodes)
         members = members[mass[members] > 0]
-        value = fix.formulas[axis].evaluate_points(hub.values, place[members])
+        value = fix.formulas[axis].evaluate_points(hub.values, positions[members])
         v = momentum[members] / mass[members]
         act = fix.hooks()[LOADS].function
         for n, b, u in zip(members, value, v, strict=True):
@@ -120,7 +120,7 @@ def load(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.ndarray:
-    """Return a component of a vector, which begins at ``first(kin)`` in an array of nodes."""
+    """Component of a vector that begins at ``first(kin)`` in an array of nodes."""
     if axis >= nodes.hub.domain.dimension:
         return np.zeros(len(nodes.ids))
     component = nodes.arrays[name][:, first(nodes.kin) + axis]
@@ -128,14 +128,14 @@ def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.nda
 
 
 def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
-    """Return the columns of a vector; ``*`` in the name becomes the direction."""
+    """Columns of a vector; ``*`` in the name becomes the direction."""
     return {
         name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
         for k, axis in enumerate(AXES)
     }
 
 
-# Columns of every scene; those with None only some scenes have, in others they are 0.
+# None: 0 in scenes without it.
 COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(
@@ -154,7 +154,7 @@ COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
 }
 
-# --- sums over points, computed on request --------------------------------------------------------
+# --- sums over points, computed on request ---
 
 LOADS = "post_particles_to_grid"
 
@@ -171,10 +171,10 @@ def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
     return None if force is None or axis >= len(force) else force[axis]
 
 
-# A value for each point of a block, or None.
+# Values (n,) of a block's points, or None.
 BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
     "vol": _volume,
-    "rigid": lambda simulation, block: (  # 1 for rigid solids
+    "rigid": lambda simulation, block: (  # 1: rigid
         np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
     ),
     **{f"b{axis}": partial(_force, k) for k, axis in enumerate(AXES)},
@@ -182,15 +182,15 @@ BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
 
 
 def brought(simulation: Any, name: str) -> np.ndarray:
-    """(nodes, 2) sums of N value over the local points: whole units, and the remainder."""
+    """Sums of N value over local points, (nodes, 2): whole units, and the remainder."""
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))
-    found = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]
-    found = [(block, np.ascontiguousarray(of, float)) for block, of in found if of is not None]
-    largest = max((float(np.abs(of).max(initial=0)) for _, of in found), default=0.0)
+    terms = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]
+    terms = [(block, np.ascontiguousarray(of, float)) for block, of in terms if of is not None]
+    largest = max((float(np.abs(of).max(initial=0)) for _, of in terms), default=0.0)
     largest = float(simulation.comm.allreduce_max(np.array([largest]))[0])
     unit = 2.0 ** (frexp(largest)[1] - 36)
-    for block, of in found if largest > 0 else ():
+    for block, of in terms if largest > 0 else ():
         points = block.points
         where = points.x[simulation.now] if points.home is None else points.home
         export_to_nodes(s.basis, s.kin, s.grids, points.grid, where, of, unit, out)
@@ -198,15 +198,15 @@ def brought(simulation: Any, name: str) -> np.ndarray:
 
 
 def loaded(hub: Scene, simulation: Any) -> dict[str, int]:
-    """Count, by fix ID, the nodes with mass on which a force fix acts."""
+    """Count the nodes with mass under each force fix, by ID."""
     loading = {
         ID: fix for ID, fix in hub.fixes.items() if isinstance(fix.hooks().get(LOADS), CompiledHook)
     }
-    there = simulation.nodes.with_mass()
-    own = [
-        len(there) if fix.group.all else np.count_nonzero(np.isin(there, fix.nodes))
+    with_mass = simulation.nodes.with_mass()
+    counts = [
+        len(with_mass) if fix.group.all else np.count_nonzero(np.isin(with_mass, fix.nodes))
         for fix in loading.values()
     ]
     return dict(
-        zip(loading, simulation.comm.allreduce(np.array(own, np.int64)).tolist(), strict=True)
+        zip(loading, simulation.comm.allreduce(np.array(counts, np.int64)).tolist(), strict=True)
     )

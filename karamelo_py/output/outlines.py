@@ -1,4 +1,4 @@
-"""Lines around bodies of points and around tools, in 2D and as projected in 3D."""
+"""Lines around bodies of points and around tools, in 2D and projected in 3D."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -8,19 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from contourpy import contour_generator
 
-FINE = 300  # steps along the longest side when searching the outline of a tool
-# In 3D, where tools are drawn by sections: points per axis of the search, steps along a section,
-# bisections for its ends, and sections between these.
+FINE = 300  # steps along the longest side of a tool's outline
+# Sections of tools in 3D: points per axis of the search, steps along a section, bisections for its
+# ends, and sections between these.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
-SHARP, FLAT = 0.87, 1 - 1e-6  # cosines of the angle between two faces
-# Points used to measure spacing, at least and at most, and distances computed at once.
+SHARP, FLAT = 0.87, 1 - 1e-6  # cosines between faces
+# Points that measure spacing (least, most), and distances per batch.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
-Depth = Callable[[np.ndarray], np.ndarray]  # in a tool, at positions (n, d): (n,)
+Depth = Callable[[np.ndarray], np.ndarray]  # (n,) in a tool, at (n, d)
 
 
 class Tool(NamedTuple):
-    """A wall or tool: a depth function, and its faces (m, d, d) if it has any."""
+    """A wall or tool: depth function, and faces (m, d, d) if any."""
 
     depth: Depth
     faces: np.ndarray | None = None
@@ -29,8 +29,10 @@ class Tool(NamedTuple):
         """Yield lines (m, d) on its surface between two corners (d,)."""
         plane = len(lo) == 2
         if self.faces is None:
-            found = zeros(self.depth, lo, hi, FINE) if plane else section_lines(self.depth, lo, hi)
-            yield from found
+            contours = (
+                zeros(self.depth, lo, hi, FINE) if plane else section_lines(self.depth, lo, hi)
+            )
+            yield from contours
             return
         step = np.linalg.norm(hi - lo) / FINE
         for start, end in self.faces if plane else edges(self.faces):
@@ -41,10 +43,10 @@ class Tool(NamedTuple):
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Return lines (m, 2) where points x (n, 2) fill half of the space.
+    """Lines (m, 2) where points x (n, 2) fill half of the space.
 
-    Each point is scattered to the nodes of cells of its size, over three of them. A node at the
-    surface gets half as much as nodes inside the body.
+    Each point is scattered to nodes of cells of its size, over three of them. A node at the surface
+    gets half as much as nodes inside.
     """
     cell = spacing(x, 4)
     if not cell > 0:
@@ -60,7 +62,7 @@ def outlines(x: np.ndarray) -> list[np.ndarray]:
 
 
 def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the nodes (n,) around positions (n, d) and their linear weights (n,)."""
+    """Yield nodes (n,) around positions (n, d), and linear weights (n,)."""
     first = at.astype(int)
     for corner in product((0, 1), repeat=len(shape)):
         node = first + corner
@@ -68,42 +70,42 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Scatter positions (n, d) to the surrounding nodes, with linear weights."""
-    found = np.zeros(int(np.prod(shape)))
+    """Scatter positions (n, d) to nodes, with linear weights."""
+    sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
-        found += np.bincount(node, weight, len(found))
-    return found.reshape(shape)
+        sums += np.bincount(node, weight, len(sums))
+    return sums.reshape(shape)
 
 
 def _largest(values: np.ndarray, reach: int) -> np.ndarray:
-    """Return the maximum over each node and its neighbours up to `reach` along each axis."""
+    """Maximum over neighbours up to `reach` along each axis."""
     for axis in [*range(values.ndim)] * reach:
-        beside = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
-        values = np.maximum(values, beside)
+        neighbours = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
+        values = np.maximum(values, neighbours)
     return values
 
 
 def smoothed(values: np.ndarray) -> np.ndarray:
-    """Return the mean of each node and its neighbours, applied twice along each axis."""
+    """Average each node with its neighbours, twice along each axis."""
     for axis in range(values.ndim):
         for _ in range(2):
-            beside = np.roll(values, 1, axis) + np.roll(values, -1, axis)
-            values = 0.5 * values + 0.25 * beside
+            neighbours = np.roll(values, 1, axis) + np.roll(values, -1, axis)
+            values = 0.5 * values + 0.25 * neighbours
     return values
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Return lines (m, 2) of zero depth between corners (2,), by `fine` steps on the long side."""
+    """Lines (m, 2) of zero depth between corners (2,), in `fine` steps on the long side."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
-    found = depth(places.reshape(-1, 2)).reshape(places.shape[:2])
-    lines: Any = contour_generator(x, y, found).lines(0.0)
+    depths = depth(places.reshape(-1, 2)).reshape(places.shape[:2])
+    lines: Any = contour_generator(x, y, depths).lines(0.0)
     return lines
 
 
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) on the surface of a tool between two corners (3,).
+    """Yield lines (m, 3) on a tool's surface between two corners (3,).
 
     They are sections across each axis: at the ends, where faces meet, and in between if the surface
     is curved. A box gets its edges, a ball circles.
@@ -116,7 +118,7 @@ def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.n
 
 
 class _Lattice(NamedTuple):
-    """Positions around a surface by coordinates along each axis, depths, and tighter bounds."""
+    """Coordinates along each axis, depths, and bounds of a surface."""
 
     axes: list[np.ndarray]
     depths: np.ndarray
@@ -125,13 +127,13 @@ class _Lattice(NamedTuple):
 
 
 def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
-    """Evaluate depths (n, m, k) on a lattice of coordinates along each axis."""
+    """Depths (n, m, k)."""
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Find tight bounds of a surface between two corners (3,); None if there is none."""
+    """Tight bounds of a surface between corners (3,); None without a surface."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -145,16 +147,16 @@ def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | 
 
 
 def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
-    """Tell for each section across an axis (n,) whether the surface crosses it."""
+    """Whether each section across an axis (n,) cuts the surface."""
     within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
     return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
 
 def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
-    """Find the two ends of a surface along an axis by bisection; empty if no section crosses it."""
-    axes, there = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
+    """Both ends of a surface along an axis, by bisection; empty if there is no surface."""
+    axes, crossed = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
     ends = []
-    for k, beyond in ((there[0], -1), (there[-1], 1)) if len(there) else ():
+    for k, beyond in ((crossed[0], -1), (crossed[-1], 1)) if len(crossed) else ():
         inner, outer = axes[axis][[k, np.clip(k + beyond, 0, COARSE - 1)]]
         for _ in range(HALVINGS):
             middle = np.array([(inner + outer) / 2])
@@ -167,7 +169,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) of sections across an axis, from end to end, that show the surface.
+    """Yield lines (m, 3) of those sections across an axis that show the surface.
 
     Lines in a plane that cuts the surface off are left out.
     """
@@ -175,7 +177,7 @@ def _sections(
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(*ends, BETWEEN + 2)
     apart = (heights[1] - heights[0]) / 2 * np.eye(3)[axis]
-    # At an end, depths are known where they exceed a step of the section.
+    # At an end, sections resolve depths beyond a step.
     step = (hi - lo).max() / SECTION
     inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
     for height in heights:
@@ -183,9 +185,9 @@ def _sections(
         inset = 0.0 if cut_off else inset_of.get(height, 0.0)
         for flat in zeros(partial(_section, depth, axis, height + inset), lo, hi, SECTION):
             line = np.insert(flat, axis, height + inset, axis=1)
-            if inset:  # do other faces meet the face at the end?
-                part = inset / 2 * np.eye(3)[axis]
-                slope = (depth(line + part) - depth(line - part)) / inset
+            if inset:  # other faces meet the face at the end?
+                offset = inset / 2 * np.eye(3)[axis]
+                slope = (depth(line + offset) - depth(line - offset)) / inset
                 shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7
             elif not cut_off:
                 bend = np.abs(depth(line + apart) + depth(line - apart))
@@ -196,7 +198,7 @@ def _sections(
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
-    """Find sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections where they bend slightly."""
+    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections where they bend slightly."""
     corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -206,7 +208,9 @@ def edges(faces: np.ndarray) -> np.ndarray:
     first, second = order[:-1][shared], order[1:][shared]
     cosine = np.abs((normal[first // 3] * normal[second // 3]).sum(axis=1))
     sharp = first[cosine < SHARP]
-    found = [np.stack((faces[sharp // 3, sharp % 3], faces[sharp // 3, (sharp + 1) % 3]), axis=1)]
+    segments = [
+        np.stack((faces[sharp // 3, sharp % 3], faces[sharp // 3, (sharp + 1) % 3]), axis=1)
+    ]
     bends = (cosine >= SHARP) & (cosine < FLAT)
     smooth = faces[np.unique(np.concatenate([first[bends], second[bends]]) // 3)]
     for axis in range(3) if len(smooth) else ():
@@ -214,20 +218,20 @@ def edges(faces: np.ndarray) -> np.ndarray:
         for height in np.linspace(along.min(), along.max(), BETWEEN + 2)[1:-1]:
             crossed = (along > height) != (np.roll(along, -1, axis=1) > height)
             a, b = smooth[crossed], np.roll(smooth, -1, axis=1)[crossed]
-            part = (height - a[:, axis]) / (b[:, axis] - a[:, axis])
-            found.append((a + part[:, None] * (b - a)).reshape(-1, 2, 3))
-    return np.concatenate(found)
+            fraction = (height - a[:, axis]) / (b[:, axis] - a[:, axis])
+            segments.append((a + fraction[:, None] * (b - a)).reshape(-1, 2, 3))
+    return np.concatenate(segments)
 
 
 def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarray:
-    """Evaluate the depth at positions (n, 2) in a plane across an axis."""
+    """Depth at (n, 2) in a plane across an axis."""
     return depth(np.insert(x, axis, height, axis=1))
 
 
 class Front:
-    """Height of the nearest surface to the eye in each cell, from projected points x (n, 3).
+    """Height of the surface nearest to the eye in each cell, from projected points x (n, 3).
 
-    A point fills its cell and the cells next to it; up to twice as many `gaps` are closed.
+    A point fills its cell and the adjacent ones; up to twice as many `gaps` are closed.
     """
 
     def __init__(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float, gaps: int):
@@ -241,11 +245,11 @@ class Front:
         return tuple(np.clip((x[:, :2] - self.low) / self.cell, 0, last).astype(int).T)
 
     def beside(self, x: np.ndarray) -> np.ndarray:
-        """Return the heights of lines (n, 2) around the points."""
+        """Heights at lines (n, 2) around the points."""
         return _largest(self.height, 2)[self._cells(x)]
 
     def outlines(self) -> list[np.ndarray]:
-        """Draw lines (m, 2) around the points."""
+        """Lines (m, 2) around the points."""
         filled = smoothed(np.isfinite(self.height).astype(float))
         across, up = (
             low + self.cell * (np.arange(n) + 0.5)
@@ -255,19 +259,19 @@ class Front:
         return lines
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
-        """Tell of positions x (n, 2) at these heights whether all cells `around` are in front."""
+        """Whether all cells `around` x (n, 2) are in front of these heights."""
         return -_largest(-self.height, around)[self._cells(x)] > height + 3 * self.cell
 
 
 def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
-    """Yield the hidden and the visible pieces of a line."""
+    """Yield hidden and visible pieces of a line."""
     turns = np.flatnonzero(np.diff(hidden)) + 1
     for first, end in pairwise([0, *turns, len(line)]):
         yield line[first : end + 1], bool(hidden[first])
 
 
 def spacing(x: np.ndarray, count: int = 1) -> float:
-    """Return the mean distance of points (n, d) from their nearest `count` neighbours."""
+    """Mean distance from the nearest `count` neighbours, of points (n, d)."""
     if len(x) <= count:
         return 0.0
     near = []

@@ -1,7 +1,4 @@
-"""Pictures of the points of a snapshot in 1D, 2D and 3D, drawn by Matplotlib.
-
-Axes, labels and the colour bar are a background that is drawn once and reused.
-"""
+"""Pictures of the points of a snapshot in 1D, 2D and 3D, by Matplotlib."""
 
 from __future__ import annotations
 
@@ -36,68 +33,65 @@ from karamelo_py.output.outlines import (
 )
 from karamelo_py.output.snapshots import Snapshot
 
-# Colour-blind safe (Okabe and Ito 2008); used cyclically for solids.
+# Colour-blind safe (Okabe and Ito 2008).
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
 MOST_IN_LEGEND = 16
-MARGIN = 4  # pixels on both sides of a long title
-MARKS = 1 << 16  # points drawn at once
-MOST_CELLS = 1 << 23  # of the picture in which hidden points are found
-HIDDEN = (0.0, 0.0, 0.0, 0.25)  # colour of hidden lines
-# A circle of this diameter has the area of a unit square.
+MARGIN = 4  # pixels next to a long title
+MARKS = 1 << 16  # points per batch
+MOST_CELLS = 1 << 23  # for finding hidden points
+HIDDEN = (0.0, 0.0, 0.0, 0.25)
+# Diameter of the circle with the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
-# Direction of the light: right, up, towards the eye.
+# Of the light: right, up, towards the eye.
 LIGHT = np.array([-0.35, 0.6, 0.72])
-AMBIENT = 0.5  # ambient light
-LIT = 8  # points needed for a surface
+AMBIENT = 0.5
+LIT = 8  # points that make a surface
 
 
 Window = Sequence[tuple[float | None, float | None]]
 
 
 class Options(NamedTuple):
-    """Options of a picture."""
-
-    column: str  # colours the points, or is drawn over x in 1D
-    label: str  # of the colour bar (in 1D, of the ordinate)
-    solids: tuple[str, ...] = ()  # names of the solids that colour the points, if a column does not
-    limits: tuple[float | None, float | None] = (None, None)  # None: grow with what has been seen
-    symmetric: bool = False  # limits are symmetric about 0
+    column: str  # colours the points; 1D: ordinate
+    label: str  # of the colour bar or ordinate
+    solids: tuple[str, ...] = ()  # names of solids that colour the points, instead of `column`
+    limits: tuple[float | None, float | None] = (None, None)  # None: grow
+    symmetric: bool = False  # about 0
     cmap: str = "viridis"
-    azimuth: float = -60.0  # angles of view in 3D, in degrees
+    azimuth: float = -60.0  # degrees
     elevation: float = 30.0
     axes: bool = True
-    lengths: str = ""  # unit of lengths, appended to axis names
-    window: Window = ()  # for x, y, z; None: the domain
+    lengths: str = ""  # unit of lengths
+    window: Window = ()  # x, y, z; None: the domain
     log: bool = False  # logarithmic colours; values <= 0 get the lowest
-    quantile: float = 0.0  # fraction of the values at each end that does not extend the limits
+    quantile: float = 0.0  # fraction of values at each end beyond the limits
     fontsize: float = 9.0
-    pointsize: float = 1.0  # diameter relative to the size of the material it represents
+    pointsize: float = 1.0  # diameter relative to the size of a point
     outlines: bool = False  # of solids and tools
 
 
 class DrawnPoints(Artist):
-    """The points of one state, drawn in pieces."""
+    """Points of one state, drawn in batches."""
 
     def __init__(self, picture: Picture):
         super().__init__()
         self.picture = picture
-        self.rows = np.empty((3, 0))  # positions on paper, a value, in 3D also the light
+        self.rows = np.empty((3, 0))  # projected positions, value, in 3D also light
         self.lines = LineCollection(
             [], colors="black", capstyle="round", linewidths=0.1 * picture.options.fontsize
         )
         picture.axes.add_collection(self.lines, autolim=False)
         self.lines.set_visible(False)
         self.set_zorder(picture.artist.get_zorder())
-        picture.artist.set_visible(False)  # drawn only by this artist
+        picture.artist.set_visible(False)  # by this artist only
 
     def draw(self, renderer: Any) -> None:
-        """Draw the points."""
         if not self.get_visible():
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # rasterised in .pdf and .svg too: viewers cannot show so many circles
+        if many:  # rasterised in .pdf and .svg, too: viewers cannot show so many circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.place(self.rows[:, first : first + MARKS])
@@ -111,25 +105,25 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """Axes, labels and colour bar as a background, with the points of one state on top.
+    """Axes, labels and colour bar as a background, with the points of a state on top.
 
-    Matplotlib spends most of its time on axes and ticks. They change only with the limits of the
-    field, so their pixels are stored; a new state costs the points and the title.
+    Matplotlib spends most of its time on axes and ticks. Their pixels are stored until the limits
+    change; a new state costs the points and the title.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
         self.domain = _zoomed(domain, options.window)
         self.options = options
-        self.small = options.fontsize - 1  # size of tick labels
+        self.small = options.fontsize - 1  # tick labels
         self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_subplot()
         self.limits: tuple[float, float] | None = None
         self.beyond = (False, False)
-        # The axis whose labels change with the limits of the field.
+        # Axis whose labels follow the limits.
         self.scale: Any = None
         self._laid_out = False
-        self._widest = 0.0  # of the titles, in pixels
+        self._widest = 0.0  # title, in pixels
         self._background: Any = None
         self.axes.tick_params(labelsize=self.small)
         self.title = self.axes.set_title("step 0, time 0", fontsize=options.fontsize)
@@ -140,18 +134,18 @@ class Picture:
             self.axes.set_axis_off()
         self._add_legend()
 
-    cuts = False  # whether the window cuts through bodies
-    _prepare: Callable[[], Any]  # sets up the axes and returns the artist of the points
+    cuts = False  # the window cuts bodies
+    _prepare: Callable[[], Any]  # sets up the axes; returns the artist of the points
     # Visible rows of points x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
     place: Callable[[np.ndarray], None]  # passes visible points to the artist
-    _apply_limits: Callable[[float, float], None]  # applies new limits of the field
+    _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Mark the ends of the colour bar beyond which there are values."""
+        """Mark ends of the colour bar with values beyond."""
 
     def _name_lengths(self, axis: Any, name: str) -> None:
-        """Label an axis of lengths, scaled by a power of a thousand if they are small or large."""
+        """Label an axis, with a power of 1000 if lengths are small or large."""
         size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
         if 0 < size < 1e-2 or size >= 1e5:
             power = 3 * int(np.floor(np.log10(size) / 3))
@@ -163,7 +157,6 @@ class Picture:
         axis.set_label_text(name, fontsize=self.options.fontsize)
 
     def _add_legend(self) -> None:
-        """Write the names of the solids next to the picture."""
         names = self.options.solids[:MOST_IN_LEGEND]
         if len(names) < 2:
             return
@@ -176,10 +169,7 @@ class Picture:
         )
 
     def show(self, snapshot: Snapshot, side: float, title: str, tools: Sequence[Tool] = ()) -> None:
-        """Set the points and the title; `side` is the size of a typical point.
-
-        `tools` are outlined together with the solids.
-        """
+        """Set points, title and outlined `tools`; `side` is the size of a typical point."""
         if not self._laid_out:
             self._lay_out()
         columns = in_window(snapshot.columns, self.options.window)
@@ -211,23 +201,23 @@ class Picture:
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
-        """Set the lines around points (n, 3) of bodies, and around tools."""
+        """Draw lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
-        """Write the title above the axes, or across the picture if the axes are too narrow."""
+        """Write the title above the axes, or across the picture if it is wider."""
         self.title.set_text(text)
         whole = self.figure.bbox.width - 2 * MARGIN
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
             self.title.set_fontsize(self.title.get_fontsize() * whole / wide)
-        self._widest = max(self._widest, min(wide, whole))  # shorter titles do not jump back
+        self._widest = max(self._widest, min(wide, whole))  # shorter titles do not move
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
         at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
         self.title.set_x((at - box.x0) / box.width)
 
     def begin_with(self, limits: tuple[float, float] | None) -> None:
-        """Start growing limits from the limits of an earlier picture."""
+        """Start from the limits of an earlier picture."""
         self.limits = limits
         if limits is not None:
             if not self._laid_out:
@@ -241,13 +231,13 @@ class Picture:
             furthest = max(-grown_to[0], grown_to[1])
             grown_to = -furthest, furthest
         lo, hi = (
-            own if fixed is None else np.log10(fixed) if self.options.log else fixed
-            for own, fixed in zip(grown_to, self.options.limits, strict=True)
+            end if fixed is None else np.log10(fixed) if self.options.log else fixed
+            for end, fixed in zip(grown_to, self.options.limits, strict=True)
         )
         return (lo, hi) if hi > lo else (min(lo, hi), min(lo, hi) + (abs(lo) or 1.0))
 
     def save_png(self, file: BinaryIO, compression: int) -> None:
-        """Draw the state over the stored background and write it as PNG."""
+        """Draw the state over the stored background."""
         if self._background is None:
             self.title.set_animated(True)
             self.marks.set_animated(True)
@@ -256,33 +246,33 @@ class Picture:
         self.canvas.restore_region(self._background)
         self.axes.draw_artist(self.title)
         self.axes.draw_artist(self.marks)
-        # Opaque everywhere, so three channels are enough.
+        # Opaque: three channels are enough.
         pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
         image = Image.fromarray(np.ascontiguousarray(pixels))
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Reserve room for the widest labels once, so that nothing moves between pictures."""
+        """Reserve room for the widest labels, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
-        for _ in range(2):  # twice, because the aspect ratio moves the axes
+        for _ in range(2):  # the aspect ratio moves the axes
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
         self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes
-            if axes is not self.axes:  # a colour bar, no taller than the axes
-                own, beside = axes.get_position(), self.axes.get_position()
-                high = min(own.height, beside.height)
-                low = beside.y0 + (beside.height - high) / 2
+            if axes is not self.axes:  # colour bar, no taller than the axes
+                bar, box = axes.get_position(), self.axes.get_position()
+                high = min(bar.height, box.height)
+                low = box.y0 + (box.height - high) / 2
                 axes.set_box_aspect(None)
-                axes.set_position((own.x0, low, own.width, high))
+                axes.set_position((bar.x0, low, bar.width, high))
             at = axes.transAxes.inverted().transform((self.scale.label.get_position()[0], 0))
             self.scale.set_label_coords(at[0], 0.5)
         self._laid_out = True
 
     def _make_room_at_left(self) -> None:
-        """Move axes with equal units right if the name of y would lie outside the picture."""
+        """Move axes with equal units right if the label of y would lie outside."""
         label = self.axes.yaxis.label
         out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
         if out <= MARGIN or not self.axes.axison or not label.get_text():
@@ -292,17 +282,16 @@ class Picture:
         self.figure.draw_without_rendering()
 
     def _pixels_per_unit(self) -> float:
-        """Return points (1/72 inch) on paper per unit of x."""
+        """Points (1/72 inch) on paper per unit of x."""
         box = self.axes.get_position()
         lo, hi = self.axes.get_xlim()
         return box.width * self.figure.get_figwidth() * 72 / (hi - lo)
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Return limits that contain the old ones and the finite values.
+    """Extend limits to contain the finite values.
 
-    They are rounded outwards to eighths of a power of two, so that they change rarely while a field
-    grows.
+    Rounded outwards to eighths of a power of two: they change rarely while a field grows.
     """
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -319,13 +308,13 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 
 
 def within(values: np.ndarray, share: float) -> np.ndarray:
-    """Return the finite values, or their quantiles `share` and 1 - `share`."""
+    """Finite values, or their quantiles `share` and 1 - `share`."""
     finite = values[np.isfinite(values)]
     return np.quantile(finite, [share, 1 - share]) if share and len(finite) else finite
 
 
 def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.ndarray]:
-    """Select the rows whose x, y and z lie in a window."""
+    """Select rows with x, y and z in a window."""
     for name, ends in zip("xyz", window, strict=False):
         for end, out in zip(ends, (np.less, np.greater), strict=True):
             if end is not None:
@@ -335,13 +324,12 @@ def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.nd
 
 
 def _zoomed(domain: Any, window: Window) -> Any:
-    """Return the visible part of a domain."""
     if not window:
         return domain
     lo, hi = np.array(domain.lo, float), np.array(domain.hi, float)
     for k, ends in zip(range(len(lo)), window, strict=False):
         lo[k], hi[k] = (
-            own if given is None else given for own, given in zip((lo[k], hi[k]), ends, strict=True)
+            end if limit is None else limit for end, limit in zip((lo[k], hi[k]), ends, strict=True)
         )
     return SimpleNamespace(dimension=domain.dimension, lo=lo, hi=hi)
 
@@ -360,12 +348,11 @@ def _number(value: float, _: Any = None) -> str:
 
 
 def _power(value: float, _: Any = None) -> str:
-    """Format a value on a logarithmic scale."""
     return _number(float(f"{10.0**value:.3g}"))
 
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
-    """Make invisible arrows at the lower and upper end of a colour bar."""
+    """Invisible arrows at both ends of a colour bar."""
     looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
     return [
         Polygon(
@@ -379,7 +366,7 @@ def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
 
 
 class PlanePicture(Picture):
-    """2D: the points at their positions."""
+    """2D: points at their positions."""
 
     def _prepare(self) -> Any:
         lo, hi = self.domain.lo, self.domain.hi
@@ -409,7 +396,7 @@ class PlanePicture(Picture):
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
-        # The bar checks each end as it is set, and swaps ends in the wrong order.
+        # The bar checks each end when it is set, and swaps ends in the wrong order.
         if hi > self.norm.vmin:
             self.norm.vmax, self.norm.vmin = hi, lo
         else:
@@ -420,7 +407,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # As large as the material it represents, with a minimum that is larger for few points.
+        # As large as its material, with a minimum that is larger for few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._pixels_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -434,19 +421,17 @@ class PlanePicture(Picture):
         self.marks.lines.set_segments(lines + [line for x in bodies for line in outlines(x[:, :2])])
 
     def place(self, rows: np.ndarray) -> None:
-        """Pass visible points to the artist."""
         self.artist.set_offsets(rows[:2].T)
         self.artist.set_facecolors(self._colours_of(rows))
 
     def _colours_of(self, rows: np.ndarray) -> np.ndarray:
-        """(n, 4) colours."""
         if self.options.solids:
             return self.colours[(rows[2].astype(int) - 1) % len(SOLIDS)]
         return colormaps[self.options.cmap](rows[2])
 
 
 class SpacePicture(PlanePicture):
-    """3D: points seen from outside, farthest first, with the edges of the domain."""
+    """3D: points, farthest first, with the edges of the domain."""
 
     cuts = True
 
@@ -472,7 +457,7 @@ class SpacePicture(PlanePicture):
         return (x - self.middle) @ self.view.T
 
     def _draw_edges(self, axis: int, reach: float) -> None:
-        """Draw the four edges along an axis; ticks at the lowest one, for z at the leftmost."""
+        """Draw four edges; ticks at the lowest one, for z at the leftmost."""
         others = [k for k in range(3) if k != axis]
         edges = []
         for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):
@@ -521,8 +506,8 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Tell which points are not completely hidden: those at the surface of a large body."""
-        # A neighbouring cell lies within the circle of a point, which lies within three cells.
+        """Mask of points that are not completely hidden: the surface of a large body."""
+        # An adjacent cell lies within a point's circle, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5
         if not cell > 0 or np.prod((high - low) / cell) > MOST_CELLS:
@@ -535,21 +520,21 @@ class SpacePicture(PlanePicture):
             Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
             for x in bodies
         ]
-        found = []  # lines of each tool as projected, their heights, and what the tool hides
+        groups = []  # lines of each tool as projected, heights, and what it hides
         for front in fronts:
             if lines := front.outlines():
                 seen = np.concatenate(lines)
-                found.append((lines, seen, front.beside(seen), False))
+                groups.append((lines, seen, front.beside(seen), False))
         for tool in tools:
             if not (lines := list(tool.lines(self.lo, self.hi))):
                 continue
             at = np.concatenate(lines)
-            # The tool itself is nearer to the eye where it hides its far side.
+            # The tool is nearer to the eye where it hides its far side.
             nearer = at + 0.01 * np.linalg.norm(np.ptp(at, axis=0)) * self.view[2]
             *places, height = self._project(at).T
-            found.append((lines, np.transpose(places), height, tool.depth(nearer) > 0))
+            groups.append((lines, np.transpose(places), height, tool.depth(nearer) > 0))
         pieces = []
-        for lines, seen, height, behind in found:
+        for lines, seen, height, behind in groups:
             hidden = behind | np.any([front.hides(seen, height) for front in fronts], axis=0)
             ends = np.cumsum([len(line) for line in lines])[:-1]
             for one in zip(np.split(seen, ends), np.split(hidden, ends), strict=True):
@@ -565,7 +550,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Compute the light on some points; a surface faces the side with fewer points."""
+        """Light on some points; a surface faces the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2
@@ -599,5 +584,4 @@ class LinePicture(Picture):
         return np.array([*x.T[:2], values])[:, np.argsort(ids)]
 
     def place(self, rows: np.ndarray) -> None:
-        """Pass visible points to the artist."""
         self.artist.set_data(rows[0], rows[2])

@@ -1,4 +1,4 @@
-"""Plots of logged quantities, drawn with Matplotlib when a run ends; the style of all plots."""
+"""Plots of logged quantities at the end of a run; the style of all plots."""
 
 from collections.abc import Callable, Sequence
 from math import floor, log10
@@ -14,10 +14,10 @@ from karamelo_py.script.errors import Place
 
 
 class PlottedCurve(Rhythmic):
-    """One curve of `y` against `x`, with a point at every `every` steps.
+    """Curve of `y` against `x`, with a point every `every` steps.
 
-    `side` is the side of its y axis, left or right; `scale` is linear or log; `label` is the title
-    of that axis, by default the name of y.
+    `side` of the y axis is left or right, its `scale` linear or log, its `label` by default y's
+    name.
     """
 
     remembers = ("points",)
@@ -38,15 +38,13 @@ class PlottedCurve(Rhythmic):
         self.place: Place | None = None
 
     def write(self) -> None:
-        """Append the present state."""
         self.points.append((float(self.x.read()), float(self.y.read())))
 
 
 class Plots(dict[str, PlottedCurve]):
-    """The curves of a scene by ID, and the file they are drawn to.
+    """Curves of a scene by ID, and their file; without a file they are only collected.
 
-    Curves over the same quantity share axes; each further quantity gets axes below. Without a file
-    the curves are only collected.
+    Curves over the same quantity have common axes; each further quantity gets axes below.
     """
 
     def __init__(self, hub: Scene):
@@ -56,12 +54,11 @@ class Plots(dict[str, PlottedCurve]):
         self.place: Place | None = None  # of save_plot
 
     def add(self, ID: str, curve: PlottedCurve) -> None:
-        """Add a curve under a new `ID`."""
         curve.id = ID
         self[ID] = curve
 
     def finish(self) -> None:
-        """Draw all curves that have points to the file, if there is one."""
+        """Draw all curves with points."""
         curves = [curve for curve in self.values() if curve.points]
         if self.file is not None and curves:
             draw(curves, self.hub.folder / self.file, self._labelled)
@@ -73,7 +70,7 @@ class Plots(dict[str, PlottedCurve]):
 
 
 def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] = str) -> None:
-    """Draw non-empty curves; `labelled` adds units to the names of quantities."""
+    """Draw non-empty curves; `labelled` adds units to names."""
     by_x: dict[str, list[PlottedCurve]] = {}
     for curve in curves:
         by_x.setdefault(curve.x.name, []).append(curve)
@@ -85,9 +82,9 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
         lines = []
         for side in ("left", "right"):
             chosen = [curve for curve in over_x if curve.side == side]
-            # Colours continue from the left side to the right.
+            # Colours continue from left to right.
             lines += _over_one_axis(axes, side, chosen, len(lines), labelled) if chosen else []
-        # Above the curves, so that it hides none.
+        # Above the curves.
         above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
         axes.legend(handles=lines, **above, frameon=False, fontsize="small")
     savefig(figure, path)
@@ -96,7 +93,7 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
 def _over_one_axis(
     axes: Any, side: str, curves: list[PlottedCurve], first: int, labelled: Callable[[str], str]
 ) -> list:
-    """Draw curves over one y axis; return their lines."""
+    """Draw curves over one y axis; return the lines."""
     if side == "right":
         axes = axes.twinx()
         axes.spines[["top", "left"]].set_visible(False)
@@ -114,12 +111,12 @@ def _over_one_axis(
     return lines
 
 
-# ---- common style --------------------------------------------------------------------------------
+# ---- style ----
 
 
 def blank_figure(width: float, height: float) -> Any:
-    """Make an empty Matplotlib figure, in inches, that needs no display."""
-    # Importing Matplotlib takes a third of a second: only scenes with plots pay it.
+    """Empty Matplotlib figure (inches) that needs no display."""
+    # 0.3 s, only for scenes with plots.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -129,25 +126,25 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def in_mathtext(lead: str, exponent: int) -> str:
-    """Format a number times a power of ten for Matplotlib; `lead` is omitted if it is 1."""
+    """Number times a power of ten; `lead` is omitted if 1."""
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
 def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
-    """Format the numbers of one axis consistently: 0.02, 500, or 10^-7, 3·10^-7."""
+    """Format numbers of an axis consistently: 0.02, 500, or 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
     return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 
 
 def _parts(a: float) -> tuple[str, int]:
-    """Split a number into mantissa (empty for 1) and decimal exponent."""
+    """Mantissa (empty for 1) and decimal exponent."""
     exponent = floor(log10(abs(a)) + 1e-9)
     lead = a / 10**exponent
     return "" if abs(lead - 1) < 1e-9 else f"{lead:g}", exponent
 
 
 def real_ticks(axis: Any) -> None:
-    """Label the ticks of a linear axis with full numbers, without common factor or offset."""
+    """Label ticks with full numbers, without common factor or offset."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     class WholeNumbers(ScalarFormatter):

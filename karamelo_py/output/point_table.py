@@ -1,4 +1,4 @@
-"""Tables of points: all points of a scene, a piece of them by id, or some of a block."""
+"""Tables of points: a whole scene, a piece by id, or some of a block."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -18,7 +18,7 @@ from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
-# Columns, the vectors they belong to, and directions.
+# Columns: vector and direction.
 VECTORS = {
     f"{before}{axis}{after}": (vector, k)
     for before, after, vector in (
@@ -42,75 +42,74 @@ class Part(NamedTuple):
 
     @property
     def points(self) -> Points:
-        """Return the arrays of these points only."""
+        """Arrays of these points."""
         return self.block.points if self.rows is None else some_of(self.block, self.rows).points
 
 
 class Rows(NamedTuple):
-    """Points of a table, as stored in the arrays of a scene."""
+    """Points of a table, as the scene stores them."""
 
     s: Setup
     parts: list[Part]
     ids: np.ndarray
     present: np.ndarray
-    comm: Any = None  # of the processes that hold parts of the table, or None
+    comm: Any = None  # of the processes with parts of the table, or None
 
-    def of_all(self, own: list[tuple]) -> Iterator[tuple]:
-        """Yield places and numbers of all processes, given those at local parts."""
+    def of_all(self, local: list[tuple]) -> Iterator[tuple]:
+        """Yield places and numbers of all processes, given local ones."""
         if self.comm is None:
-            yield from own
+            yield from local
         else:
-            yield from (one for of_rank in self.comm.allgather(own) for one in of_rank)
+            yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Gather a field (n, ...), which `of` selects from `Points`; zero for deleted points."""
-        own = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
-        found = np.zeros((*own[0][1].shape[:-1], len(self.ids)), own[0][1].dtype)
-        return self._filled(found, own)
+        """Gather a field (n, ...), which `of` selects; zero for deleted points."""
+        local = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
+        field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
+        return self._filled(field, local)
 
-    def _filled(self, found: np.ndarray, own: list[tuple]) -> np.ndarray:
-        for places, array in self.of_all(own):
-            found[..., places] = array
-        return found.T
+    def _filled(self, field: np.ndarray, local: list[tuple]) -> np.ndarray:
+        for places, array in self.of_all(local):
+            field[..., places] = array
+        return field.T
 
     def put(self, of: Callable[[Points], np.ndarray], values: np.ndarray) -> None:
-        """Scatter a field (n, ...), which `of` selects from `Points`."""
+        """Scatter a field (n, ...), which `of` selects."""
         for block, rows, places in self.parts:
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
         """Gather a declared field (n, components); None if the scene does not have it.
 
-        Points whose law does not have the field get its initial value.
+        Points whose law does not have it get its initial value.
         """
         arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
         if all(array is None for _, array in arrays):
             return None
-        found = fields.at_points(kind, self.s.kin, len(self.ids), float).array
-        own = [(part.places, part.taken(array)) for part, array in arrays if array is not None]
-        return self._filled(found, own)
+        field = fields.at_points(kind, self.s.kin, len(self.ids), float).array
+        local = [(part.places, part.taken(array)) for part, array in arrays if array is not None]
+        return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Compute (n, *columns) numbers of each point with a kernel.
+        """Compute (n, *columns) numbers by the kernel ``of(laws)``, or 0 if it is None.
 
-        The kernel ``of(laws)`` is called as ``fill(kin, points, laws, rows)``. If it is None, the
-        points of those laws get 0.
+        It is called as ``fill(kin, points, laws, rows)``.
         """
-        own, s = [], self.s
+        local, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
-            # Arrays without points have another type and would cause another compilation.
+            # Empty arrays have another type: another compilation.
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(s.kin, points, part.block.laws, rows)
-                own.append((part.places, rows.T))
-        return self._filled(np.zeros((*columns, len(self.ids))), own)
+                local.append((part.places, rows.T))
+        return self._filled(np.zeros((*columns, len(self.ids))), local)
 
 
 class PointTable:
-    """Some points of a scene in order: arrays (copies) and columns.
+    """Some points in order: arrays (copies) and columns.
 
-    Deleted points (boundary delete) are zero in the arrays; `particle` omits them.
+    Deleted points are zero in arrays; `particle` omits them.
     """
 
     def __init__(self, hub: Scene, rows: Rows):
@@ -119,24 +118,23 @@ class PointTable:
         self._cache: dict[str, Any] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], Any]) -> Any:
-        rows = self._rows  # clears the cache if the scene has stepped
+        rows = self._rows  # clears the cache after a step
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
 
     @property
     def numbers(self) -> np.ndarray:
-        """(n,) numbers of the points, from 0."""
+        """(n,) from 0."""
         return self._rows.ids
 
     @property
     def ids(self) -> np.ndarray:
-        """(n,) ids of the points, from 1, as in dumps."""
+        """(n,) from 1, as in dumps."""
         return self.numbers + 1
 
     @property
     def count(self) -> int:
-        """Number of points."""
         return len(self._rows.ids)
 
     @property
@@ -146,40 +144,40 @@ class PointTable:
 
     @property
     def position(self) -> np.ndarray:
-        """(n, d) positions."""
+        """(n, d)."""
         return self._cached("x", lambda rows: rows.take(partial(_place, rows.s)))
 
     @property
     def velocity(self) -> np.ndarray:
-        """(n, d) velocities."""
+        """(n, d)."""
         return self._cached("v", lambda rows: rows.take(partial(shown_velocity, rows.s)))
 
     @property
     def mass(self) -> np.ndarray:
-        """(n,) masses."""
+        """(n,)."""
         return self._cached("mass", lambda rows: rows.take(lambda points: points.mass))
 
     @property
     def reference_position(self) -> np.ndarray:
-        """(n, d) positions before the first step."""
+        """(n, d) before the first step."""
         return self._cached("x0", lambda rows: places_before(self.hub, rows.ids))
 
     @property
     def reference_volume(self) -> np.ndarray:
-        """(n,) volumes before the first step."""
+        """(n,) before the first step."""
         return self._cached("V0", lambda rows: volumes_before(self.hub, rows.ids))
 
     @property
     def solid(self) -> np.ndarray:
-        """(n,) number of the solid of each point, from 0."""
+        """(n,) numbers of solids, from 0."""
         firsts = [solid.first_id for solid in self.hub.solids.values()]
         return (np.searchsorted(firsts, self.numbers, side="right") - 1).astype(np.int32)
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """(n, d d) velocity moment sum N v (X - x), for transfers that store it, else None.
+        """(n, d d) sum N v (X - x), for transfers that store it, else None.
 
-        The arms X - x are in present coordinates: in the total frame, F times the reference arms.
+        In present coordinates: in the total frame, the arms X - x are F times the reference arms.
         """
         rows = self._rows
         if (kept := rows.declared(Moment)) is None:
@@ -189,23 +187,20 @@ class PointTable:
             for part in rows.parts
             if fields.field(part.block.points.fields, Moment) is not None
         ]
-        own = [(part.places, _velocity_moment(rows.s, part)) for part in have]
-        return rows._filled(np.zeros(kept.T.shape, kept.dtype), own)
+        local = [(part.places, _velocity_moment(rows.s, part)) for part in have]
+        return rows._filled(np.zeros(kept.T.shape, kept.dtype), local)
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """Return a declared field (n, components); None if the scene does not have it."""
+        """A declared field (n, components); None if the scene does not have it."""
         return self._rows.declared(kind)
 
     def columns_of_laws(self) -> set[str]:
-        """Names of the columns declared by the laws of the materials."""
+        """Columns declared by the laws of the materials."""
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """Return a column (n,) of the existing points, without deleted ones.
-
-        Columns that the scene does not have are zero, as in Karamelo.
-        """
+        """A column (n,) of the existing points; 0 if the scene does not have it, as in Karamelo."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -225,7 +220,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # A kinematics stores its components only: in 2D the fourth is 12, as in 3D.
+        # Only this kinematics' components: in 2D the fourth is 12, as in 3D.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -233,7 +228,7 @@ class PointTable:
 
 
 def owners_of_fields(hub: Scene, contact: Any = None) -> list:
-    """List the parts of a scene that may declare fields of points and nodes."""
+    """Parts of a scene that may declare fields."""
     update, method = hub.update, hub.update.method
     heat = Conducting if update.thermal else None
     grids = ReflectingGrid if update.boundary == "reflect" else None
@@ -246,22 +241,22 @@ def owners_of_fields(hub: Scene, contact: Any = None) -> list:
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
-    """Map each column to the field that declares it in `attribute`, and the component."""
-    found: dict[str, tuple[type, int]] = {}
+    """Columns declared by fields in `attribute`: field and component."""
+    columns: dict[str, tuple[type, int]] = {}
     for kind in fields.declared(owners_of_fields(hub), attribute):
         for k, column in enumerate(fields.columns_of(kind)):
-            found.setdefault(column, (kind, k))
-    return found
+            columns.setdefault(column, (kind, k))
+    return columns
 
 
 def named_sets(hub: Scene) -> list[str]:
-    """List groups of points and solids; as columns they are 1 for their points, else 0."""
+    """Groups of points and solids: columns that are 1 for their points, else 0."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
 
 def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
-    """Return 1 for points (0-based numbers, (n,)) that belong to a group or solid, else 0."""
+    """1 for points (0-based, (n,)) of a group or solid, else 0."""
     if name in hub.groups:
         return hub.groups[name].has(numbers).astype(float)
     solid = hub.solids[name]
@@ -269,7 +264,7 @@ def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:
-    """List the columns that exist in some scenes only, without those that are `present`."""
+    """Columns of some scenes only, without those `present`."""
     return [name for name, show in columns.items() if show is None and name not in present]
 
 
@@ -278,9 +273,9 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of the positions, if their rate of change is known.
+    """Velocities (d, n) at the time of the positions, if their rate of change is stored.
 
-    Otherwise the stored velocities, half a step earlier.
+    Otherwise half a step earlier.
     """
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
@@ -302,30 +297,30 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
 
 
 def places_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
-    """Return initial positions (n, d) of points by id."""
-    return from_solids(hub, ids, lambda solid, own: solid.x0_of(own), hub.domain.dimension)
+    """Initial positions (n, d) by id."""
+    return from_solids(hub, ids, lambda solid, numbers: solid.x0_of(numbers), hub.domain.dimension)
 
 
 def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
-    """Return initial volumes (n,) of points by id."""
-    return from_solids(hub, ids, lambda solid, own: solid.volume0[own])
+    """Initial volumes (n,) by id."""
+    return from_solids(hub, ids, lambda solid, numbers: solid.volume0[numbers])
 
 
 def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
-    """Gather ``of(solid, numbers)`` for points of all solids."""
-    found, order = np.empty((len(ids), *columns)), np.argsort(ids)
+    """Gather ``of(solid, numbers)``."""
+    gathered, order = np.empty((len(ids), *columns)), np.argsort(ids)
     for solid in hub.solids.values():
         ends = solid.first_id, solid.first_id + solid.count
         rows = order[slice(*np.searchsorted(ids, ends, sorter=order))]
         if len(rows):
-            found[rows] = of(solid, ids[rows] - solid.first_id)
-    return found
+            gathered[rows] = of(solid, ids[rows] - solid.first_id)
+    return gathered
 
 
 def _column_of_laws(name: str, laws: Any) -> Callable | None:
-    """Return the kernel that exports a number declared by laws; None if no law declares it."""
-    what = columns_of(laws).get(name)
-    return None if what is None else partial(export.export, what, False)
+    """Kernel that exports a column of laws; None if no law declares it."""
+    number = columns_of(laws).get(name)
+    return None if number is None else partial(export.export, number, False)
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:
@@ -352,8 +347,7 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
     return table._exported[:, k].copy()
 
 
-# Columns of every scene. Those with None need certain materials or fields; elsewhere they are 0,
-# as in Karamelo.
+# None: only with certain materials or fields; else 0, as in Karamelo.
 COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     "id": lambda table: table.ids,
     "type": lambda table: table.solid + 1,

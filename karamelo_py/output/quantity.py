@@ -1,4 +1,4 @@
-"""Named quantities that the log and plots read at each output."""
+"""Quantities of the log and plots."""
 
 import math
 import re
@@ -11,26 +11,24 @@ from karamelo_py.script.expressions import POINT_SEEDS
 from karamelo_py.script.syntax import Raw, Source
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
-LIMIT = "limit"  # the log shows what limits the step
+LIMIT = "limit"  # what limits the step
 PER_POINT = frozenset(POINT_SEEDS)
 
 
 class Quantity:
-    """A named number of the running scene.
-
-    One of the words ``step``, ``dt``, ``time``; a script variable; a value published by a fix or
-    compute (``Ek``, ``v_x``); or an anonymous `formula` (``Ek + Es``).
+    """A number: ``step``, ``dt``, ``time``; a script variable; a value of a fix or compute (``Ek``,
+    ``v_x``); or an anonymous `formula` (``Ek + Es``).
     """
 
     script_kind = "a quantity"
 
-    words = False  # whether ``limit``, which is text, is allowed
+    words = False  # allow ``limit``, which is text
 
     def __init__(self, hub: Scene, name: str, formula: Any = None):
         self.hub = hub
         self.name = name
         self.formula = formula
-        self._told = False  # whether a NaN has been reported
+        self._told = False  # a NaN has been reported
         self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return
@@ -47,7 +45,6 @@ class Quantity:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "Quantity":
-        """Read the quantity from a script argument; errors mark the argument."""
         text = argument.text.strip().strip('"')
         try:
             if text in cls.names(hub) or (cls.words and text == LIMIT):
@@ -69,16 +66,16 @@ class Quantity:
 
     @staticmethod
     def names(hub: Scene) -> list[str]:
-        """List all names that can be logged now."""
+        """Names that can be logged now."""
         return [*KEYWORDS, *_variables(hub), *hub.values.names()]
 
     @property
     def heading(self) -> str:
-        """Column heading: the name as Karamelo writes it, without blanks."""
+        """Karamelo's name, without blanks."""
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """Read the present number or word; the first NaN is reported to the user."""
+        """Current number or word; the first NaN is reported."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()
@@ -94,9 +91,9 @@ class Quantity:
         return number
 
     def _source(self) -> Any:
-        """Find the formula, the value of the variable, or the number of this name.
+        """Formula, value of the variable, or number.
 
-        Looked up each time, because the script may redefine a variable between runs.
+        Looked up each time: the script may redefine a variable between runs.
         """
         variables = _variables(self.hub)
         if self.formula is not None:
@@ -113,9 +110,9 @@ class Quantity:
 
 
 class Caption:
-    """A text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
+    """Text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
 
-    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # in dollars: Matplotlib's mathematics
+    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathtext in dollars
 
     def __init__(self, hub: Scene, text: str, option: str = "title"):
         self.text, self.quantities = text, {}
@@ -134,7 +131,7 @@ class Caption:
     def names(self) -> set[str]:
         """Names that its numbers depend on."""
         sources = ((one.name, one._source()) for one in self.quantities.values())
-        return {name for own, of in sources for name in getattr(of, "names", [own])}
+        return {item for name, of in sources for item in getattr(of, "names", [name])}
 
     def __str__(self) -> str:
         def shown(found: re.Match) -> str:

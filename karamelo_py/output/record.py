@@ -1,7 +1,6 @@
-"""The record of a script's runs as data: run.json next to the log.
+"""The record of a script's runs: run.json next to the log (fields: docs/run-record.md).
 
-The banner and the closing table are printed from it, and studies read it. Its fields are listed
-in docs/run-record.md. Numbers that are not finite are null.
+Banner and closing table are printed from it; studies read it. Numbers that are not finite are null.
 """
 
 import hashlib
@@ -26,7 +25,7 @@ NAME = "run.json"
 
 
 def surroundings() -> dict[str, Any]:
-    """Date, machine and versions, for measurements made now."""
+    """Date, machine and versions of measurements."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
@@ -39,7 +38,7 @@ def surroundings() -> dict[str, Any]:
 
 
 def processor() -> str:
-    """Return the name of the processor."""
+    """Name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.lower().startswith("model name"):
@@ -50,10 +49,7 @@ def processor() -> str:
 
 
 class RunRecord:
-    """Facts of all runs of a script, and its messages.
-
-    Written when a run begins or ends, and by `end`; not at all without a `path`.
-    """
+    """Facts and messages of a script's runs, written at each begin and end (with a `path`)."""
 
     def __init__(self) -> None:
         self.path: Path | None = None
@@ -61,11 +57,11 @@ class RunRecord:
         self.content: dict[str, Any] = {"schema": SCHEMA, "status": "running"}
         self.runs: list[dict[str, Any]] = []
         self.messages: list[dict[str, Any]] = []
-        self._written: tuple[str, int] | None = None  # status and number of messages in the file
+        self._written: tuple[str, int] | None = None  # status and number of messages
         self._begun = time.perf_counter()
 
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
-        """Note the script and the values given to its variables."""
+        """Note the script and values of its variables."""
         of_content = None
         with suppress(OSError):
             if Path(file).is_file():  # a pipe can be read only once
@@ -78,28 +74,27 @@ class RunRecord:
 
     @property
     def script(self) -> str:
-        """The script file as the user wrote it; SCRIPT if there is none."""
+        """Script file as written by the user; SCRIPT if none."""
         return str(self.content.get("script", {}).get("file", "SCRIPT"))
 
     def begin(self, facts: Mapping[str, Any]) -> None:
-        """Start the record of a run with facts known before its first step."""
+        """Add a run, with facts known before its first step."""
         self.content["status"] = "running"
         self.runs.append(dict(facts))
         self._write()
 
     def finish(self, facts: Mapping[str, Any]) -> None:
-        """Add the facts known at the end of the present run."""
+        """Add facts known at the end of the run."""
         self.runs[-1].update(facts)
         self._write()
 
     def warn(
         self, text: str, hint: str | None, place: Place | None, code: str = "", cause: str = ""
     ) -> None:
-        """Note a warning: `code` names its kind, `cause` its likely cause."""
         self._note("warning", text, place, hint=hint, code=code, cause=cause)
 
     def end(self, status: str, error: BaseException | None = None) -> None:
-        """Note how the script ended: finished, interrupted or failed, with the error."""
+        """Note the end of the script: finished, interrupted or failed."""
         self.content["status"] = status
         if isinstance(error, ScriptError):
             fields = {"code": error.code, "cause": error.cause, "resume": error.resume}
@@ -132,7 +127,7 @@ class RunRecord:
 
 
 def _finite(value: Any) -> Any:
-    """Convert NumPy numbers to Python's, and non-finite ones to None."""
+    """Python numbers of NumPy's; None if not finite."""
     if isinstance(value, dict):
         return {name: _finite(of) for name, of in value.items()}
     if isinstance(value, (list, tuple)):

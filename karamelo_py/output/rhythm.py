@@ -1,4 +1,4 @@
-"""Output intervals: every n steps, or every time span."""
+"""Output intervals in steps or time."""
 
 import re
 from math import ceil, floor, isfinite
@@ -14,9 +14,8 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step at or after each multiple of `span`.
-
-    `passed` counts the multiples that have been written.
+    """Output at the first step at or after each multiple of `span`; `passed` counts written
+    multiples.
     """
 
     def __init__(self, span: float):
@@ -24,12 +23,12 @@ class ByTime:
         self.passed = -1
 
     def now(self, time: float) -> int:
-        """Count the multiples up to `time`, allowing for round-off."""
+        """Multiples up to `time`, allowing for round-off."""
         return floor(time / self.span * (1 + 1e-12) + 1e-9)
 
 
 class Rhythmic:
-    """Something written repeatedly: at the interval `every`, last at `last_step`."""
+    """Output at the interval `every`, last at `last_step`."""
 
     remembers = ("last_step", "passed")
     every: int | ByTime
@@ -37,7 +36,6 @@ class Rhythmic:
 
     @property
     def passed(self) -> int | None:
-        """Number of multiples of the time span that were written."""
         return getattr(self.every, "passed", None)
 
     @passed.setter
@@ -47,13 +45,12 @@ class Rhythmic:
 
 
 class Every:
-    """Annotation: a number of steps, or ``time(T)``; an int or a `ByTime`."""
+    """Annotation: a number of steps, or ``time(T)``; int or `ByTime`."""
 
     script_kind = "a whole number above 0, of steps, or time(T)"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> int | ByTime:
-        """Read the interval from an argument."""
         match = _BY_TIME.fullmatch(argument.text)
         if not match:
             return _STEPS.convert(hub, argument)
@@ -66,16 +63,15 @@ class Every:
 
 
 def is_due(every: int | ByTime, step: int, time: float) -> bool:
-    """Tell whether the present state is to be written."""
     if isinstance(every, ByTime):
         return every.now(time) > every.passed
     return step % every == 0
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """Find the first step after `step` that may be due.
+    """First step after `step` that may be due.
 
-    Unless `fixed`, the step may grow, so half of a longer distance is taken at a time.
+    Unless `fixed`, the step may grow: half of a longer distance at a time.
     """
     if not isinstance(every, ByTime):
         return (step // every + 1) * every

@@ -1,4 +1,4 @@
-"""Schedule of output: the log, dumps and plots."""
+"""Schedule of output: log, dumps, plots."""
 
 import os
 import re
@@ -18,11 +18,11 @@ RESTART = "restart"
 
 
 class Output:
-    """Write log, dumps and plots when they are due.
+    """Writes log, dumps and plots when due.
 
     Each is due at the first and last state of every run and at multiples of its `every`, in
-    absolute steps or time, so that further runs continue the sequence. No state is written twice to
-    one file. In a rehearsal nothing is written.
+    absolute steps or time: further runs continue the sequence. No state is written twice to a file.
+    Nothing is written in a rehearsal.
     """
 
     def __init__(self, hub: Scene):
@@ -32,36 +32,36 @@ class Output:
         self.units: Units | None = None
         # False if a program reads the log and no file is requested.
         self.writes = True
-        # Written last, after everything else of the same state.
+        # Written after everything else of a state.
         self.last: list[Rhythmic] = []
-        # Live pages that are being watched.
+        # Live pages being watched.
         self.pages: list[Rhythmic] = []
-        # The writer of each file.
+        # Writer by file.
         self.files: dict[Path, str] = {}
 
     @property
     def takes_part(self) -> bool:
-        """Tell whether this process takes part in writing dumps."""
+        """Whether this process takes part in writing dumps."""
         return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:
-        """Refuse to write to `file` if it is the log, a script, or not writable."""
+        """Refuse to write to the log, a script or an unwritable file."""
         path = self.hub.folder / file
         scripts = getattr(self.hub.interpreter, "files", ())
         if _may_be(path, self.log.path):
-            what = f"{file} is the log"
+            error = f"{file} is the log"
         elif any(_may_be(path, script) for script in scripts):
-            what = f"{file} is the script itself"
+            error = f"{file} is the script itself"
         elif path.exists() and not os.access(path, os.W_OK):
-            what = f"{file} is there and cannot be overwritten"
+            error = f"{file} is there and cannot be overwritten"
         elif not path.exists() and path.parent.is_dir() and not os.access(path.parent, os.W_OK):
-            what = f"nothing can be written to the folder {path.parent}"
+            error = f"nothing can be written to the folder {path.parent}"
         else:
             return
-        raise ScriptError(what, argument="file", expected="the name of another file")
+        raise ScriptError(error, argument="file", expected="the name of another file")
 
     def claim(self, file: Path, writer: str) -> None:
-        """Reserve `file` for one writer, such as a dump; only restart files may be overwritten."""
+        """Reserve `file` for one writer; only restart files may be overwritten."""
         other = self.files.get(file)
         if other is not None and not other == writer == RESTART:
             raise ScriptError(
@@ -72,7 +72,7 @@ class Output:
         self.files[file] = writer
 
     def begin(self, *, within: bool = False) -> None:
-        """Write headers and the first state of a run, unless it continues `within` a run."""
+        """Write headers, and the first state unless the run continues `within` another."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not self.plots:
@@ -86,7 +86,7 @@ class Output:
             self.write(last=True)
 
     def next_step(self, step: int) -> int:
-        """Find the first step after `step` at which output is due."""
+        """First step after `step` at which output is due."""
         update = self.hub.update
         fixed = update.fixed_dt is not None
         return min(
@@ -94,7 +94,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write everything due at this step; with `last`, everything not yet written."""
+        """Write what is due; with `last`, everything not yet written."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time
@@ -104,7 +104,7 @@ class Output:
             if i.last_step != step and (last or is_due(i.every, step, time))
         ]
         if any(item is self.log or item in self.plots.values() for item in due):
-            # Computes and energy fixes work only when their values are needed.
+            # Computes and energy fixes work only when needed.
             self.hub.refresh_values()
         for item in due:
             self._do(item, "write")
@@ -113,14 +113,13 @@ class Output:
                 item.every.passed = item.every.now(time)
 
     def write_last(self) -> None:
-        """Write the items in `last`."""
         for item in self.last if self.takes_part else ():
             if item.last_step != self.hub.update.step:
                 self._do(item, "write")
                 item.last_step = self.hub.update.step
 
     def end(self, last: bool = True) -> None:
-        """Write the last state of a run (unless `last` is false), and complete plots and dumps."""
+        """Write the last state (if `last`), and complete plots and dumps."""
         if self.hub.rehearsing:
             return
         if last:
@@ -129,9 +128,9 @@ class Output:
             self._do(item, "finish")
 
     def abort(self) -> None:
-        """Draw plots, complete dumps and close the log of an aborted run.
+        """Complete plots, dumps and log of an aborted run, without a further state.
 
-        Writes no further state. Errors become warnings.
+        Errors become warnings.
         """
         if self.hub.rehearsing:
             return
@@ -148,7 +147,7 @@ class Output:
         return [self.plots, *self.hub.dumps.values()] if self.writes else []
 
     def _do(self, item: Any, what: str) -> None:
-        """Write or finish an item; errors point to the command that defined it."""
+        """Write or finish an item; errors point to its command."""
         style = getattr(item, "style", "")
         if not self.hub.settings.comm.leads:
             what = "take_part" if hasattr(item, "take_part") else what

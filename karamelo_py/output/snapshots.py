@@ -1,4 +1,4 @@
-"""Readers of particle dumps: LAMMPS text (gzipped or not), HDF5, VTU."""
+"""Readers of particle dumps: LAMMPS text (or gzipped), HDF5, VTU."""
 
 import gzip
 import re
@@ -16,25 +16,23 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Snapshot(NamedTuple):
-    """The points at one time."""
-
     step: int
-    time: float  # NaN if the file does not give it
-    columns: dict[str, np.ndarray]  # (n,) by name, including x, y and z
-    lo: np.ndarray  # (3,) corners of the domain, or bounds of the points if the file has none
+    time: float  # NaN if unknown
+    columns: dict[str, np.ndarray]  # (n,) by name, with x, y, z
+    lo: np.ndarray  # (3,) corners of the domain, or bounds of the points
     hi: np.ndarray
-    units: Mapping[str, str] = {}  # by column, and of time, if the file gives them
+    units: Mapping[str, str] = {}  # by column, and of time
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Yield the snapshots in a file from the `first` on; raise an error if it is not a dump."""
+    """Yield snapshots from the `first` on; ScriptError if the file is no dump."""
     reader = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}.get(path.suffix, _lammps)
     if path.exists() and not path.is_file():
-        what = "a folder" if path.is_dir() else "a pipe or a device"
-        raise ScriptError(f"{path} is {what}", expected="a file of dump particle, hdf5 or vtk")
+        kind = "a folder" if path.is_dir() else "a pipe or a device"
+        raise ScriptError(f"{path} is {kind}", expected="a file of dump particle, hdf5 or vtk")
     try:
         yield from reader(path, first)
-    except Exception as error:  # readers raise many kinds of errors for damaged files
+    except Exception as error:  # of many kinds, for damaged files
         reason = getattr(error, "strerror", None)
         raise ScriptError(
             f"{path} cannot be read: {reason}"
@@ -84,8 +82,8 @@ def _hdf5(path: Path, first: int) -> Iterator[Snapshot]:
         for k, (step, time) in enumerate(moments, first):
             columns = {name: root[name][k] for name in names}
             columns |= {name: root[name][:] for name in ("id", "type")}
-            there = ~np.isnan(columns["x"])
-            columns = {name: column[there] for name, column in columns.items()}
+            exists = ~np.isnan(columns["x"])
+            columns = {name: column[exists] for name, column in columns.items()}
             yield Snapshot(int(step), float(time), columns, *root.attrs["domain"], units)
 
 

@@ -1,4 +1,4 @@
-"""Names of the units of a scene, for labels."""
+"""Units of a scene, for labels."""
 
 import re
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 
 
 
 class Powers(NamedTuple):
-    """Powers of length, mass, time and temperature in a quantity."""
+    """Powers of length, mass, time and temperature."""
 
     length: int = 0
     mass: int = 0
@@ -45,7 +45,7 @@ COLUMNS = {
     r"T": Powers(0, 0, 0, 1),
     r"time|dt": Powers(0, 0, 1),
 }
-# Values published by fixes and computes, by style.
+# Values of fixes and computes, by style.
 STYLES = {
     "kinetic_energy": ENERGY,
     "strain_energy": ENERGY,
@@ -61,7 +61,7 @@ STYLES = {
 
 
 class Units(NamedTuple):
-    """The units of a scene, by name."""
+    """Units by name."""
 
     length: str
     mass: str
@@ -72,12 +72,12 @@ class Units(NamedTuple):
         return " ".join(self)
 
     def si(self, powers: Powers) -> float:
-        """Return the size of the unit of a mechanical quantity in SI units."""
+        """SI value of the unit of a mechanical quantity."""
         si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
         return si * TIMES[self.time] ** powers.time
 
     def name(self, powers: Powers) -> str:
-        """Name the unit of a quantity: MPa if it has a name, else a product such as mm/ms."""
+        """Unit with a name (MPa), else a product (mm/ms)."""
         if powers in NAMED:
             order = log10(self.si(powers))
             if isclose(order, round(order), abs_tol=1e-9) and round(order) in PREFIXES:
@@ -87,19 +87,19 @@ class Units(NamedTuple):
             for unit, power in zip(self, powers, strict=True)
             if power
         ]
-        above = " ".join(part for part, power in parts if power > 0)
-        below = " ".join(part for part, power in parts if power < 0)
+        above = " ".join(factor for factor, power in parts if power > 0)
+        below = " ".join(factor for factor, power in parts if power < 0)
         if not below:
             return above
         return f"{above or 1}/{f'({below})' if ' ' in below else below}"
 
     def of_column(self, name: str) -> str:
-        """Name the unit of a dump column; empty if it has none."""
+        """Unit of a dump column, or ""."""
         powers = (powers for names, powers in COLUMNS.items() if re.fullmatch(names, name))
         return self.name(next(powers, Powers()))
 
     def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
-        """Name the unit of a log column, which may be a value of one of `parts`."""
+        """Unit of a log column, perhaps a value of one of `parts`."""
         for ID, part in parts.items():
             if name in (ID, *(f"{ID}_{end}" for end in part.published)):
                 return self.name(STYLES.get(part.style, Powers()))
@@ -107,5 +107,5 @@ class Units(NamedTuple):
 
 
 def labelled(name: str, unit: str) -> str:
-    """Format ``name (unit)``, or the name without a unit."""
+    """``name (unit)``, or name."""
     return f"{name} ({unit})" if unit else name

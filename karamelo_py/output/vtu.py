@@ -1,7 +1,7 @@
 """Unstructured grids in VTK's XML format, written in pieces (VTK File Formats, 2015).
 
-The file stores arrays one after another, but rows arrive with all columns: compressed blocks wait
-in unnamed temporary files until the last row.
+The file has one array after another, but rows arrive with all columns: compressed blocks wait in
+unnamed temporary files until the last row.
 """
 
 import sys
@@ -18,12 +18,12 @@ KINDS = {"vertex": 1, "line": 3, "quad": 9, "hexahedron": 12}
 TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
 BLOCK = 1 << 15  # bytes compressed together
 COMPRESSION = 4  # a third of the time of level 6, slightly larger files
-IN_MEMORY = 1 << 16  # bytes of an array that wait in memory
+IN_MEMORY = 1 << 16  # bytes of an array in memory
 PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in between
 
 
 class Column:
-    """The rows of one array, added in pieces."""
+    """Rows of one array, added in pieces."""
 
     def __init__(self, name: str, folder: Path):
         self.name = name
@@ -34,7 +34,7 @@ class Column:
         self._last = 0
 
     def add(self, rows: np.ndarray) -> None:
-        """Add rows (n,) or (n, components)."""
+        """(n,) or (n, components)."""
         components = f' NumberOfComponents="{rows.shape[1]}"' if rows.ndim == 2 else ""
         self._kind = f'type="{TYPES[rows.dtype]}" Name="{self.name}"{components}'
         self._rest += rows.tobytes()
@@ -64,9 +64,9 @@ class Column:
 
 
 class Vtu:
-    """A file of points with columns of these `names`, and of cells between them.
+    """Points with columns `names`, and cells between them.
 
-    The `folder` of temporary files needs as much room as the file.
+    Temporary files in `folder` need as much room as the file.
     """
 
     def __init__(self, names: Iterable[str], folder: Path):
@@ -76,14 +76,14 @@ class Vtu:
         self.counts = [0, 0]
 
     def add_points(self, x: np.ndarray, columns: Iterable[np.ndarray]) -> None:
-        """Add points at `x` (n, 3), with a row (n,) of each column."""
+        """Add points at `x` (n, 3), with rows (n,) of each column."""
         self.points.add(np.ascontiguousarray(x, float))
         for column, rows in zip(self.columns, columns, strict=True):
             column.add(rows)
         self.counts[0] += len(x)
 
     def add_cells(self, kind: str, corners: np.ndarray) -> None:
-        """Add cells of a kind between points (n, corners)."""
+        """Add cells between points (n, corners)."""
         count, each = corners.shape
         ends = each * np.arange(self.counts[1] + 1, self.counts[1] + count + 1, dtype=np.int64)
         arrays = corners.ravel(), ends, np.full(count, KINDS[kind], np.int64)
@@ -92,7 +92,6 @@ class Vtu:
         self.counts[1] += count
 
     def write(self, out: BinaryIO) -> None:
-        """Write the whole file."""
         points, cells = self.counts
         out.write(
             f'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="0.1" '

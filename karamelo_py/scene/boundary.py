@@ -1,4 +1,4 @@
-"""Edge of the domain: points that reach it stop the run, are deleted or are reflected."""
+"""Points at the edge of the domain stop the run, are deleted or are reflected."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def check(hub: Scene) -> None:
-    """Refuse combinations that do not work; called before every run."""
+    """Refuse unsupported combinations."""
     update = hub.update
     if update.boundary == "error":
         return
@@ -35,22 +35,22 @@ def check(hub: Scene) -> None:
 
 
 def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
-    """Delete the points that left the domain in a failed step, if the scene asks for it.
+    """Delete the points that left the domain in a failed step, if ``boundary(delete)``.
 
-    The run is then back at the start of the step. Which points leave depends on the state only, so
-    results do not depend on threads or on how a run is divided.
+    Restores the start of the step. The choice depends on the state only, not on threads or on how a
+    run is divided.
     """
     if hub.update.boundary != "delete":
         return False
     gone = simulation.leaving()
     if not len(gone):
         return False
-    step, first = simulation.step, simulation.present.all()
+    step, none_before = simulation.step, simulation.present.all()
     simulation.restore(snapshot)
     if step > simulation.step:
         simulation.advance(step - simulation.step)
     simulation.remove(gone)
-    if first:
+    if none_before:
         hub.warn(
             f"step {step + 1}, time {simulation.time:.6g}: {named(hub, gone[0])} "
             "leaves the domain and is deleted; more are only counted",
@@ -66,9 +66,8 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
 
 
 def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
-    """Delete points (by id, ascending); return their mass and energy.
-
-    The energy is kinetic, stored and dissipated; the balance counts it as negative work.
+    """Delete points (ids, ascending); return their mass and energy (kinetic + stored + dissipated),
+    negative work in the energy balance.
     """
     simulation = hub.simulation
     if len(ids) == np.count_nonzero(simulation.present):
@@ -81,7 +80,6 @@ def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
 
 
 def tell_of_bounces(hub: Scene, simulation: Any) -> None:
-    """Warn when the first points have been reflected."""
     if hub.update.boundary == "reflect" and not hub.update.warned_of_bounces and simulation.bounces:
         hub.update.warned_of_bounces = True
         hub.warn(
@@ -92,7 +90,6 @@ def tell_of_bounces(hub: Scene, simulation: Any) -> None:
 
 
 def counted(hub: Scene, simulation: Any) -> dict[str, int]:
-    """Return counts for the end of a run: deleted points or reflections."""
     deleted = int(np.count_nonzero(~simulation.present))
     if deleted or hub.update.boundary == "delete":
         return {"deleted points": deleted}

@@ -1,8 +1,8 @@
 """Clip the boxes of points at the edge of a region: volumes and centroids.
 
 `Region.depth` bounds the distance to the surface, so only boxes that the surface may cross are
-clipped. In them the surface is taken as a plane, fitted to the depth at the corners and the middle.
-If it is not plane, the box is halved, up to `HALVED` times.
+clipped. There the surface is a plane, fitted to the depth at the corners and the centre; a box
+whose surface is not plane is halved, up to `HALVED` times.
 """
 
 import itertools
@@ -13,42 +13,41 @@ import numpy as np
 
 from karamelo_py.scene.region import Region
 
-HALVED = 5  # times at most, along each direction
-PLANE = 0.01  # of a box: deviation of a surface from a plane
-EDGE = 0.05  # the same for a part of a box, which otherwise has a sharp edge
-SHEET = 0.01  # the same if the surface may belong to a thin sheet
-LEAST = 0.1  # of a box: smaller pieces are given to a neighbouring point
-NOTHING = 1e-9  # of a box: round-off
-# Of a box, in the smallest parts that are not plane: a corner in 2D or an edge in 3D has a third of
-# it; a sheet thinner than these parts has more, or it is most of its body.
+HALVED = 5  # per direction
+PLANE = 0.01  # deviation of a surface from a plane, relative to the box
+EDGE = 0.05  # same for a part of a box, whose edge would otherwise be sharp
+SHEET = 0.01  # same if the surface may belong to a thin sheet
+LEAST = 0.1  # of a box: smaller pieces are merged with a neighbour
+NOTHING = 1e-9  # round-off, relative to the box
+# Fraction of a box in the smallest parts that are not plane: 1/3 of it at a corner in 2D or an edge
+# in 3D. A sheet thinner than these parts has more, or they are most of its body.
 ROUGH = 0.025
 MOSTLY = 0.1
-FACE = 2  # parts per face of a box along each direction
-SLOPE = 1e-3  # relative to the largest: smaller slopes are zero (sums would lose their digits)
+FACE = 2  # parts of a face per direction
+SLOPE = 1e-3  # smaller slopes, relative to the largest, are zero: sums would lose their digits
 
 
 class Pieces(NamedTuple):
-    """Clipped boxes: their parts in a region whose surface passes through them."""
+    """Boxes that the surface crosses."""
 
-    number: np.ndarray  # (n,) of the boxes, ascending
-    middle: np.ndarray  # (n, d) centroid of the part
-    share: np.ndarray  # (n,) volume of the part, as a fraction of the box
-    # (m,) fraction of each box in parts that are not plane and too small to be halved.
+    number: np.ndarray  # (n,) box numbers, ascending
+    middle: np.ndarray  # (n, d) centroids
+    share: np.ndarray  # (n,) volume fractions of the box
+    # (m,) fraction of each box in smallest parts that are not plane.
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
-        """Return the smallest thickness resolved by boxes of this size; 0 if all of it is."""
+        """Smallest thickness resolved by boxes of this size; 0: all."""
         mostly = self.rough.sum() > MOSTLY * self.share.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Find the boxes of edge length `size` around `x` (n, d) that lie in a region, in part or
-    whole.
+    """Find the boxes of edge length `size` around `x` (n, d) that lie in a region or cross its
+    edge.
 
-    Boxes are numbered from `first`. Returns the mask of boxes, and the pieces of those at the edge.
-    The domain clips, too. Boxes end at the region's bounding box, so that faces along the axes are
-    exact.
+    Returns the mask of boxes, numbered from `first`, and the pieces at the edge. The domain clips,
+    too. Boxes end at the region's bounding box, so that faces along the axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -75,24 +74,23 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger piece in a neighbouring box, if there is one.
+    """Merge small pieces into the nearest larger piece in an adjacent box, if there is one.
 
-    `boxes` are `Filled`, whose places are the middles of boxes. Merged pieces get the fraction 0;
-    whole boxes that take a piece are added.
+    Merged pieces get the fraction 0; whole boxes that receive a piece are added.
     """
     small = np.flatnonzero(pieces.share < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
     nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
-    # A piece leans to the side of its box beyond which there is more.
+    # The side of its box where the region continues.
     lean = np.where(middle > boxes.middles(pieces.number[small]), 1, -1)
     for step in np.array(list(itertools.product((0, 1), repeat=d))):
         number = boxes.beside(pieces.number[small], step * lean)
         row = np.minimum(np.searchsorted(pieces.number, number), len(pieces.number) - 1)
-        known = pieces.number[row] == number
-        large = known & (pieces.share[row] >= LEAST)
+        is_piece = pieces.number[row] == number
+        large = is_piece & (pieces.share[row] >= LEAST)
         at = pieces.middle[row]
-        other = np.flatnonzero(~known & (number >= 0))
+        other = np.flatnonzero(~is_piece & (number >= 0))
         at[other] = boxes.middles(number[other])
         large[other] = region.depth(at[other], region.domain.tolerance) > 0
         for k in range(d):
@@ -101,8 +99,8 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
         distance = np.sqrt(np.einsum("ni,ni->n", at, at))
         nearer = large & (distance < nearest * (1 - NOTHING))
         nearest[nearer], taker[nearer] = distance[nearer], number[nearer]
-    given = taker >= 0
-    small, taker = small[given], taker[given]
+    merged = taker >= 0
+    small, taker = small[merged], taker[merged]
     new = np.setdiff1d(taker, pieces.number)
     order = np.argsort(np.concatenate([pieces.number, new]), kind="stable")
     number = np.concatenate([pieces.number, new])[order]
@@ -121,15 +119,14 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
 def _measure(
     region: Region, lo: np.ndarray, edges: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Measure boxes clipped by a surface: fraction (n,) of the box and its moment (n, d).
-
-    Both as fractions of a whole box. Third, how much is rough; see `Pieces`.
+    """Return the volume fraction (n,) and moment (n, d) of boxes clipped by a surface, relative to
+    a whole box, and `Pieces.rough`.
     """
     n, d = lo.shape
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
     box = np.flatnonzero((edges > NOTHING * size).all(axis=1))
-    # Rows are contiguous, because regions read one direction after another.
+    # Regions read one direction after another: contiguous rows.
     lo, edges = lo[box].T, edges[box].T
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=d)))
     places = np.concatenate([corners, np.full((1, d), 0.5)])
@@ -148,7 +145,7 @@ def _measure(
         whole &= inmost >= (0.5 - NOTHING) * edges.min(axis=0)
         passed = (np.abs(inmost) < reach) & ~whole
         slopes[:, ~passed] = 0
-        # Where neither it nor its surroundings are seen, it may be a sheet.
+        # A surface that neither corners nor centre reveal may be a sheet.
         unseen = np.abs(np.sign(depth).sum(axis=0)) == len(depth)
         edge = np.where(unseen, SHEET, EDGE) * edges.max(axis=0)
         bent = passed & (off > (edge if halved == HALVED else np.minimum(edge, PLANE * size)))
@@ -156,7 +153,7 @@ def _measure(
         if halved == HALVED:
             rough = np.bincount(box[bent], volume[bent])
             bent[:] = False
-        # Simpson's rule for the mean over slightly curved boxes.
+        # Simpson's rule for the mean.
         done = ~bent
         share, middle = _plane((mean + 2 * inmost)[done] / 3, slopes[:, done])
         share *= volume[done]
@@ -171,21 +168,22 @@ def _measure(
 
 
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Measure the surface of `region` in boxes of edge length `size` around `x` (n, d).
+    """Return area times outward normal (n, d) of a region's surface in boxes of edge `size` around
+    `x` (n, d), and positions (n, d) on the surface.
 
-    Returns area times outward normal, (n, d), and a position on the surface, (n, d). The vector is
-    the difference of the covered areas of opposite faces, so that its sum over boxes is exact.
+    The vector is the difference of the covered areas of opposite faces: its sum over boxes is
+    exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
     starts = np.array(list(itertools.product(range(FACE), repeat=d - 1)), float)
-    on_face = (starts[:, None, :] + ends) / FACE - 0.5  # corners of the parts
+    on_face = (starts[:, None, :] + ends) / FACE - 0.5
     area = np.empty((n, d))
     for k in range(d):
         covered = []
         for side in (-0.5, 0.5):
             at = x[:, None, None, :] + np.insert(on_face, k, side, axis=2) * size
-            # A face along the surface is not covered, for both of its boxes.
+            # A face along the surface is covered for neither of its boxes.
             depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
             depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
             slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)
@@ -197,10 +195,8 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Clip a unit cube by a linear function: fraction (n,) and centroid (d, n) of its positive
-    part.
-
-    The function is `mean` (n,) at the middle of the cube.
+    """Return fraction (n,) and centroid (d, n) of the part of a unit cube where a linear function,
+    `mean` (n,) at the centre, is positive.
     """
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
@@ -215,10 +211,10 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same for a function that decreases by `m` > 0 (d, n) along each edge.
+    """`_plane` for a function that decreases by `m` > 0 (d, n) along each edge.
 
-    The function is positive in a simplex at the lowest corner of the cube. The simplices at the
-    other corners, outside the cube, are subtracted and added in turn.
+    It is positive in a simplex at the lowest corner, minus or plus simplices at the other corners,
+    which lie outside the cube.
     """
     d = len(m)
     top = mean + m.sum(axis=0) / 2
@@ -226,9 +222,9 @@ def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     unit = 1 / (math.factorial(d) * m.prod(axis=0))
     for corner in itertools.product((0, 1), repeat=d):
         height = np.maximum(top - np.array(corner, float) @ m, 0)
-        part = (-1) ** sum(corner) * height**d * unit
-        share += part
+        volume = (-1) ** sum(corner) * height**d * unit
+        share += volume
         for k in range(d):
-            moment[k] += part * (corner[k] + height / ((d + 1) * m[k]))
+            moment[k] += volume * (corner[k] + height / ((d + 1) * m[k]))
     share = np.clip(share, 0, 1)
     return share, np.clip(moment / np.maximum(share, NOTHING), 0, 1)

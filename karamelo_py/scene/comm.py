@@ -1,4 +1,4 @@
-"""Communication between processes; here for one. :mod:`karamelo_py.run.mpi.comm` has several."""
+"""Communication between processes, here of one; :mod:`karamelo_py.run.mpi.comm` has several."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,31 +10,30 @@ from karamelo_py.script.errors import ScriptError
 
 
 class SerialComm:
-    """The interface of several processes, for one that has the whole scene.
+    """Communicator of a single process.
 
-    All processes execute the same Python statements, and call these methods collectively.
+    All processes execute the same Python statements; methods are collective.
     """
 
     rank, size = 0, 1
-    beside = 1  # processes on the cores of this one, including it
+    beside = 1  # processes on this one's cores, including it
     on_machine = 1  # processes on this machine
-    waited = 0.0  # seconds in steps spent waiting for others
-    failed_within = False  # an error occurred inside a collective operation
-    at_end = False  # all processes have reached the same final end of the run
+    waited = 0.0  # seconds of steps spent waiting
+    failed_within = False
+    at_end = False  # all processes have ended the run alike
 
     @property
     def leads(self) -> bool:
-        """Tell whether this is rank 0, which writes."""
         return self.rank == 0
 
     @property
     def share_here(self) -> float:
-        """Fraction of the scene on this machine."""
+        """Fraction of the scene."""
         return self.on_machine / self.size
 
     @contextmanager
     def joint(self) -> Iterator[None]:
-        """Record an error in a collective operation, in which the others would wait forever."""
+        """Record an error in a collective operation."""
         try:
             yield
         except BaseException:
@@ -42,32 +41,30 @@ class SerialComm:
             raise
 
     def barrier(self) -> None:
-        """Wait for all processes."""
+        pass
 
     def end_together(self) -> None:
-        """Wait for all processes at the end of a run, which each reports in the same words."""
+        """Wait at the end of a run, which all processes report alike."""
         self.barrier()
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Gather a word from each process (size,); None if one is late by `patience` seconds."""
+        """Gather a word (size,) of each process; None if one is late by `patience` seconds."""
         return np.array([word])
 
     def bcast(self, thing: Any = None) -> Any:
-        """Send an object of rank 0 to all."""
         return thing
 
     def gather(self, thing: Any) -> list | None:
-        """Gather an object from each process at rank 0; None elsewhere."""
+        """Objects of all processes at rank 0, else None."""
         return [thing]
 
     def allgather(self, thing: Any) -> list:
-        """Gather an object from each process at all."""
         return [thing]
 
-    def everyone(self, what: str, thing: Any) -> list:
-        """Gather an object from each process; all must pass the same `what`, else an error."""
-        asked, found = zip(*self.allgather((what, thing)), strict=True)
+    def everyone(self, request: str, thing: Any) -> list:
+        """Gather objects; raise ScriptError unless all processes ask for the same `what`."""
+        asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
                 f"a function in Python comes to {asked[0]} on one process, and to {other} on "
@@ -75,39 +72,38 @@ class SerialComm:
                 hint="points.total(terms) and nodes.total(terms) have to be asked for by all "
                 "processes, those without points too",
             )
-        return list(found)
+        return list(answers)
 
     def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
-        """Gather objects at rank 0, make an answer for each, and scatter the answers."""
-        found = self.gather(thing)
-        return self.scatter(None if found is None else make(found))
+        """Gather objects at rank 0, and scatter an answer for each."""
+        gathered = self.gather(thing)
+        return self.scatter(None if gathered is None else make(gathered))
 
-    def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
-        """Concatenate the numbers of all processes into `out` of rank 0."""
+    def gather_rows(self, rows: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        """Concatenate into `out` of rank 0."""
         assert out is not None
-        out[:] = own
+        out[:] = rows
 
     def scatter(self, things: Sequence | None) -> Any:
-        """Send an object of rank 0 to each process."""
         assert things is not None
         return things[0]
 
     def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
-        """Exchange objects with some processes, by rank; both sides must name each other."""
+        """Exchange objects by rank; both sides must name each other."""
         return {}
 
     def alltoall(self, numbers: np.ndarray) -> np.ndarray:
-        """Exchange a number (size,) with each process."""
+        """Exchange one number with each process, (size,)."""
         return numbers
 
     def allreduce(self, array: np.ndarray) -> np.ndarray:
-        """Sum integers over all processes; for integers the order does not matter."""
+        """Sum integers: any order gives equal bits."""
         return array
 
     def allreduce_max(self, array: np.ndarray) -> np.ndarray:
-        """Take the maximum of each number over all processes, in place."""
+        """In place."""
         return array
 
     def in_turn(self, act: Callable[[], None]) -> None:
-        """Let rank 0 act, then all others, which find what it has made."""
+        """Rank 0 acts first."""
         act()

@@ -1,4 +1,4 @@
-"""The domain: the bounding box of the scene and its background grid."""
+"""The domain: bounding box of the scene and its background grid."""
 
 from collections.abc import Sequence
 
@@ -11,16 +11,15 @@ from karamelo_py.script.errors import Place, ScriptError
 
 
 class Domain:
-    """A box with a grid of square cells that starts at its lower corner.
+    """A box with a grid of square cells from its lower corner.
 
-    The grid covers the box; if a side is not a multiple of `h`, it extends past the upper corner by
-    less than one cell. Corners `lo` and `hi` (3,) are 0 in unused directions. Without `h`, the
-    first solid sets the cell size (older scripts).
+    If a side is not a multiple of `h`, the grid extends past the upper corner by less than a cell.
+    `lo` and `hi` (3,) are 0 in unused directions. Without `h` the first solid sets the cell size.
     """
 
-    axisymmetric = False  # x is a radius and y the axis
-    thin = False  # no stress across the body: plane stress, or uniaxial stress in 1D
-    thickness = 1.0  # of the body in 2D, its cross-section in 1D
+    axisymmetric = False  # x is the radius, y the axis
+    thin = False  # plane stress, or uniaxial stress in 1D
+    thickness = 1.0  # in 2D; cross-section in 1D
     place: Place | None = None
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
@@ -32,7 +31,6 @@ class Domain:
             self.set_cell_size(h)
 
     def set_cell_size(self, h: float) -> None:
-        """Set the cell size; raise ScriptError if there would be too many nodes."""
         self.lattice = Lattice(self.dimension, self.lo, self.hi, h)
         self.h = self.lattice.h
 
@@ -43,14 +41,11 @@ class Domain:
         return RELATIVE_TOLERANCE * size
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Extent of the body out of its plane at positions `x` (n, d): the radius, or a thickness.
-
-        Volumes and areas in 2D and 1D have it as a factor. Radii are per radian.
-        """
+        """Out-of-plane factor of volumes at `x` (n, d): radius (per radian) or thickness."""
         return x[:, 0].astype(float) if self.axisymmetric else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions `x` (n, >= dimension) lie in the closed box: (n,) bool."""
+        """Test which `x` (n, >= dimension) lie in the closed box: (n,) bool."""
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
             inside &= x[:, axis] >= self.lo[axis] - self.tolerance
@@ -59,7 +54,7 @@ class Domain:
 
 
 def _around(hub: Scene, dimension: int) -> str | None:
-    """Suggest a domain around the block or cylinder of the present statement."""
+    """Suggest a domain around the block or cylinder of the current statement."""
     _, *words = words_of(hub.interpreter.statement) or [""]
     if words[:1] == ["block"]:
         ends = words[1 : 1 + 2 * dimension]
@@ -77,7 +72,6 @@ def _around(hub: Scene, dimension: int) -> str | None:
 
 
 def require_domain(hub: Scene) -> Domain:
-    """Return the domain; raise ScriptError if there is none yet."""
     if hub.domain is None:
         if announced := hub.announced_dimension:
             ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
@@ -97,7 +91,6 @@ def require_domain(hub: Scene) -> Domain:
 
 
 def require_grid(hub: Scene) -> Domain:
-    """Return the domain; raise ScriptError if it has no grid yet."""
     domain = require_domain(hub)
     if domain.h is None:
         raise ScriptError(

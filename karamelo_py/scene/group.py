@@ -1,4 +1,4 @@
-"""Groups of points or nodes, on which fixes, computes and dumps act."""
+"""Groups of points or nodes for fixes, computes and dumps."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -19,12 +19,11 @@ NOTHING_THERE = "what acts on this group does nothing there"
 
 
 class AnyGroup(Named):
-    """A group of points or of nodes, for annotations; `all` includes those made later.
+    """A group of points or nodes; `all` includes later ones.
 
     Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members of
-    groups other than `all`; and ``add(region, solids)``, which adds what lies in a region and
-    belongs to some solids (None: any), and returns the number found (0 for a region that is not
-    known yet).
+    other groups than `all`; and ``add(region, solids)``, which adds the points or nodes of these
+    solids (None: any) in a region and returns their number (0 if the region is not known yet).
     """
 
     kind = ""
@@ -42,7 +41,7 @@ class AnyGroup(Named):
 
     @property
     def members(self) -> np.ndarray:
-        """Numbers (from 0) of the members, ascending: (n,) int64."""
+        """Member numbers from 0, ascending: (n,) int64."""
         return np.arange(self.total(), dtype=np.int64) if self.all else self.chosen()
 
     total: Callable[[], int]
@@ -51,7 +50,7 @@ class AnyGroup(Named):
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """Find the group that `argument` names; ``all`` is every node, or every point."""
+        """``all`` is every node or point."""
         if ALL in (argument.text, argument.word()):
             return (ParticleGroup if cls is AnyGroup else cls)(hub, everything=True)
         try:
@@ -71,16 +70,15 @@ class AnyGroup(Named):
 
 
 class ParticleGroup(AnyGroup):
-    """A set of points, chosen by their reference positions when they are added."""
+    """Points, chosen by their reference positions when they are added."""
 
     kind = "particles"
     script_kind = "a group of points, or all"
-    # Membership of each point, one bit each from the lowest of a byte on, and 64 spare bits.
+    # Membership, one bit per point from the lowest of a byte on, and 64 spare bits.
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
     def of(cls, hub: Scene, solid: Solid) -> "ParticleGroup":
-        """The points of a solid."""
         group = cls(hub)
         group.id = solid.id
         group._take(_numbers_of(solid))
@@ -89,59 +87,53 @@ class ParticleGroup(AnyGroup):
     def __len__(self) -> int:
         return sum(map(len, self.pieces()))
 
-    ids = AnyGroup.members  # id - 1 of the points
+    ids = AnyGroup.members  # id - 1
 
     def total(self) -> int:
-        """Number of points of all solids."""
         return sum(solid.count for solid in self.hub.solids.values())
 
     def chosen(self) -> np.ndarray:
-        """Members of a group other than `all`."""
         return np.concatenate([np.empty(0, np.int64), *self.pieces()])
 
     def pieces(self) -> Iterator[np.ndarray]:
-        """Yield the numbers of the members in pieces, ascending."""
         for solid in self.hub.solids.values():
             for ids in _numbers_of(solid):
                 yield ids[self.has(ids)]
 
     def has(self, ids: np.ndarray) -> np.ndarray:
-        """(n,) whether points, by number, are members."""
+        """(n,) bool, of points by number."""
         if self.all:
             return np.ones(len(ids), np.bool_)
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)
 
     def touches(self, solid: Solid) -> bool:
-        """Tell whether points of a solid are members."""
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Return the membership of `count` points, one bit each, in bytes of whole words."""
+        """Membership of `count` points, one bit each, as bytes of whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
-        found = np.zeros(size, np.uint8)
-        own = self._bits[:size]
-        found[: len(own)] = own
-        return found
+        whole = np.zeros(size, np.uint8)
+        stored = self._bits[:size]
+        whole[: len(stored)] = stored
+        return whole
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add the points in a region, see `AnyGroup`."""
         return self._take(self._found(region, solids))
 
     def add_numbers(self, ids: np.ndarray) -> None:
-        """Add points by ascending numbers."""
+        """Add ascending numbers."""
         self._take([ids])
 
     def _take(self, pieces: Iterable[np.ndarray]) -> int:
-        """Add points, in ascending pieces; return their number."""
         bits, count = self.bits(self.total() + 64), 0
         for ids in pieces:
             if len(ids):
-                own = bits[ids[0] >> 3 : (ids[-1] >> 3) + 1]
-                members = np.unpackbits(own, bitorder="little")
+                span = bits[ids[0] >> 3 : (ids[-1] >> 3) + 1]
+                members = np.unpackbits(span, bitorder="little")
                 members[ids - (ids[0] & ~7)] = 1
-                own[:] = np.packbits(members, bitorder="little")
+                span[:] = np.packbits(members, bitorder="little")
                 count += len(ids)
         self._bits = bits
         return count
@@ -157,22 +149,21 @@ class ParticleGroup(AnyGroup):
 
 
 def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
-    """Yield the numbers of the points of a solid in pieces."""
     end = solid.first_id + solid.count
     for first in range(solid.first_id, end, CHUNK):
         yield np.arange(first, min(first + CHUNK, end))
 
 
 class NodeGroup(AnyGroup):
-    """A set of nodes, by position.
+    """Nodes by position.
 
-    It is stored as its definition, because later solids and methods may add grids, whose nodes in
-    the region belong to it, too. The method decides whether solids have separate grids.
+    Stored as a definition: solids and methods may add grids later, whose nodes in the region are
+    members, too.
     """
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
-    awaits_solids = False  # later solids may add the first members
+    awaits_solids = False  # later solids may add members
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         super().__init__(hub, everything=everything)
@@ -182,28 +173,25 @@ class NodeGroup(AnyGroup):
     nodes = AnyGroup.members
 
     def total(self) -> int:
-        """Number of nodes of all grids."""
         require_grid(self.hub)
         return sum(lattice.node_count for lattice in self.hub.lattices)
 
     def chosen(self) -> np.ndarray:
-        """Members of a group other than `all`; found again when the grids change."""
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
-            found = [numbers for part in self.parts if len(numbers := self._find(*part))]
-            # Each is ascending already; sorting millions would be a waste.
-            members = [np.unique(np.concatenate(found))] if len(found) > 1 else found
+            pieces = [numbers for part in self.parts if len(numbers := self._find(*part))]
+            # Each is ascending; sorting millions would be a waste.
+            members = [np.unique(np.concatenate(pieces))] if len(pieces) > 1 else pieces
             self._found = lattices, (members or [np.empty(0, np.int64)])[0]
         return self._found[1]
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        """Add the nodes in a region, see `AnyGroup`."""
         self.parts = (*self.parts, (region, solids))
         self._found = None
         return len(self._find(region, solids))
 
     def warn_past_domain(self) -> None:
-        """Warn if the group is meant as a wall at an upper edge but lies past the domain."""
+        """Warn if the group looks like a wall at an upper edge but lies past it."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return
@@ -222,7 +210,7 @@ class NodeGroup(AnyGroup):
                 )
 
     def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
-        """Nodes in `region`; if solids have separate grids, only on the grids of `solids`."""
+        """Nodes in `region`; with separate grids, only on the grids of `solids`."""
         if region.unknown:
             return np.empty(0, dtype=np.int64)
         require_grid(self.hub)
@@ -230,11 +218,11 @@ class NodeGroup(AnyGroup):
         if solids is not None and len(lattices) > 1:
             wanted = {method.lattice_of(self.hub, solid) for solid in solids}
             lattices = [lattices[k] for k in sorted(wanted)]
-        found = [np.empty(0, dtype=np.int64)]
+        pieces = [np.empty(0, dtype=np.int64)]
         for lattice in lattices:
             for number, x in lattice.between(region.box_lo, region.box_hi):
-                found.append(number[region.inside(x)])
-        return np.concatenate(found)
+                pieces.append(number[region.inside(x)])
+        return np.concatenate(pieces)
 
 
 KINDS: dict[str, type[AnyGroup]] = {kind.kind: kind for kind in (ParticleGroup, NodeGroup)}

@@ -1,4 +1,4 @@
-"""The hub (Karamelo's Pointers): state of the scene that commands and styles can access."""
+"""The hub (Karamelo's Pointers): the state of a scene, for commands and styles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts of a scene, in creation order; items have an ``id`` and a ``place``."""
+    """Named parts of a scene in creation order, with ``id`` and ``place``."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -31,7 +31,6 @@ class Catalogue(dict):
         self.hub = hub
 
     def add(self, ID: str, item: Any, *, replace: bool = False) -> Any:
-        """Add `item` under `ID`; an ID already in use is an error unless `replace`."""
         if not replace:
             self.refuse(ID)
         item.id, item.place = ID, self.hub.place
@@ -39,7 +38,6 @@ class Catalogue(dict):
         return item
 
     def refuse(self, ID: str) -> None:
-        """Raise ScriptError if an ID is in use."""
         if ID in self:
             before = self[ID].place
             where = f" (line {before.line})" if before else ""
@@ -52,10 +50,10 @@ class Catalogue(dict):
             )
 
     def __missing__(self, ID: str) -> Any:
-        known = [*["all"] * (self.kind == "group"), *self]
+        names = [*["all"] * (self.kind == "group"), *self]
         other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
         below = line_below(self.hub.interpreter, self.kind, ID)
-        hint = meant(ID, known)
+        hint = meant(ID, names)
         if self.kind == "group" and other in ("region", "solid"):
             who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
             hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"
@@ -66,18 +64,17 @@ class Catalogue(dict):
             code="unknown-ID",
             name=ID,
             kind=self.kind,
-            expected=f"one of {', '.join(known)}" if known else f"no {self.kind} is defined yet",
+            expected=f"one of {', '.join(names)}" if names else f"no {self.kind} is defined yet",
             hint=hint,
         )
 
     def remove(self, ID: str) -> None:
-        """Remove `ID`; raise ScriptError if it is unknown."""
         self[ID]
         del self[ID]
 
 
 class Parts(dict):
-    """Catalogues of parts of laws by kind, made on request for kinds of plug-ins."""
+    """Catalogues of parts of laws by kind; kinds of plug-ins are made on request."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -91,75 +88,69 @@ PARTS = ("eos", "strength", "damage", "temperature")
 
 
 class Settings:
-    """Settings of the command line or the script: threads, precision, processes."""
-
     def __init__(self) -> None:
         self.threads: int | None = None
         self.precision = "double"
         self.engine = "processor"
-        self.card: Any = None  # the GPU, with --gpu
-        self.ranks = 1  # number of processes requested
-        self.comm = SerialComm()  # communicator of the processes
+        self.card: Any = None  # the GPU
+        self.ranks = 1  # processes requested
+        self.comm = SerialComm()
         self.debug = False
         self.trusts = False  # .geo files may run programs
 
 
 class Update:
-    """Choices of method, scheme, set_dt and dt_factor, and the clock."""
+    """Method, scheme, time step and clock."""
 
     remembers = ("warned_of_bounces", "warned_of")
 
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
-        self.transfer: Any = None  # a NamedTuple: PIC, FLIP, APIC ...
+        self.transfer: Any = None  # NamedTuple: PIC, FLIP, APIC ...
         self.scheme: Any = MUSL()
-        self.scheme_place: Place | None = None  # in the script, like the others below
-        self.scheme_behind = 0  # number of runs before it was chosen
-        self.thermal = False  # heat is conducted between points
+        self.scheme_place: Place | None = None
+        self.scheme_behind = 0  # runs before it was chosen
+        self.thermal = False  # heat conduction
         self.anti_locking = False  # F-bar
-        self.half_start = False  # whether the first kick lasts half a step
-        self.fixed_dt: float | None = None  # from set_dt; None: follows the fastest point
-        self.dt_factor: float | None = None  # of the stable step; None: chosen by the program
+        self.half_start = False  # the first kick lasts half a step
+        self.fixed_dt: float | None = None  # set_dt; None: adaptive
+        self.dt_factor: float | None = None  # of the stable step; None: automatic
         self.dt_place: Place | None = None
-        self.boundary = "error"  # or delete or reflect, for points that reach the edge
+        self.boundary = "error"  # or delete, reflect
         self.boundary_place: Place | None = None
-        self.warned_of_bounces = False  # the user has been warned of reflected points
-        self.warned_of: list[str] = []  # known failures that the user has been warned of
+        self.warned_of_bounces = False
+        self.warned_of: list[str] = []  # known failures already reported
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and its start
 
     def first_time(self, name: str) -> bool:
-        """Note a warning by name; return False if it has been given before."""
+        """Return False if the warning `name` was given before."""
         first = name not in self.warned_of
         self.warned_of += [name] * first
         return first
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        """Fields of points that persist between steps."""
         return (VelocityBefore,) if self.half_start else ()
 
     @property
     def words(self) -> str:
-        """Method, transfer, basis and scheme, in words of the script."""
         scheme = _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme)
         return f"{self.words_of_state} {scheme}" + " thermo-mechanical" * self.thermal
 
     @property
     def words_of_state(self) -> str:
-        """Method, transfer and basis; any scheme can continue such a state."""
+        """`words` without the scheme: any scheme can continue such a state."""
         method = registry.name_of("method", type(self.method))
         transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
         return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
 
     @property
     def step(self) -> int:
-        """Number of steps taken."""
         return int(self.values.get("timestep"))
 
     @property
     def time(self) -> float:
-        """Present time."""
         return self.values.get("time")
 
     @property
@@ -168,7 +159,7 @@ class Update:
         return self.values.get("dt")
 
     def transfer_tag(self, real: type) -> Any:
-        """The transfer with its numbers in the precision of the run."""
+        """Transfer with its numbers in the run's precision."""
         return type(self.transfer)(*(real(x) if isinstance(x, float) else x for x in self.transfer))
 
 
@@ -182,29 +173,27 @@ def _with_numbers(name: str, tag: NamedTuple) -> str:
 
 
 class Hub:
-    """The scene, its time integration and its output."""
-
     def __init__(self, console: Console | None = None):
         self.console = console or Console()
         self.settings = Settings()
         self.folder = Path.cwd()
-        self.place: Place | None = None  # of the present statement
-        # During a rehearsal nothing runs and nothing is written.
+        self.place: Place | None = None  # of the current statement
+        # Nothing runs and nothing is written in a rehearsal.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = 0  # number of runs, including a rehearsal's
-        self.answered = False  # the script has printed, written or ended something
+        self.begun = 0  # runs, including a rehearsal's
+        self.answered = False  # the script printed, wrote or ended something
         self.checking = False  # ``karamelo-py check``: the first run only reports
-        self.pausing = False  # the script stops before its runs, which a program controls
-        self.open_ended = False  # a program may continue after the end of the script
-        # Fixes, dumps and curves that act in some run, as far as the rehearsal got.
+        self.pausing = False  # stops before runs, which a program controls
+        self.open_ended = False  # a program may continue after the script
+        # Fixes, dumps and curves active in some run of the rehearsal.
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
-        self.restart: Any = None  # the restart state, until the script has rebuilt the scene
+        self.restart: Any = None  # until the script has rebuilt the scene
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
-        self.parts = Parts(self)  # parts of composed materials
+        self.parts = Parts(self)  # of composed materials
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -213,15 +202,15 @@ class Hub:
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()  # published by fixes and computes, and time, timestep, dt
+        self.values = Values()  # of fixes and computes; time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
-        self.functions: dict[str, Any] = {}  # in Python, that a program has given
-        self.in_run = 0  # the number of the run in progress, if there is one
-        self.listeners: list[Any] = []  # of runs (`run.listening.Listener`)
-        self._fits_run = 0  # the last one that found the arrays to fit the scene
-        self.runs: list[dict[str, float]] = []  # published values at the end of each so far
+        self.functions: dict[str, Any] = {}  # Python functions passed by a program
+        self.in_run = 0  # number of the active run, else 0
+        self.listeners: list[Any] = []  # `run.listening.Listener`
+        self._fits_run = 0  # last run whose arrays fit the scene
+        self.runs: list[dict[str, float]] = []  # published values at each end
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []  # times and messages, for live pages
         self.later: list[Any] = []  # `known_failures.Step` of later runs, from the rehearsal
@@ -230,23 +219,22 @@ class Hub:
 
     @property
     def catalogues(self) -> list[Catalogue]:
-        """All catalogues."""
         mine = [item for item in vars(self).values() if isinstance(item, Catalogue)]
         return [*self.parts.values(), *mine]
 
     @property
     def has_run(self) -> bool:
-        """True if a run has changed the state (in a rehearsal, will have)."""
+        """A run has changed the state (in a rehearsal: will have)."""
         return bool(self.begun or self.update.step)
 
     @property
     def simulation(self) -> Any:
-        """The arrays of the scene as it is now, made when first asked for; a run changes none."""
-        run, known = self.in_run, self._simulation
-        if known is not None and run and run == self._fits_run:
-            return known
+        """Arrays of the current scene, made on demand; a run changes none of its parts."""
+        run, current = self.in_run, self._simulation
+        if current is not None and run and run == self._fits_run:
+            return current
         self._fits_run = run
-        if known is None or not known.fits(self):
+        if current is None or not current.fits(self):
             engine = registry.find("engine", self.settings.engine)
             with attributed(self):
                 self._simulation = engine(self, self._simulation)
@@ -254,7 +242,7 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """The grids of the scene: of the method, or of the domain if there is no method yet.
+        """The grids of the method, or of the domain if there is no method yet.
 
         The list object changes only if the grids change.
         """
@@ -268,26 +256,25 @@ class Hub:
         return self.domain, self.domain.h, self.update.method, *self.solids.values()
 
     def forget_simulation(self) -> None:
-        """Discard arrays and grids after the points of a solid were replaced."""
         self._simulation = None
         self._lattices = None
 
     def refresh_values(self) -> None:
-        """Let computes and fixes measure the present state."""
+        """Publish values of the present state."""
         for catalogue in (self.computes, self.fixes):
             for item in catalogue.values():
                 name = f"{catalogue.kind} {item.style}"
                 with as_script_error(name, "refresh", type(item), item.place):
                     item.refresh()
                 if catalogue is self.computes and item.published and not item.has_published:
-                    item.has_published = True  # reported once
+                    item.has_published = True
                     self.warn(
                         f"{name} has measured and published nothing: "
                         f"{item.id}_{item.published[0]} is 0".replace("_ ", " "),
                         item.place,
                         hint="its author calls self.publish in refresh, or says published = ()",
                     )
-        # A compute of a plug-in may use random numbers: all processes use the values of rank 0.
+        # A compute of a plug-in may use random numbers: rank 0's values count.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
@@ -300,10 +287,7 @@ class Hub:
         code: str = "",
         cause: str = "",
     ) -> None:
-        """Warn the user, except during a rehearsal.
-
-        `code` names the kind of problem for programs, `cause` the likely cause.
-        """
+        """Warn the user, except in a rehearsal."""
         if not self.rehearsing:
             self.record.warn(message, hint, place or self.place, code, cause)
             text = render_message(
@@ -323,11 +307,9 @@ class Hub:
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:
-        """List fixes, dumps and curves, which act in runs."""
         return [*self.fixes.values(), *self.dumps.values(), *self.output.plots.values()]
 
     def _tell_of_late(self, rehearsed: Hub) -> None:
-        """Warn of parts that the script defines after its last run."""
         curve = next(iter(rehearsed.output.plots.values()), None)
         if curve is not None and rehearsed.output.plots.file is None and not self.open_ended:
             self.warn(
@@ -346,10 +328,10 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """A copy on which the rest of the script can be tried without side effects.
+        """Copy for trying the rest of the script without side effects.
 
-        Whatever commands may change is copied. Fixes, computes, regions and materials are the same
-        objects, because commands only make new ones.
+        Copies what commands may change; fixes, computes, regions and materials are shared, because
+        commands only make new ones.
         """
         other = copy.copy(self)
         other.rehearsing = True
@@ -377,7 +359,6 @@ class Hub:
         return other
 
     def _copy_bodies(self, real: Hub) -> None:
-        """Give a rehearsal a domain, solids and groups that it may change."""
         self.domain = copy.copy(real.domain)
         copies: dict[Any, Any] = {}
         for ID, solid in real.solids.items():
@@ -387,5 +368,5 @@ class Hub:
             mine = self.groups[ID] = copy.copy(group)
             mine.hub = self
         if real._lattices is not None:
-            # Unchanged grids are the same objects: groups of nodes remember their members.
+            # Unchanged grids stay the same objects, so that node groups need no new search.
             self._lattices = self._key_of_lattices, real._lattices[1]

@@ -1,4 +1,4 @@
-"""Lattices: the regular grids of a scene and the numbering of their nodes."""
+"""Lattices: the regular grids of a scene and their node numbers."""
 
 import itertools
 import math
@@ -10,24 +10,22 @@ import numpy as np
 from karamelo_py.points.grid import Grid
 from karamelo_py.script.errors import ScriptError
 
-# A point this far (in cells) past a face still counts as on it.
+# Points this far past a face (in cells) are on it.
 RELATIVE_TOLERANCE = 1e-9
 # Kernels pack node numbers into 32 bits.
 MAX_NODES = 2**31 - 1
-# Points or nodes processed at once: large enough for NumPy, small enough for caches and memory.
+# Points or nodes per batch: large enough for NumPy, small enough for caches and memory.
 CHUNK = 1 << 18
 
 
 class Lattice:
-    """A grid of square cells over a box, from its lower corner.
+    """A grid of square cells of size `h` from the lower corner of a box.
 
-    If a side of the box is not a multiple of `h`, the grid extends past the upper corner by less
-    than one cell.
-
-    Cells have the size `h`. `nodes_per_cell` is 1, or 2 with nodes at cell centres. Nodes are
-    numbered from `first`, cells from `first_cell`. There are at least `least_nodes` per direction;
-    those outside the box have no mass. `cells` and `shape` (3,) count cells and nodes, 1 in unused
-    directions. Raises ScriptError if there are more than `MAX_NODES` nodes.
+    It extends past the upper corner by less than a cell if a side is not a multiple of `h`.
+    `nodes_per_cell` is 1, or 2 with nodes at cell centres. Nodes are numbered from `first`, cells
+    from `first_cell`. Nodes added to reach `least_nodes` per direction have no mass. `cells` and
+    `shape` (3,) count cells and nodes, 1 in unused directions. Raises ScriptError for more than
+    `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -44,7 +42,7 @@ class Lattice:
         self.lo[:dimension], self.hi[:dimension] = lo[:dimension], hi[:dimension]
         self.h = float(h)
         self.nodes_per_cell = nodes_per_cell
-        self.first = self.first_cell = 0  # numbers of the first node and cell, see `numbered`
+        self.first = self.first_cell = 0  # see `numbered`
         lengths = (self.hi - self.lo)[:dimension]
         cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
         nodes = [max(n * nodes_per_cell + 1, least_nodes) for n in cells]
@@ -60,28 +58,28 @@ class Lattice:
 
     @property
     def spacing(self) -> float:
-        """Distance between nodes."""
+        """Between nodes."""
         return self.h / self.nodes_per_cell
 
     @property
     def node_count(self) -> int:
-        """Number of nodes."""
         return math.prod(self.shape)
 
     def places(self, numbers: np.ndarray) -> np.ndarray:
-        """Indices (n, 3) of nodes; node (i, j, k) has the number `first` + (i ny + j) nz + k."""
+        """Indices (n, 3) of nodes: node (i, j, k) has the number `first` + (i ny + j) nz + k."""
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
-        """Positions (n, 3) of nodes, by default of all."""
+        """(n, 3) of nodes, by default of all."""
         if numbers is None:
             numbers = self.first + np.arange(self.node_count)
         return self.lo + self.places(numbers) * self.spacing
 
     def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield the nodes in a box in chunks: numbers (m,) and positions (m, dimension).
+        """Yield numbers (m,) and positions (m, dimension) of the nodes in a box, in ascending
+        chunks.
 
-        `lo` and `hi` (3,) may be infinite. Nodes come in the order of their numbers.
+        `lo` and `hi` (3,) may be infinite.
         """
         used = slice(self.dimension)
         corner, shape = self.lo[used], self.shape[used]
@@ -96,7 +94,7 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Cell indices (n, dimension) of positions; outside the grid, of the nearest cell."""
+        """Cell indices (n, dimension) of positions; outside the grid, the nearest cell."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
@@ -111,7 +109,7 @@ class Lattice:
         return np.array([self.first + np.ravel_multi_index(tuple(p.T), shape) for p in places])
 
     def numbers(self, real: type) -> Grid:
-        """The lattice as kernels read it, in the precision `real`."""
+        """Grid of kernels, in the precision `real`."""
         size = (self.hi - self.lo) / self.h
         reach = float(np.abs([self.lo, self.hi]).max()) / self.h
         _, ny, nz = self.shape
@@ -129,14 +127,14 @@ class Lattice:
 
 
 def table(lattices: Sequence[Lattice], real: type) -> Grid:
-    """All lattices as kernels read them: a Grid with an array for each number."""
+    """Grid of arrays, for kernels."""
     rows = [lattice.numbers(real) for lattice in lattices]
     columns: Any = (np.array(column) for column in zip(*rows, strict=True))
     return Grid(*columns)
 
 
 def numbered(lattices: Sequence[Any]) -> list[Lattice]:
-    """Number the nodes and cells of lattices consecutively."""
+    """Number nodes and cells consecutively."""
     first = first_cell = 0
     for lattice in lattices:
         lattice.first, lattice.first_cell = first, first_cell
@@ -150,23 +148,22 @@ def numbered(lattices: Sequence[Any]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Yield integer positions between `first` and `last` (inclusive), last axis fastest, in chunks.
+    """Yield int64 index arrays (m, d) from `first` to `last` (inclusive), last axis fastest.
 
-    Each chunk is an int64 array (m, d) with about CHUNK / `weight` rows, so that `weight` items
-    per position need a bounded amount of memory.
+    A chunk has about CHUNK / `weight` rows: `weight` items per index need bounded memory.
     """
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 
 
 def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple[int, int]]:
-    """Numbers of the first position of each chunk, and one past the last position."""
+    """Begin and end of each chunk."""
     total = math.prod(b - a + 1 for a, b in zip(first, last, strict=True))
     step = max(1, CHUNK // weight)
     return [(begin, min(begin + step, total)) for begin in range(0, total, step)]
 
 
 def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
-    """Positions with numbers from `start` to before `end`."""
+    """Indices of the numbers `start` to before `end`."""
     counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
     return np.stack(np.unravel_index(np.arange(start, end), counts), axis=1) + first

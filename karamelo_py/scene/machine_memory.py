@@ -16,11 +16,10 @@ except ImportError:  # Windows
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import ScriptError, render_message
 
-# Of all memory: reserved by the system, and released when needed.
+# Fraction of all memory that the system reserves and releases when needed.
 SLACK = 0.03
 
-# Files of control groups, versions 2 and 1: limit, usage, and what of the usage is droppable cache,
-# as memory.stat calls it.
+# Control group files, versions 2 and 1: limit, usage, and droppable cache in memory.stat.
 _OF_GROUPS = (
     ("memory.max", "memory.current", ("active_file", "inactive_file", "slab_reclaimable")),
     (
@@ -31,7 +30,7 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes that are free on a machine or in a job, and the total; swap included.
+    """Free and total bytes of a machine or a job, with swap.
 
     More than `free` may be available if the system does not report all it can release (ZFS caches);
     more than `whole` may not.
@@ -42,38 +41,36 @@ class MachineMemory(NamedTuple):
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Return available memory, including caches and swap; None if the system does not report it.
+    """Memory available, caches and swap included; None if the system does not report it.
 
     The least of the machine's memory, the limits of containers and batch jobs (cgroup, both
-    versions), and the limit of each of `processes` on this machine (ulimit -v). `root` is for
-    tests.
+    versions), and the limit of each of `processes` on this machine (ulimit -v).
     """
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # about numbers that are not needed
+        with warnings.catch_warnings(action="ignore"):  # about numbers not needed here
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
     left = machine.available + swap.free + SLACK * machine.total
-    found = [MachineMemory(left, machine.total + swap.total), *_of_groups(root, swap)]
+    limits = [MachineMemory(left, machine.total + swap.total), *_of_groups(root, swap)]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0] if resource else -1
     if limit >= 0:
         left = (1 + SLACK) * limit - psutil.Process().memory_info().vms
-        found.append(MachineMemory(processes * left, processes * limit))
-    return MachineMemory(*map(min, zip(*found, strict=True)))
+        limits.append(MachineMemory(processes * left, processes * limit))
+    return MachineMemory(*map(min, zip(*limits, strict=True)))
 
 
 def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
-    """Read the limits of the control groups of this process."""
-    found = []
+    limits = []
     for line in _lines(root / "proc/self/cgroup"):
         _, controllers, path = line.split(":", 2)
         if controllers and "memory" not in controllers.split(","):
             continue
         top = root / "sys/fs/cgroup" / ("memory" if controllers else "")
         limit_file, used_file, dropped = _OF_GROUPS[bool(controllers)]
-        # In a container the path may be the outer one; the limit is then at the top.
+        # A container may see the outer path; its limit is then at the top.
         inner = top / path.strip("/")
         for folder in (inner, *inner.parents[: len(inner.parts) - len(top.parts)]):
             limit, used = (_number(folder / name) for name in (limit_file, used_file))
@@ -85,40 +82,38 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
                 free, whole = min(free, most - out), min(whole, most)
             stat = dict(line.split(maxsplit=1) for line in _lines(folder / "memory.stat"))
             cached = sum(float(stat.get(name, 0)) for name in dropped)
-            found.append(MachineMemory((1 + SLACK) * limit - used + cached + free, limit + whole))
-    return found
+            limits.append(MachineMemory((1 + SLACK) * limit - used + cached + free, limit + whole))
+    return limits
 
 
 def _lines(path: Path) -> list[str]:
-    """Read the lines of a file; empty if there is no file."""
     with suppress(OSError):
         return path.read_text(encoding="utf-8").splitlines()
     return []
 
 
 def _number(path: Path) -> float | None:
-    """Read the number in a file; None if there is no file or no limit."""
     with suppress(OSError, ValueError):
         return float(path.read_text(encoding="utf-8"))
     return None
 
 
 def taken() -> int:
-    """Return the bytes of memory used by this process."""
+    """Bytes used by this process."""
     import psutil
 
     return psutil.Process().memory_info().rss
 
 
 def age() -> float:
-    """Return the age of this process in seconds."""
+    """Seconds since this process started."""
     import psutil
 
     return time.time() - psutil.Process().create_time()
 
 
 GIB = 2**30
-MANY = 20_000_000  # points, whose placement takes seconds
+MANY = 20_000_000  # points; placing more takes seconds
 
 
 def in_words(count: float) -> str:
@@ -129,25 +124,22 @@ def in_words(count: float) -> str:
 class Room(NamedTuple):
     """Memory for points in addition to `already` existing ones."""
 
-    whole: float  # bytes of memory for all points
-    of_one: int  # least bytes per point
+    whole: float  # bytes, for all points
+    of_one: int  # bytes, at least
     already: int
-    single: bool  # single precision
+    single: bool  # precision
     say: Callable[[str], None] = lambda text: None
 
     @property
     def most(self) -> float:
-        """Return how many more points fit."""
         return max(self.whole / self.of_one - self.already, 0.0)
 
     def tell(self, count: float) -> None:
-        """Report the placement of points, if it takes a while."""
         if count > MANY:
             words = f"some {count:.2g} points are placed, which take more than "
             self.say(render_message("note", f"{words}{in_words(count * self.of_one)} of memory"))
 
     def refused(self, count: float) -> ScriptError:
-        """Make the error for too many points."""
         need = in_words((count + self.already) * self.of_one)
         return ScriptError(
             f"the scene has some {count + self.already:.2g} points with these, which take more "
@@ -159,15 +151,15 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Return the room for points whose law has `state` numbers.
+    """Room for points whose law has `state` numbers.
 
-    A point has two positions, a velocity, a mass, the state and three integers. During a run the
-    last good state stores position, velocity and state again.
+    A point has two positions, a velocity, a mass, the state and three integers. The last good state
+    of a run stores position, velocity and state again.
     """
     settings = hub.settings
-    found, comm = machine_memory(settings.comm.on_machine), settings.comm
+    memory, comm = machine_memory(settings.comm.on_machine), settings.comm
     single = settings.precision == "single"
     numbers = 3 * dimension + 1 + state + (0 if hub.checking else 2 * dimension + state)
     of_one = (4 if single else 8) * numbers + 16
-    whole = inf if found is None else found.whole
+    whole = inf if memory is None else memory.whole
     return Room(whole / comm.share_here, of_one, already, single, hub.console.say)

@@ -1,4 +1,4 @@
-"""Materials and parts of materials that a script has named: entries of catalogues."""
+"""Named materials and parts of materials: entries of catalogues."""
 
 from typing import NamedTuple
 
@@ -10,8 +10,7 @@ from karamelo_py.points.laws.thin import Thin
 class MaterialPart(Named):
     """A named law or part of a law, of a `kind` such as ``eos`` and a `style`.
 
-    `made` is the return value of the style: the law, or `laws` by kind if it brings several.
-    `given` are the values of its arguments by name.
+    `made` is the law, or `laws` by kind if the style brings several; `given` are its arguments.
     """
 
     def __init__(
@@ -28,34 +27,30 @@ class MaterialPart(Named):
 
     @property
     def law(self) -> NamedTuple:
-        """The NamedTuple of parameters, whose class selects point functions (`points.laws`)."""
         return self.laws[self.kind]
 
 
 class Material(MaterialPart):
-    """A material."""
-
     script_kind = "the ID of a material"
     catalogue = "materials"
-    thin = False  # its bodies have no stress across
+    thin = False  # plane stress, or uniaxial stress in 1D
 
     @property
     def whole(self) -> NamedTuple:
-        """The law in three dimensions."""
+        """Law in 3D."""
         return self.laws[self.kind]
 
     @property
     def law(self) -> NamedTuple:
-        """The law of its points."""
         return Thin(self.whole) if self.thin else self.whole
 
     @property
     def words(self) -> str:
-        """ID, style, and the styles of its parts: ``steel (eos-strength: linear, plastic)``."""
+        """``steel (eos-strength: linear, plastic)``: ID, style, styles of its parts."""
         styles = [
-            registry.name_of(kind, type(part))
-            for kind, part in zip(self.whole._fields, self.whole, strict=True)
-            if isinstance(part, tuple) and part and registry.names(kind)
+            registry.name_of(kind, type(law))
+            for kind, law in zip(self.whole._fields, self.whole, strict=True)
+            if isinstance(law, tuple) and law and registry.names(kind)
         ]
         parts = ", ".join(styles)
         return f"{self.id} ({self.style}{': ' if parts else ''}{parts})"

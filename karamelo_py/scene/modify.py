@@ -1,8 +1,8 @@
 """Base classes of fixes and computes (Modify in LAMMPS and Karamelo).
 
 A fix overrides hooks, named as in Karamelo; docs/plugins.md lists them. A hook is a method, called
-with a view of the group (Python runs at that stage of each step), or the result of
-:func:`node_hook`, :func:`point_hook` or :func:`vector_hook`, which is compiled into the loop.
+with a view of the group at that stage of each step, or a compiled hook made by :func:`node_hook`,
+:func:`point_hook` or :func:`vector_hook`.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 
-FIRST, USUAL, LAST = range(3)  # among the fixes that act at a stage, else as in the script
+FIRST, USUAL, LAST = range(3)  # at a stage; USUAL: as in the script
 FROM_PYTHON = 3e-4  # seconds per call of a Python hook, without its work
 
 
@@ -49,7 +49,7 @@ class Publisher:
     id: str = ""
     style: str = ""
     place: Place | None = None
-    # Suffixes of published values: "x" for ``ID_x`` and so on, "" for ``ID``.
+    # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
 
@@ -61,60 +61,59 @@ class Publisher:
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
     def publish_components(self, vector: np.ndarray) -> None:
-        """Publish up to three components as ID_x, ID_y, ID_z, if they are in `published`."""
+        """Publish ID_x, ID_y, ID_z, those in `published`."""
         for name, value in zip("xyz", vector, strict=False):
             if name in self.published:
                 self.publish(name, value)
 
     def publish_all(self, *values: float) -> None:
-        """Publish values in the order of `published`; missing ones are skipped."""
         for name, value in zip(self.published, values, strict=False):
             self.publish(name, value)
 
     def refresh(self) -> None:
-        """Update published values; called before output."""
+        """Called before output."""
 
 
 class Fix(Publisher):
-    """Base of all fixes: acts on its `group` during a run. Class attributes declare traits."""
+    """Base of fixes, which act on a `group` during a run. Class attributes are traits."""
 
-    group: Any = None  # of nodes or points
+    group: Any = None
     formulas: tuple = ()  # of compiled hooks: one or None per component
-    first_step_only = False  # acts only in the first step after its definition
-    # Its Python hooks treat each point or node separately and move none. They then get the local
-    # points in any order, before the first step in several calls. Sums need ``total``.
+    first_step_only = False  # only in the first step after its definition
+    # Python hooks treat each point or node separately and move none. They get the local points, in
+    # any order, before the first step in several calls. Sums need ``total``.
     point_by_point = False
-    for_method = False  # has no hooks: the method reads it
-    # Prescribes nodal velocities in ``post_update_grid_state``, in directions that have a formula;
-    # contact does not change them.
+    for_method = False  # read by the method; no hooks
+    # Prescribes nodal velocities in ``post_update_grid_state`` where there is a formula; contact
+    # does not change them.
     prescribes_velocity = False
-    # Directions in which it holds or bounds nodes. Cell faces with all nodes held are walls, at
-    # which splines are modified as at the ends of the grid.
+    # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
+    # are all held, as at the ends of the grid.
     held_directions: tuple[int, ...] = ()
-    # Formula of the friction coefficient of this wall, in directions without a formula; None for
-    # frictionless walls.
+    # Formula of the friction coefficient of this wall in directions without a formula; None:
+    # frictionless.
     wall_friction: Any = None
-    # Declared fields (`compiler.fields`): `Force` if it sets forces on points in
+    # Declared fields (`compiler.fields`); `Force` for forces on points set in
     # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    by_sizes = False  # takes the sizes of points from their volumes, and no thickness
+    by_sizes = False  # sizes of points follow from their volumes, without a thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
-    follows_points = False  # the force depends on positions of points, as for tools
-    depth_of: Any = None  # depth of positions in a tool, (n,), for outlines in pictures
-    faces_of: Any = None  # present faces of a tool that consists of faces, (m, d, d)
-    accelerates = False  # its formulas are forces per mass, such as gravity
+    follows_points = False  # force depends on positions of points (tools)
+    depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
+    faces_of: Any = None  # present faces (m, d, d) of a tool
+    accelerates = False  # formulas are forces per mass
     brakes = False  # dissipates energy
-    order = USUAL  # FIRST or LAST at each stage, wherever the script defines it
-    # Its Python hooks add no energy: they store, transfer or dissipate it. Otherwise the energy
-    # balance is not monitored.
+    order = USUAL  # FIRST or LAST at each stage, wherever it is defined
+    # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not
+    # monitored.
     conserves = False
-    # Calls ``between_steps()`` after steps that are multiples of this; it returns whether points
-    # were deleted. 0: never.
+    # Calls ``between_steps()`` after multiples of this step number (0: never); it returns whether
+    # points were deleted.
     every = 0
-    friction: float | None = None  # between its two `solids`, for contact on the grid
-    solids: tuple = ()  # that it acts between, if it has no group
+    friction: float | None = None  # between its two `solids`, on the grid
+    solids: tuple = ()  # if it has no group
 
     def __init__(self, hub: Scene, group: Any = None):
         self.hub = hub
@@ -123,41 +122,37 @@ class Fix(Publisher):
 
     @property
     def nodes(self) -> np.ndarray:
-        """Numbers of the nodes that it acts on, for fixes on nodes."""
         return self.group.nodes
 
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Give the components (m, k) of `nodes` at `x` (m, d) that it prescribes, and their values.
+        """Mask (m, k) of prescribed components of `nodes` at `x` (m, d), and their values.
 
-        Those that it has `formulas` for. For implicit schemes, which do not call its hooks for it.
+        By default where there are `formulas`. For implicit schemes, which do not call hooks for it.
         """
-        own = np.isin(nodes, self.nodes)
-        given = np.outer(own, [formula is not None for formula in self.formulas])
-        values, x = np.zeros(given.shape), x[own]
+        acts = np.isin(nodes, self.nodes)
+        mask = np.outer(acts, [formula is not None for formula in self.formulas])
+        values, x = np.zeros(mask.shape), x[acts]
         for k, formula in enumerate(self.formulas):
             if formula is not None:
-                values[own, k] = formula.evaluate_points(self.hub.values, x, x)
-        return given, values
+                values[acts, k] = formula.evaluate_points(self.hub.values, x, x)
+        return mask, values
 
     def defined(self) -> None:
-        """Called when the fix has its ID and is part of the scene."""
+        """Called when the fix has its ID."""
 
     def seconds(self) -> float:
-        """Estimate the core seconds that it adds to a step, for ``check``."""
+        """Estimated core seconds per step, for ``check``."""
         from_python = any(not isinstance(hook, CompiledHook) for hook in self.hooks().values())
         return FROM_PYTHON if from_python and not self.first_step_only else 0.0
 
     def hooks(self) -> dict[str, Any]:
-        """Map the names of overridden hooks to methods or compiled hooks."""
-        found = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
+        hooks = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
         return {
             name: hook if isinstance(hook, CompiledHook) else self._told(name, hook)
-            for name, hook in found.items()
+            for name, hook in hooks.items()
         }
 
     def _told(self, name: str, hook: Callable) -> Callable:
-        """Wrap `hook` so that its exceptions name the fix."""
-
         @wraps(hook)
         def call(view: Any) -> None:
             with as_script_error(f"fix {self.style}", name, type(self), self.place):
@@ -168,7 +163,7 @@ class Fix(Publisher):
 
 
 class Compute(Publisher):
-    """Base of all computes: override `refresh`, which measures a `group` of points for the log."""
+    """Base of computes, which measure a `group` of points in `refresh`."""
 
     def __init__(self, hub: Scene, group: ParticleGroup):
         self.hub = hub

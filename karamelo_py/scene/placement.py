@@ -1,4 +1,4 @@
-"""Placement of points in a region, cell by cell, with the same pattern in each cell."""
+"""Fill regions with points, cell by cell in the same pattern."""
 
 import math
 from bisect import bisect_right
@@ -15,31 +15,31 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
-SAMPLE = 4096  # positions sampled before a large region is filled
-LOOKS = 9  # times, doubling the sample: finally a million
-FEW = 1_000_000  # points that fit into memory everywhere, whatever their fields
-# Beyond this many candidates the points outside the domain are not counted.
+SAMPLE = 4096  # positions
+LOOKS = 9  # doublings of the sample, to a million
+FEW = 1_000_000  # points that any machine can store
+# With more candidates, points outside the domain are not counted.
 _MAX_COUNTED = 20_000_000
 
 
 class Placement(NamedTuple):
-    """Points and their initial domains; values common to all points may be scalars."""
+    """Points and initial domains; values equal for all points may be scalars."""
 
-    x0: Any  # (n, d) positions, an array or Filled
-    volume: float | np.ndarray  # (n,), per unit thickness in 2D or area in 1D; not times the radius
-    half_size: np.ndarray  # (n, d) half edge lengths of the initial domains
-    lo: np.ndarray  # (d,) corners of the bounding box of the solid
+    x0: Any  # (n, d) positions: array or Filled
+    volume: float | np.ndarray  # (n,) per unit thickness (2D) or area (1D); without the radius
+    half_size: np.ndarray  # (n, d) half edges of initial domains
+    lo: np.ndarray  # (d,) bounding box of the solid
     hi: np.ndarray
-    outside: float = 0  # number of points rejected outside the domain, inf if unknown
-    shape: str = "box"  # or a meshio cell type: line, triangle, quad, tetra, hexahedron
-    corners: np.ndarray | None = None  # (n, c, d) of initial domains other than boxes
-    missed: float = 0  # thinner parts of the region may be missing, see `Pieces.missed`
+    outside: float = 0  # points outside the domain; inf: unknown
+    shape: str = "box"  # or a meshio cell type
+    corners: np.ndarray | None = None  # (n, c, d) of domains other than boxes
+    missed: float = 0  # see `Pieces.missed`
 
 
 class Filled:
-    """Positions of the selected points in a box of cells: an array (n, d), computed on request.
+    """Positions (n, d) of selected points in a box of cells, computed on request.
 
-    Stores one bit per candidate position, or nothing if all or none were selected.
+    Stores one bit per candidate position, or nothing if all or none are selected.
     """
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
@@ -50,7 +50,7 @@ class Filled:
         self._kept: list[np.ndarray | None] = []
         self._ends = [0]
         self._moved = np.empty(0, np.int64), np.empty((0, len(corner)))
-        # Positions per cell, and the index of each.
+        # Positions per cell, and their indices.
         self._counts = tuple(b - a + 1 for a, b in zip(first, last, strict=True))
         self._ppc = round(len(places) ** (1 / len(corner)))
         self._subs = np.rint((places / h + 0.5) * self._ppc - 0.5).astype(np.int64)
@@ -58,39 +58,38 @@ class Filled:
         self._number[tuple(self._subs.T)] = np.arange(len(places))
 
     def candidates(self, begin: int, end: int) -> np.ndarray:
-        """Return all candidates (m, d) in cells `begin` to before `end`."""
+        """(m, d) in cells `begin` to before `end`."""
         centre = self._corner + (positions(*self._cells, begin, end) + 0.5) * self._h
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
 
     def keep(self, kept: np.ndarray) -> None:
-        """Select these candidates (m,) of the next chunk."""
+        """Select candidates of the next chunk by a mask (m,)."""
         count = int(np.count_nonzero(kept))
         self._kept.append(np.packbits(kept) if 0 < count < len(kept) else None)
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Numbers (n,) of positions shifted by `step` (n, d) along the axes; -1 outside the cells.
-
-        Positions have equal distances and are numbered through all cells.
+        """Numbers (n,) of the positions shifted by `step` (n, d) in the equidistant pattern; -1:
+        outside.
         """
-        cell, place = self._cell_and_place(number)
-        index = cell * self._ppc + self._subs[place] + step
+        cell, index_in_cell = self._cell_and_place(number)
+        index = cell * self._ppc + self._subs[index_in_cell] + step
         none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
-        cell, place = np.divmod(np.where(none[:, None], 0, index), self._ppc)
+        cell, index_in_cell = np.divmod(np.where(none[:, None], 0, index), self._ppc)
         number = np.ravel_multi_index(tuple(cell.T), self._counts) * len(self._places)
-        return np.where(none, -1, number + self._number[tuple(place.T)])
+        return np.where(none, -1, number + self._number[tuple(index_in_cell.T)])
 
     def middles(self, number: np.ndarray) -> np.ndarray:
-        """Return the positions (n, d) with these numbers."""
-        cell, place = self._cell_and_place(number)
-        return self._corner + (cell + self._cells[0] + 0.5) * self._h + self._places[place]
+        """Positions (n, d) by number."""
+        cell, index_in_cell = self._cell_and_place(number)
+        return self._corner + (cell + self._cells[0] + 0.5) * self._h + self._places[index_in_cell]
 
     def _cell_and_place(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        cell, place = np.divmod(number, len(self._places))
-        return np.array(np.unravel_index(cell, self._counts)).T, place
+        cell, index_in_cell = np.divmod(number, len(self._places))
+        return np.array(np.unravel_index(cell, self._counts)).T, index_in_cell
 
     def move(self, rows: np.ndarray, x: np.ndarray) -> None:
-        """Move points `rows`, ascending, to other positions (n, d)."""
+        """Replace the positions of ascending `rows` by (n, d)."""
         self._moved = rows, x
 
     def __len__(self) -> int:
@@ -112,22 +111,19 @@ class Filled:
         return out
 
     def _some(self, k: int, low: int, high: int) -> np.ndarray:
-        """Return points `low` to before `high` of the k-th chunk."""
         start, bits, m = self.chunks[k][0], self._kept[k], len(self._places)
         if bits is None:
-            found = np.arange(low, high)
+            rows = np.arange(low, high)
         else:
-            found = np.flatnonzero(np.unpackbits(bits))[low:high]
-        begin, end = int(found[0]) // m, int(found[-1]) // m + 1
+            rows = np.flatnonzero(np.unpackbits(bits))[low:high]
+        begin, end = int(rows[0]) // m, int(rows[-1]) // m + 1
         x = self.candidates(start + begin, start + end)
-        return x[low - begin * m : high - begin * m] if bits is None else x[found - begin * m]
+        return x[low - begin * m : high - begin * m] if bits is None else x[rows - begin * m]
 
 
 def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
-    """Return the cells in which `region` is filled.
-
-    They belong to the domain's grid; with `own`, cells that start at the lower corner of the
-    region's bounding box, clipped to the domain.
+    """Cells that `region` is filled in: of the domain's grid, or `own` cells from the corner of its
+    bounding box, clipped to the domain.
     """
     d = domain.dimension
     if not own:
@@ -138,11 +134,10 @@ def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattic
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions of `ppc` points along a unit cell, from its centre, and lengths: (ppc,).
+    """Positions of `ppc` points along a unit cell, relative to its centre, and lengths: (ppc,).
 
-    With ``regular`` and ``cut`` they are equally spaced; with ``gauss`` they are Gauss-Legendre
-    points and weights. The default is Karamelo's: equally spaced, but for 3 the Gauss points, as
-    rounded in Karamelo, with equal lengths.
+    ``regular`` and ``cut`` are equally spaced; ``gauss`` is Gauss-Legendre points and weights. The
+    default is Karamelo's: equally spaced, but for 3 its rounded Gauss points with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)
@@ -156,9 +151,9 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and sizes of `ppc`^dimension points of a unit cell, (m, d), see `offsets`.
+    """Positions and sizes (m, d) of `ppc`^dimension points of a unit cell; equal sizes are (d,).
 
-    In Karamelo's order: x before y; in 3D the lowest z first. Equal sizes are (d,).
+    In Karamelo's order: x before y; in 3D the lowest z first.
     """
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
@@ -178,11 +173,11 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill `region` within the domain with points.
+    """Fill `region` within the domain.
 
-    Cells are visited from the lower corner of the lattice, x outermost, then y, then z, in chunks,
-    and only inside the region's bounding box. Raises ScriptError for more points than can be
-    numbered, or than memory has `room` for (called if there may be many).
+    Cells are visited in chunks from the lower corner of the lattice, x outermost, z innermost,
+    within the region's bounding box. Raises ScriptError for more points than can be numbered, or
+    than memory has `room` for (called if there may be many).
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -198,10 +193,10 @@ def fill(
     last_cell = np.array(lattice.cells[used]) - 1
     if region.unknown or (lo > hi).any():
         return placed
-    # One more cell on each side, so that round-off loses no point on a face.
+    # One more cell on each side: round-off loses no point on a face.
     first = np.floor((lo - corner) / h) - 1
     last = np.floor((hi - corner) / h) + 1
-    # An open side ends at the domain; a closed one that extends past it causes a warning.
+    # An open side ends at the domain; a closed one beyond it causes a warning.
     first = np.where(np.isinf(lo), 0, first)
     last = np.where(np.isinf(hi), last_cell, last)
     inner_first = np.clip(first, 0, last_cell + 1)
@@ -211,31 +206,31 @@ def fill(
         raise ScriptError(
             f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
         )
-    # Past an axis or a plane of symmetry of the region lies its mirror image.
+    # Past an axis or plane of symmetry is the region's mirror image.
     ends = domain.lo[used], domain.hi[used]
-    with np.errstate(invalid="ignore"):  # for open sides
+    with np.errstate(invalid="ignore"):  # open sides
         at_side = [np.abs((lo + hi) / 2 - end) <= domain.tolerance for end in ends]
     at_side[0] |= domain.axisymmetric & (np.arange(dimension) == 0)
     reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
     reaches_out |= (hi > ends[1] + domain.tolerance) & np.isfinite(hi) & ~at_side[1]
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
-    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # integers stay exact
+    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # exact integers
     counted = reaches_out.any() and near and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
     open_lo = np.where(np.isinf(lo) | at_side[0], ends[0] - domain.tolerance, -np.inf)
     open_hi = np.where(np.isinf(hi) | at_side[1], ends[1] + domain.tolerance, np.inf)
 
-    there = room() if room is not None and inner > FEW else None
-    if there is not None:
-        least = _least(region, domain, h / ppc, there.most)
-        if least > there.most:
-            raise there.refused(least)
-        there.tell(least)
+    memory = room() if room is not None and inner > FEW else None
+    if memory is not None:
+        least = _least(region, domain, h / ppc, memory.most)
+        if least > memory.most:
+            raise memory.refused(least)
+        memory.tell(least)
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
-    numbers: list[np.ndarray] = []  # index of each point in the pattern
+    numbers: list[np.ndarray] = []  # indices in the pattern
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
     for begin, end in x0.chunks:
@@ -247,15 +242,15 @@ def fill(
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
-            # Points past an open side are not missed.
+            # Past an open side there is nothing to miss.
             beyond = x[kept & ~in_domain]
             outside += int(((beyond >= open_lo) & (beyond <= open_hi)).all(axis=1).sum())
         if rule == "cut":
             continue
         kept &= in_domain
         x0.keep(kept)
-        if there is not None and len(x0) > there.most:
-            raise there.refused(len(x0))
+        if memory is not None and len(x0) > memory.most:
+            raise memory.refused(len(x0))
         if not even:
             numbers.append(np.flatnonzero(kept) % len(places))
     if reaches_out.any() and not counted:
@@ -270,9 +265,9 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Return a lower bound of the number of points with this spacing in a region, by sampling.
+    """Lower bound of the number of points in a region, by sampling.
 
-    The sample grows until it shows whether there are more points than `most`.
+    The sample grows until it decides whether there are more than `most`.
     """
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
@@ -293,7 +288,7 @@ def _least(region: Region, domain: Domain, spacing: float, most: float) -> float
 def _cut_off(
     placed: Placement, region: Region, size: float, left: list[tuple[np.ndarray, Pieces]]
 ) -> Placement:
-    """Replace boxes at the edge of the region by their clipped pieces, see `clip`."""
+    """Replace boxes at the edge of the region by their pieces (`clip`)."""
     x0, d = placed.x0, region.dimension
     pieces = Pieces(*map(np.concatenate, zip(*(piece for _, piece in left), strict=True)))
     pieces = join(region, x0, pieces)
@@ -306,13 +301,13 @@ def _cut_off(
             rows.append(len(x0) - 1 + np.cumsum(kept)[number[kept[number]]])
         x0.keep(kept)
         begin += len(kept)
-    held = pieces.share > 0
+    filled = pieces.share > 0
     row = np.concatenate(rows) if rows else np.empty(0, np.int64)
-    x0.move(row, pieces.middle[held])
+    x0.move(row, pieces.middle[filled])
     share = np.ones((len(x0), 1))
-    share[row, 0] = pieces.share[held]
+    share[row, 0] = pieces.share[filled]
     half = np.ones((len(x0), 1))
-    half[row, 0] = pieces.share[held] ** (1 / d)
+    half[row, 0] = pieces.share[filled] ** (1 / d)
     return placed._replace(
         volume=placed.volume * share[:, 0], half_size=size / 2 * half, missed=pieces.missed(size)
     )

@@ -1,7 +1,4 @@
-"""Checks of the parts of a scene, and attribution of exceptions to plug-ins.
-
-Built-in parts pass the same checks.
-"""
+"""Checks of a scene's parts, and attribution of exceptions to plug-ins."""
 
 import inspect
 import linecache
@@ -42,7 +39,7 @@ from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import FAILURES
 from karamelo_py.script.values import in_a_row
 
-# Attributes that the class of a part must have.
+# Required class attributes.
 SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "traits")}
 TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
 ROWS = (
@@ -51,26 +48,20 @@ ROWS = (
 )  # fmt: skip
 COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
-ALIKE = 0.85  # similarity of a method name to a hook name that is reported as a misspelling
+ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelling
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:
-    """Refuse a fix with wrong hooks or fields.
-
-    Raises
-    ------
-    ScriptError
-        Naming the fix, its package and its place in the script.
-    """
+    """Raise ScriptError for wrong hooks or fields, naming the fix, its package and its place."""
     name = f"fix {fix.style}"
-    for what in _wrong_hooks(fix):
-        raise faults.fault(name, what, fix.place)
+    for error in _wrong_hooks(fix):
+        raise faults.fault(name, error, fix.place)
     check_fields(hub, name, fix, fix.place)
     hooks = fix.hooks()
     for method in dir(type(fix)):
         other = hasattr(Fix, method) or method in STAGES or method.startswith("_")
-        own = getattr(type(fix), method)
-        if other or not (callable(own) or isinstance(own, CompiledHook)):
+        attribute = getattr(type(fix), method)
+        if other or not (callable(attribute) or isinstance(attribute, CompiledHook)):
             continue
         least = 0.0 if method.startswith(HOOKS_BEGIN) else ALIKE
         stages = [stage for stage in STAGES if "heat" in method or "heat" not in stage]
@@ -96,7 +87,6 @@ def check_fix(hub: Scene, fix: Fix) -> None:
 
 
 def _wrong_hooks(fix: Fix) -> Iterator[str]:
-    """Yield what is wrong with the hooks of a fix."""
     hooks = {moment: getattr(fix, moment) for moment in STAGES if hasattr(fix, moment)}
     if hooks and fix.group is None and not fix.for_method:
         yield (
@@ -113,22 +103,22 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         elif misfit(hook, 1):
             yield f"{moment} has to take one argument, the view of the group"
     for moment, hook in compiled.items():
-        own, whole = ACTS_ON[moment], hook.where in (WHOLE_NODES, WHOLE_POINTS)
+        acts_on, whole = ACTS_ON[moment], hook.where in (WHOLE_NODES, WHOLE_POINTS)
         name = getattr(hook.function, "__name__", "")
         if not name or (whole and hook.tag is None):
-            given = name or type(hook.function).__name__
-            yield f"{moment} takes a function with a name (def name(...): ...), not a {given}"
+            unnamed = name or type(hook.function).__name__
+            yield f"{moment} takes a function with a name (def name(...): ...), not a {unnamed}"
             continue
-        at_own = moment in NODE_WRITES if hook.where == WHOLE_NODES else own != "nodes"
-        if hook.where != own and not (whole and at_own):
-            yield f"{moment} is a moment of {own}, and its hook was made for {hook.where}"
+        at_own = moment in NODE_WRITES if hook.where == WHOLE_NODES else acts_on != "nodes"
+        if hook.where != acts_on and not (whole and at_own):
+            yield f"{moment} is a moment of {acts_on}, and its hook was made for {hook.where}"
         function = hook.function
         takes = len(hook.reads) + 2 if whole else len(hook.signature.args)
         if misfit(function, takes):
-            given = ", ".join(inspect.signature(function).parameters)
+            signature = ", ".join(inspect.signature(function).parameters)
             yield (
                 f"{moment}: {function.__name__} has to take the {takes} arguments of a hook on "
-                f"{hook.where}: {given} is what it takes"
+                f"{hook.where}: {signature} is what it takes"
             )
         if whole:
             yield from _wrong_items(fix, moment, hook)
@@ -141,11 +131,11 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         gives = len(hook.signature.return_type)
         with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):
             try:
-                given = function(*[1.0] * takes)
-            except (ArithmeticError, ValueError):  # of a number that does not matter here
+                result = function(*[1.0] * takes)
+            except (ArithmeticError, ValueError):  # the values do not matter here
                 continue
-        if not isinstance(given, tuple) or len(given) != gives:
-            yield f"{moment}: {function.__name__} has to return {gives} numbers, not {given!r}"
+        if not isinstance(result, tuple) or len(result) != gives:
+            yield f"{moment}: {function.__name__} has to return {gives} numbers, not {result!r}"
     directed = [moment for moment, hook in compiled.items() if hook.tag is None]
     if directed and not fix.formulas:
         yield (
@@ -157,14 +147,14 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
 
 
 def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
-    """Yield what a hook on whole points cannot read or write."""
-    known, fields, written_too = WORDS, fix.point_fields, "velocity"
+    """Yield unknown reads and writes of a hook on whole points or nodes."""
+    readable, fields, written_too = WORDS, fix.point_fields, "velocity"
     if hook.on_nodes:
-        known, fields = NODE_WORDS, fix.node_fields
+        readable, fields = NODE_WORDS, fix.node_fields
         written_too = NODE_WRITES.get(moment, "force")
     else:
         fields = (*fields, *Conducting.point_fields)
-    words = ", ".join(repr(word) for word in known)
+    words = ", ".join(repr(word) for word in readable)
     for item in (*hook.reads, *hook.writes):
         written = item in hook.writes
         if isinstance(item, type):
@@ -182,18 +172,18 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
                 yield f"{moment}: point_fields has to have Force and WorkOfForces"
         elif written and item != written_too:
             yield f"{moment} writes {item!r}: '{written_too}' or a class of a field"
-        elif item not in known and (hook.on_nodes or not callable(item)):
+        elif item not in readable and (hook.on_nodes or not callable(item)):
             laws = "" if hook.on_nodes else ", or a function of laws"
             yield f"{moment} reads {item!r}: {words}, a class of a field{laws}"
 
 
 def misfit(function: Callable, count: int) -> str:
-    """Return why a function cannot be called with `count` arguments, or an empty text."""
+    """Why a function cannot be called with `count` arguments, or ""."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
     except TypeError as error:
         return str(error)
-    except ValueError:  # no signature
+    except ValueError:
         pass
     return ""
 
@@ -202,24 +192,23 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
     """Refuse an incomplete transfer, basis, method or scheme (`name`: ``basis smooth``)."""
     family, kind = name.partition(" ")[0], type(part)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
-    what = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""
-    if family in TRAITS and not what:
-        what = _wrong_traits(kind, kind.traits, TRAITS[family])
+    error = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""
+    if family in TRAITS and not error:
+        error = _wrong_traits(kind, kind.traits, TRAITS[family])
     if family == "transfer" and not updated_velocity.defined(kind):
-        what = what or f"updated_velocity is not defined for {kind.__name__}"
-    if family == "scheme" and not what:
+        error = error or f"updated_velocity is not defined for {kind.__name__}"
+    if family == "scheme" and not error:
         strange = [row for row in kind.rows if not isinstance(row, ROWS)]
         if strange:
-            what = f"{strange[0]!r} in its rows is not a row of a scheme"
+            error = f"{strange[0]!r} in its rows is not a row of a scheme"
         elif not any(isinstance(row, table.Scatter) for row in kind.rows):
-            what = "none of its rows is a Scatter: nothing reaches the grid"
-    if what:
-        raise faults.fault(name, what, hub.place)
+            error = "none of its rows is a Scatter: nothing reaches the grid"
+    if error:
+        raise faults.fault(name, error, hub.place)
     check_fields(hub, name, part, hub.place)
 
 
 def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
-    """Say what is wrong with the traits of a class: another type, or some outside of them."""
     if not isinstance(traits, wanted):
         return f"its traits are {traits!r}, and no {wanted.__name__}(...)"
     names = wanted._fields  # type: ignore[attr-defined]
@@ -231,28 +220,28 @@ def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
 
 
 def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
-    """Refuse wrong field declarations, and columns that exist with another meaning."""
+    """Refuse wrong field declarations, and columns already used with another meaning."""
     for attribute in ("point_fields", "node_fields"):
         kinds = getattr(owner, attribute, ())
         if not isinstance(kinds, tuple):
-            what = f"{attribute} has to be a tuple of classes, as in ({_shown(kinds)},)"
-            raise faults.fault(name, what, place)
+            error = f"{attribute} has to be a tuple of classes, as in ({_shown(kinds)},)"
+            raise faults.fault(name, error, place)
         for kind in kinds:
             field = f"the field {_shown(kind)}"
             with faults.as_script_error(name, field, kind, place):
-                what = _wrong_field(kind) or _wrong_size(kind, hub.domain)
-            if what:
-                raise faults.fault(name, f"{field}{what}", place)
+                error = _wrong_field(kind) or _wrong_size(kind, hub.domain)
+            if error:
+                raise faults.fault(name, f"{field}{error}", place)
             for column in columns_of(kind):
                 if shows := _shows(hub, column, kind, attribute):
-                    what = f"{kind.__name__}: the column '{column}' is {shows}"
-                    raise faults.fault(name, what, place)
+                    error = f"{kind.__name__}: the column '{column}' is {shows}"
+                    raise faults.fault(name, error, place)
 
 
 def check_law(hub: Scene, name: str, law: Any) -> None:
-    """Refuse a law, or a part of one, with wrong traits, or whose columns mean something else."""
-    if is_foreign(type(law)) and (what := _wrong_traits(type(law), law_traits(law), LawTraits)):
-        raise faults.fault(name, what, hub.place)
+    """Refuse a law (or part) with wrong traits, or columns already used with another meaning."""
+    if is_foreign(type(law)) and (error := _wrong_traits(type(law), law_traits(law), LawTraits)):
+        raise faults.fault(name, error, hub.place)
     for column in laws.columns_of(law):
         if shows := _shows(hub, column, None):
             raise faults.fault(name, f"the column '{column}' is {shows}", hub.place)
@@ -272,7 +261,7 @@ def _wrong_field(kind: Any) -> str:
 
 
 def _wrong_size(kind: type, domain: Any) -> str:
-    """Describe a wrong number of components, in the dimensions possible for the scene."""
+    """Describe a wrong number of components, in the possible dimensions."""
     for dimension in [domain.dimension] if domain else KINEMATICS:
         kin = KINEMATICS[dimension]()
         size, start = kind.shape(kin), getattr(kind, "start", 0.0)
@@ -284,7 +273,7 @@ def _wrong_size(kind: type, domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
-    """Describe the present use of a column, unless it is this field (None: a law)."""
+    """Describe the present use of a column, unless by this field (None: a law)."""
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
@@ -297,11 +286,11 @@ def _shown(kind: Any) -> str:
     return getattr(kind, "__name__", repr(kind))
 
 
-# ---- attribution ---------------------------------------------------------------------------------
+# ---- attribution ----
 
 
 class PartInUse(NamedTuple):
-    """A style in use: family and name, its class, and the place in the script."""
+    """A style in use, such as ``fix drag``, its class and its place in the script."""
 
     name: str
     kind: type
@@ -309,12 +298,11 @@ class PartInUse(NamedTuple):
 
 
 def is_foreign(kind: type) -> bool:
-    """Tell if a class belongs to a plug-in."""
+    """Tell whether a class belongs to a plug-in."""
     return not kind.__module__.startswith(registry.PREFIX)
 
 
 def foreign_parts(hub: Scene) -> list[PartInUse]:
-    """List the parts of a scene that come from plug-ins."""
     update, method = hub.update, hub.update.method
     parts = [
         PartInUse(f"{of.kind} {item.style}", type(getattr(item, "law", item)), item.place)
@@ -323,8 +311,8 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
     ]
     tags = [("scheme", update.scheme, update.scheme_place)]
     if method is not None:
-        own = {"transfer": update.transfer, "basis": method.basis, "method": method}
-        tags = [*((family, tag, method.place) for family, tag in own.items()), *tags]
+        tags_of_method = {"transfer": update.transfer, "basis": method.basis, "method": method}
+        tags = [*((family, tag, method.place) for family, tag in tags_of_method.items()), *tags]
     parts += [
         PartInUse(f"{family} {registry.name_of(family, type(tag))}", type(tag), place)
         for family, tag, place in tags
@@ -335,37 +323,36 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Convert an exception in plug-in code to a script error that names the part.
-
-    If the traceback does not show the part, it is `usual`.
+    """Convert an exception in plug-in code to a ScriptError naming the part; `usual` if the
+    traceback shows none.
     """
     try:
         yield
     except faults.KNOWN:
         raise
     except FAILURES as error:
-        own = foreign_parts(hub)
+        foreign = foreign_parts(hub)
         if isinstance(error, Undefined):
-            found = [(part, "") for part in own if part.kind in error.classes]
+            suspects = [(part, "") for part in foreign if part.kind in error.classes]
         else:
-            places = [(_owner(own, f), f" ({Path(f).name}:{k})") for f, k in places_of(error)]
-            found = [(part, place) for part, place in places if part is not None]
-        found += [(usual, "")] if usual else []
-        if not found:
+            places = [(_owner(foreign, f), f" ({Path(f).name}:{k})") for f, k in places_of(error)]
+            suspects = [(part, place) for part, place in places if part is not None]
+        suspects += [(usual, "")] if usual else []
+        if not suspects:
             raise
-        part, place = found[0]
-        if not (place or isinstance(error, Undefined)):  # the line that asked for it is reported
+        part, place = suspects[0]
+        if not (place or isinstance(error, Undefined)):  # report the line that called it
             place = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
-        what = f"{faults.cause_of(error)}{place}"
-        raise faults.fault(part.name, what, part.place, faults.TRACEBACK) from error
+        cause = f"{faults.cause_of(error)}{place}"
+        raise faults.fault(part.name, cause, part.place, faults.TRACEBACK) from error
 
 
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
-    """Find the part defined in a file, or else in its package."""
+    """The part defined in a file, or else in its package."""
     path = Path(file).resolve()
     for part in parts:
-        own = getattr(sys.modules.get(part.kind.__module__), "__file__", None)
-        if own and Path(own).resolve() == path:
+        file_of_module = getattr(sys.modules.get(part.kind.__module__), "__file__", None)
+        if file_of_module and Path(file_of_module).resolve() == path:
             return part
     for part in parts:
         package = sys.modules.get(part.kind.__module__.partition(".")[0])

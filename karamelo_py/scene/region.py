@@ -1,4 +1,4 @@
-"""Base class of regions: an inside test, a bounding box, and an optional inversion."""
+"""Base class of regions: inside test, bounding box, inversion."""
 
 import math
 from collections.abc import Sequence
@@ -14,19 +14,19 @@ from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError
 
 EXTERIOR = "exterior"
-HALVINGS = 12  # bisections along a line that crosses a surface
+HALVINGS = 12  # bisections to a surface
 
 
 class Region(Named):
     """Base of region styles, which override `contains`.
 
-    `lo` and `hi` are corners of a bounding box, one number per dimension, infinite if open. An
-    `exterior` region is the outside of the shape; `parts` are regions that it is made of.
+    `lo` and `hi` (d,) bound the shape, infinite if open. `exterior` inverts it; `parts` are the
+    regions that it combines.
     """
 
     radius = 0.0
-    axis: Any = None  # of a cylinder in 3D: its direction, and its two middle coordinates
-    skin: Any = None  # the surface of a region from a file
+    axis: Any = None  # of a cylinder in 3D: direction and two centre coordinates
+    skin: Any = None  # `Skin`, of a region from a file
     catalogue = "regions"
 
     def __init__(
@@ -43,7 +43,7 @@ class Region(Named):
         self.exterior = exterior
         self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)
-        # Its position depends on results that a rehearsal does not have.
+        # Depends on results that a rehearsal does not have.
         self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
         # Bounding box, infinite if open; 0 in unused directions.
         self.box_lo, self.box_hi = np.zeros((2, 3))
@@ -52,54 +52,53 @@ class Region(Named):
 
     @property
     def tolerance(self) -> float:
-        """Distance outside a face at which a point still counts as inside, for round-off."""
+        """Distance outside a face that counts as inside (round-off)."""
         return self.domain.tolerance
 
     @property
     def lo(self) -> np.ndarray:
-        """Lower corner (3,) of the part in the domain."""
+        """Lower corner (3,), clipped to the domain."""
         return np.clip(self.box_lo, self.domain.lo, self.domain.hi)
 
     @property
     def hi(self) -> np.ndarray:
-        """Upper corner (3,) of the part in the domain."""
+        """Upper corner (3,), clipped to the domain."""
         return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
 
     @property
     def aligned(self) -> bool:
-        """True if all faces are known to be parallel to the axes."""
-        return bool(self.parts) and all(part.aligned for part in self.parts)
+        """All faces are known to be parallel to the axes."""
+        return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
     def flat(self) -> bool:
-        """True if it or one of its parts consists of lines or surfaces, without an inside."""
-        return any(part.flat for part in self.parts)
+        """Consists of lines or surfaces without an inside, at least in part."""
+        return any(region.flat for region in self.parts)
 
     @property
     def from_file(self) -> bool:
-        """True if it or one of its parts comes from a file."""
-        return any(part.from_file for part in self.parts)
+        return any(region.from_file for region in self.parts)
 
     @property
     def volume(self) -> float | None:
-        """Length, area or volume of the part in the domain; None if unknown."""
+        """Length, area or volume in the domain; None if unknown."""
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions `x` (n, >= dimension) are in or on the shape itself: (n,) bool."""
+        """Test which `x` (n, >= dimension) are in or on the shape: (n,) bool."""
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions `x` (n, >= dimension) belong to the region: (n,) bool."""
+        """Test which `x` (n, >= dimension) belong to the region: (n,) bool."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth of positions `x` (n, >= dimension) in the shape, negative outside: (n,).
+        """Depth (n,) of `x` (n, >= dimension) in the shape, negative outside; ignores `exterior`.
 
         A lower bound of the distance to the surface, up to `reach`; linear in `x` near plane parts
-        of the surface. Ignores `exterior`. The default uses `contains` along the axes, and misses
-        what is thinner than `reach`.
+        of the surface. The default tests `contains` along the axes, and misses what is thinner than
+        `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -116,22 +115,22 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def shape(self) -> Any:
-        """Return what `kernels.surfaces.depth` takes for `distance` (no `exterior`), or None."""
+        """What `kernels.surfaces.depth` takes for `distance`, or None."""
         return None
 
     def outline(self) -> Any:
-        """The same for `depth`."""
+        """What it takes for `depth`."""
         shape = self.shape()
         return Outside(shape) if self.exterior and shape is not None else shape
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth of positions in the region, see `distance`: (n,)."""
+        """Depth (n,) of positions in the region, see `distance`."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
 
 
 def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], bool]:
-    """Split off a final word ``exterior``: the other arguments, and whether it was there."""
+    """Split off a final word ``exterior``."""
     if arguments and arguments[-1].word() == EXTERIOR:
         return arguments[:-1], True
     return arguments, False
@@ -148,13 +147,12 @@ def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> No
 
 
 def check_radius(radius: float, **where: Any) -> None:
-    """Refuse a radius that is not positive; `where` gives the place."""
     if radius <= 0:
         raise ScriptError(f"R = {radius:g} must be above 0", expected="a radius above 0", **where)
 
 
 def below(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
-    """Return the depth of positions below the surface of a ball or cylinder: (n,)."""
+    """Depth (n,) below the surface of a ball or cylinder."""
     square = np.zeros(len(x))
     for axis, middle in zip(axes, centre, strict=True):
         square += (x[:, axis] - middle) ** 2

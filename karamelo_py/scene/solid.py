@@ -1,4 +1,4 @@
-"""Solids: bodies of material points. Solid styles place the points."""
+"""Solids: bodies of material points, placed by solid styles."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -19,33 +19,27 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
-COLD, WARM = 60.0, 200.0  # temperatures below COLD, and WARM below others, are probably in Celsius
+COLD, WARM = 60.0, 200.0  # temperatures below COLD, WARM below others, are probably in Celsius
 
 
 class Solid(Named):
-    """Base of solid styles: a body of points. A style calls `put` with its points.
+    """Base of solid styles, which `put` their points.
 
-    Parameters
-    ----------
-    material
-        Material of the points.
-    h
-        Cell size. With a grid shared by all solids (ulmpm) it must be the domain's.
-    T0
-        Initial temperature; by default the material's.
-    GlueToSolid
-        An earlier solid whose velocity field this one shares, in methods with a field per solid.
+    Parameters ---------- material Material of the points. h Cell size. With a grid shared by all
+    solids (ulmpm) it must be the domain's. T0 Initial temperature; by default the material's.
+    GlueToSolid An earlier solid whose velocity field this one shares, in methods with a field per
+    solid.
     """
 
     catalogue = "solids"
-    source = "region"  # argument that gives the positions of points, for messages
-    # Volume of the points, and of the shape from a file that they fill; per radian if axisymmetric.
+    source = "region"  # argument that gives the points, for messages
+    # Of the points and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
     region: Region | None = (
         None  # that it fills, with `ppc` points per cell and direction, perhaps `cut`
     )
     ppc, cut = 0, False
-    warm = False  # its points have individual temperatures
+    warm = False  # points have individual temperatures
 
     def __init__(
         self,
@@ -70,12 +64,12 @@ class Solid(Named):
             )
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
-        self.initial: dict[str, np.ndarray] = {}  # initial columns (n,) of its points
-        # From 0; the id of a point is its number plus 1.
+        self.initial: dict[str, np.ndarray] = {}  # columns (n,) of its points
+        # An id is a number plus 1.
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        """Warn of a temperature that the material cannot have, or that is not given."""
+        """Warn of a missing or impossible temperature."""
         # Karamelo scripts give T0 in mechanical runs, too.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
@@ -84,7 +78,7 @@ class Solid(Named):
                 "eos-strength",
             )
         T0 = self.T0 if can(self.material.law, initial_heat) else None
-        melting = [parameter(part, "Tm", math.inf) for part in self.material.whole]
+        melting = [parameter(law, "Tm", math.inf) for law in self.material.whole]
         Tm = min(melting, default=math.inf)
         if T0 is not None and T0 < 0:
             hub.warn(
@@ -126,7 +120,7 @@ class Solid(Named):
         volume = np.asarray(placement.volume, float)
         if self.domain.axisymmetric:
             radius = placement.x0[:][:, 0]
-            if count and radius.min() <= 0:  # a point on the axis would have no mass
+            if count and radius.min() <= 0:  # no mass on the axis
                 raise ScriptError(
                     f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
                     "and points lie at x > 0",
@@ -136,8 +130,8 @@ class Solid(Named):
             volume = volume * radius
         elif self.domain.thin:
             volume = volume * self.domain.thickness
-        # As in `Placement`, but volumes are per radian if axisymmetric. Equal values are stored
-        # once. All arrays are read-only.
+        # As in `Placement`, but per radian if axisymmetric. Read-only; equal values are stored
+        # once.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
         self.mass = np.broadcast_to(volume / float(specific_volume(self.material.law)), (count,))
@@ -152,9 +146,9 @@ class Solid(Named):
                 hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
 
-    described: Callable[[], str]  # source of the points in words, such as ``region 'disk'``
-    why_empty: Callable[[], str]  # why there are no points although none lies outside the domain
-    wanted: Callable[[], str]  # a source that would give points
+    described: Callable[[], str]  # source of the points: ``region 'disk'``
+    why_empty: Callable[[], str]  # why no point lies in the source
+    wanted: Callable[[], str]  # a source that has points
 
     @property
     def count(self) -> int:
@@ -163,47 +157,50 @@ class Solid(Named):
 
     @property
     def x0(self) -> np.ndarray:
-        """(n, d) reference positions; for large solids computed on each access."""
+        """(n, d) reference positions; computed on each access for large solids."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
-        """(n, d) reference positions of some points, by ascending numbers."""
-        found = np.empty((len(numbers), self.domain.dimension))
+        """(n, d) reference positions by ascending numbers."""
+        positions = np.empty((len(numbers), self.domain.dimension))
         for begin in range(0, len(numbers), CHUNK):
             some = numbers[begin : begin + CHUNK]
-            found[begin : begin + CHUNK] = self.places[some[0] : some[-1] + 1][some - some[0]]
-        return found
+            positions[begin : begin + CHUNK] = self.places[some[0] : some[-1] + 1][some - some[0]]
+        return positions
 
     def pieces(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Yield reference positions in pieces, with the number of the first point of each."""
+        """Yield the first number and the reference positions of each piece."""
         for first in range(0, self.count, CHUNK):
             yield first, self.places[first : first + CHUNK]
 
 
 def solid_with(hub: Scene, number: int) -> Solid:
-    """Return the solid of a point."""
+    """The solid of a point."""
     return [solid for solid in hub.solids.values() if solid.first_id <= number][-1]
 
 
 def named(hub: Scene, number: int) -> str:
-    """Return the name of a point for messages."""
+    """Name of a point in messages."""
     return f"point {number + 1} of solid '{solid_with(hub, number).id}'"
 
 
 def words_of_volumes(hub: Scene) -> str:
-    """Report how much of the shapes from files the points fill; empty without such shapes."""
-    known = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
-    words = [f"{name} {own:.6g} of {whole:.6g} in its file" for name, (own, whole) in known.items()]
+    """Volumes of points and of their shapes from files, in words; empty without such shapes."""
+    volumes = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
+    words = [
+        f"{name} {volume:.6g} of {whole:.6g} in its file"
+        for name, (volume, whole) in volumes.items()
+    ]
     return ", ".join(words[:4]) + (f" and {len(words) - 4} more solids" if len(words) > 4 else "")
 
 
 def own_grids(hub: Scene) -> bool:
-    """Tell whether the method uses a separate grid for each solid."""
+    """Each solid has a separate grid."""
     return hub.update.method is not None and hub.update.method.own_grids
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
-    """Cell size of a solid that gives `h`; the first one may set the domain's."""
+    """Cell size of a solid; the first one may set the domain's."""
     if domain.h is None:
         domain.set_cell_size(h)
     if own_grids(hub):
@@ -231,7 +228,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Tell whether points of `a` coincide with points of `b`; large solids are sampled."""
+    """Tell whether points of two solids coincide; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():

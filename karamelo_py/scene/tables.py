@@ -1,4 +1,4 @@
-"""Tables of numbers from users: columns in files, or arrays of a Python program."""
+"""Columns of numbers in users' files, or arrays of a Python program."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Annotation: named columns of a file, or of arrays passed by a program."""
+    """Annotation: named columns."""
 
     script_kind = "the name of a file of columns"
 
@@ -26,20 +26,20 @@ class FileColumns:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "FileColumns":
-        """Read the file, or take the data passed to `Simulation`."""
-        given = hub.functions.get(argument.text)
-        if isinstance(given, Mapping):
+        """Read the file, or take the arrays passed to `Simulation`."""
+        arrays = hub.functions.get(argument.text)
+        if isinstance(arrays, Mapping):
             return cls(
-                "the table", {str(name): np.asarray(of, float) for name, of in given.items()}
+                "the table", {str(name): np.asarray(of, float) for name, of in arrays.items()}
             )
         path = TableFile.from_script(hub, argument)
         return cls(str(path), read_table(path))
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Read columns of numbers by the names in the first row (or "1", "2", ...).
+    """Read columns by the names in the first row (or "1", "2", ...).
 
-    Separators are commas, semicolons or blanks; lines that begin with # are comments.
+    Separators are commas, semicolons or blanks; # begins a comment line.
     """
     rows = []
     try:

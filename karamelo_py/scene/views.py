@@ -1,10 +1,10 @@
-"""Views of nodes and points for hooks written in Python.
+"""Views of nodes and points for Python hooks: arrays with a row per node or point of the group.
 
-A view has arrays with one row per node or point of the group. Changes by the hook, by assignment or
-in place, are written back when it returns; other fields are read-only.
+Changes, by assignment or in place, are written back when the hook returns; other fields are
+read-only.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.equations.heat import Supply, Temperature
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.move import VelocityBefore
@@ -33,14 +34,13 @@ from karamelo_py.script.errors import NoItem, Place, ScriptError, nearest
 
 
 class Shown:
-    """A field of a view, with its read and (unless read-only) write function."""
+    """A field of a view; read-only without `write`."""
 
     def __init__(self, read: Callable, write: Callable | None = None, doc: str | None = None):
         self.read, self.write = read, write
         self.__doc__ = doc or read.__doc__
 
     def writer(self, write: Callable) -> Callable:
-        """Decorate the function that writes the field."""
         self.write = write
         return write
 
@@ -50,10 +50,13 @@ class Shown:
     def __get__(self, view: "View | None", owner: type) -> Any:
         if view is None:
             return self
-        return view._handed(self.name, lambda: self.read(view), written=self.write is not None)
+        return view._handed(self.name, lambda: self.read(view), written=self._writable(view))
+
+    def _writable(self, view: "View") -> bool:
+        return self.write is not None and self.name not in view._read_only
 
     def __set__(self, view: "View", value: Any) -> None:
-        if self.write is None:
+        if not self._writable(view):
             raise AttributeError(f"{self.name} is read-only")
         now = self.__get__(view, type(view))
         value = np.asarray(value)
@@ -62,17 +65,18 @@ class Shown:
         now[...] = value
 
 
-# Columns of dumps, and the arrays that store them.
+# Columns, with the arrays that have them.
 _VECTORS = VECTORS | {f"{of}{axis}": ("force", k) for of in "fb" for k, axis in enumerate("xyz")}
 
 
 class View:
-    """A view: its fields are the only attributes and check what is assigned."""
+    """A view, whose fields are its only attributes."""
 
     _fields: tuple[str, ...] = ()
+    _read_only: tuple[str, ...] = ()
 
     def __init__(self) -> None:
-        # By attribute name or field class: the array given to the hook, and a copy of its content.
+        # By attribute or field class: array given to the hook, and a copy.
         self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _take_times(self, control: Any) -> None:
@@ -83,7 +87,6 @@ class View:
         self.time = float(control.values[arrays.TIME])
 
     def write_back(self) -> None:
-        """Write changes of the hook; called when it returns."""
         for key, (now, before) in self._handed_out.items():
             if now is before or np.array_equal(now, before, equal_nan=True):
                 continue
@@ -93,7 +96,6 @@ class View:
                 self._put(key, now)
 
     def _handed(self, key: str | type, read: Callable, *, written: bool = True) -> np.ndarray:
-        """Return the array given to the hook before, or the result of ``read()``."""
         if key not in self._handed_out:
             array = np.array(read())
             array.flags.writeable = written
@@ -104,16 +106,19 @@ class View:
     _put: Callable[[type, np.ndarray], None]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        known = name in self._fields or name.startswith("_")
-        if not known and not isinstance(getattr(type(self), name, None), Shown):
+        if not (name in self._fields or name.startswith("_") or self._shows(name)):
             raise self._unknown(name)
         object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
         raise self._unknown(name)
 
+    @classmethod
+    def _shows(cls, name: str) -> bool:
+        return isinstance(getattr(cls, name, None), Shown)
+
     def __getitem__(self, kind: type) -> np.ndarray:
-        """(n, components) of a field declared by a part."""
+        """Return a declared field, (n, components)."""
         if not isinstance(kind, type):
             raise self._no_column(kind)
         return self._handed(kind, lambda: self._get(kind))
@@ -122,13 +127,13 @@ class View:
         self[kind][...] = value
 
     def _no_column(self, name: Any) -> KeyError:
-        """Make the error for a column in brackets, naming the attribute to use."""
+        """Make the error for a column in brackets, with the attribute to use."""
         kind = type(self).__name__
         attribute, *k = _VECTORS.get(str(name), (str(name),))
-        if isinstance(getattr(type(self), attribute, None), Shown):
-            place = f"[:, {k[0]}]" if k else ""
-            return NoItem(f"{kind} has no ['{name}']: write .{attribute}{place}")
-        names = ", ".join(n for n in dir(type(self)) if isinstance(getattr(type(self), n), Shown))
+        if self._shows(attribute):
+            column = f"[:, {k[0]}]" if k else ""
+            return NoItem(f"{kind} has no ['{name}']: write .{attribute}{column}")
+        names = ", ".join(filter(self._shows, dir(type(self))))
         return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
 
     def _unknown(self, name: str) -> AttributeError:
@@ -144,22 +149,22 @@ NO_HEAT = "no heat flows: the method has to be thermo-mechanical"
 
 
 def _declared(kind: type, of: str, missing: str = "") -> Callable:
-    """Make the getter of a declared field from the arrays of points or nodes."""
+    """Make the getter of a declared field of points or nodes."""
 
-    def find(found: Any) -> np.ndarray:
-        array = field(found.fields, kind)
+    def find(arrays: Any) -> np.ndarray:
+        array = field(arrays.fields, kind)
         if array is None:
-            what = f"{of}s have no {name_of(kind)}: name it in the {of}_fields of the fix"
-            raise ValueError(missing or what)
+            undeclared = f"{of}s have no {name_of(kind)}: name it in the {of}_fields of the fix"
+            raise ValueError(missing or undeclared)
         return array
 
     return find
 
 
 class NodesView(View):
-    """The nodes `index` (n,) of a group that carry mass, at one stage of a step.
+    """Nodes `index` (n,) of a group with mass, at one stage of a step.
 
-    A hook writes ``nodes.force += nodes.mass[:, None] * self.gravity``.
+    Example: ``nodes.force += nodes.mass[:, None] * self.gravity``.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "index")
@@ -183,13 +188,12 @@ class NodesView(View):
         self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
     def total(self, terms: Any) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over all nodes of the group, of all processes."""
+        """Sum terms (n,) or (n, k) over the group's nodes of all processes."""
         terms = np.asarray(terms, float)
-        own = slice(None) if self._foreign is None else self._foreign[self.index] == 0
-        return self._simulation.points.summed(terms[own])
+        local = slice(None) if self._foreign is None else self._foreign[self.index] == 0
+        return self._simulation.points.summed(terms[local])
 
     def _vectors(self, name: str, first: int = 0) -> np.ndarray:
-        """Return components from `first` on of an array of all nodes, (N, d)."""
         return getattr(self._nodes, name)[:, first : first + self._d]
 
     def _declared(self, kind: type) -> np.ndarray:
@@ -203,7 +207,7 @@ class NodesView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """(n, 3) positions of the nodes; read only."""
+        """(n, 3); read only."""
         grids = self._grids
         g = np.searchsorted(grids.first, self.index, side="right") - 1
         local = self.index - grids.first[g]
@@ -214,7 +218,7 @@ class NodesView(View):
 
     @Shown
     def mass(self) -> np.ndarray:
-        """(n,) nodal mass; read only."""
+        """(n,); read only."""
         return self._nodes.sums[self.index, arrays.MASS]
 
     @Shown
@@ -232,12 +236,12 @@ class NodesView(View):
 
     @property
     def _change(self) -> np.ndarray:
-        """Change of velocity in the momentum update: v* minus v."""
+        """v* - v of the momentum update."""
         return self._vectors("update", arrays.of_change(self._kin))
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """(n, d) velocity: v before the momentum update, or the one that deforms the points."""
+        """(n, d) v before the momentum update, or the velocity that deforms the points."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
@@ -255,7 +259,7 @@ class NodesView(View):
 
     @Shown
     def velocity_update(self) -> np.ndarray:
-        """(n, d) v*, the velocity after the momentum update (``post_update_grid_state``)."""
+        """(n, d) v*, after the momentum update (``post_update_grid_state``)."""
         return self._vectors("velocity" if self._on_velocity else "update")[self.index]
 
     @velocity_update.writer
@@ -269,45 +273,75 @@ class NodesView(View):
 
 
 class PointsView(View):
-    """The points of a group, at one stage of a step, in the order of their ids."""
+    """The points of a group at one stage of a step: in the order of their ids, or local ones.
+
+    Hooks that treat each point separately (`Fix.point_by_point`) get local points: `pieces` of
+    blocks, with their rows, in storage order and with read-only positions. Before the first step
+    (`in_steps` False) they are only some of the local points.
+    """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
     ids: np.ndarray
 
-    def __init__(self, simulation: Any, ids: np.ndarray, then: bool):
+    def __init__(
+        self,
+        simulation: Any,
+        numbers: np.ndarray | None = None,
+        *,
+        then: bool = False,
+        pieces: Sequence[tuple[Block, np.ndarray]] = (),
+        in_steps: bool = True,
+    ):
         super().__init__()
         self._simulation = simulation
         self._then = then
         self._take_times(simulation.control)
-        self._numbers = ids  # from 0
-        self.ids = ids + 1  # as in dumps
         self.moved = False
-        self._found: Rows | None = None
+        self._in_steps = in_steps
+        self._stored: Rows | None = None
+        if numbers is None:
+            numbers = self._take_local(pieces or [(simulation.setup.blocks[0], np.empty(0, int))])
+        self._numbers = numbers  # from 0
+        self.ids = numbers + 1  # as in dumps
+
+    def _take_local(self, pieces: Sequence[tuple[Block, np.ndarray]]) -> np.ndarray:
+        ids = [block.points.id[rows] for block, rows in pieces]
+        numbers = np.concatenate(ids)
+        spans = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
+        parts = [Part(*piece, slice(*span)) for piece, span in zip(pieces, spans, strict=True)]
+        present = np.ones(len(numbers), np.bool_)
+        self._stored = Rows(self._simulation.setup, parts, numbers, present)
+        self._read_only = ("position",)
+        return numbers
 
     def total(self, terms: Any) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over all points of the group, rounded once.
+        """Sum terms (n,) or (n, k) over the group's points, rounded once.
 
         Collective; the result is the same for any number of processes.
         """
+        if not self._in_steps:
+            raise ValueError(
+                "points.total(terms) is known in steps alone; before the first, points come in "
+                "pieces where point_by_point is True"
+            )
         return self._simulation.points.summed(np.asarray(terms, float))
 
     def column(self, name: str) -> np.ndarray:
-        """(n,) a dump column of these points."""
+        """Return a dump column (n,)."""
         return PointTable(self._simulation.hub, self._rows).particle(name)
 
     @property
     def _rows(self) -> Rows:
-        """The points of the view, as stored in the arrays of the scene."""
-        if self._found is None:
+        if self._stored is None:
             s, parts = self._simulation.setup, []
-            place = np.full(self._simulation.count, -1)
-            place[self._numbers] = np.arange(len(self.ids))
+            order = np.full(self._simulation.count, -1)
+            order[self._numbers] = np.arange(len(self.ids))
             for block in s.blocks:
-                of_block = place[block.points.id]
-                rows = np.flatnonzero(of_block >= 0)
-                parts.append(Part(block, rows, of_block[rows]))
-            self._found = Rows(s, parts, self._numbers, np.ones(len(self.ids), np.bool_))
-        return self._found
+                places = order[block.points.id]
+                rows = np.flatnonzero(places >= 0)
+                parts.append(Part(block, rows, places[rows]))
+            self._stored = Rows(s, parts, self._numbers, np.ones(len(self.ids), np.bool_))
+        return self._stored
 
     def _get(self, kind: type) -> np.ndarray:
         return self._rows.take(_declared(kind, "point"))
@@ -324,7 +358,7 @@ class PointsView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """(n, d) positions; corners of convected domains move with the points."""
+        """(n, d); corners of convected domains move with the points."""
         return self._rows.take(self._place)
 
     @position.writer
@@ -334,96 +368,93 @@ class PointsView(View):
         self._rows.put(self._place, value)
         step = self._rows.take(self._place) - before
         corners = corners_that_move(s)
-        for block, rows, own in self._rows.parts if corners else ():
-            behind = self._places(block.points)[d : d + d * corners]
-            behind[:, rows] += np.tile(step[own].T, (corners, 1))
+        for block, rows, places in self._rows.parts if corners else ():
+            of_corners = self._places(block.points)[d : d + d * corners]
+            of_corners[:, rows] += np.tile(step[places].T, (corners, 1))
         self.moved = True
 
     def _write_velocity(self, value: np.ndarray) -> None:
         self._rows.put(lambda points: points.v, value)
-        if self._rows.declared(VelocityBefore) is not None:  # nothing has set this
+        if self._rows.declared(VelocityBefore) is not None:
             self._rows.put(_declared(VelocityBefore, "point"), np.full_like(value, np.nan))
 
     velocity = Shown(
-        lambda view: view._rows.take(lambda points: points.v), _write_velocity, "(n, d) velocities."
+        lambda view: view._rows.take(lambda points: points.v), _write_velocity, "(n, d)."
     )
-    mass = Shown(
-        lambda view: view._rows.take(lambda points: points.mass), doc="(n,) masses; read only."
-    )
+    mass = Shown(lambda view: view._rows.take(lambda points: points.mass), doc="(n,); read only.")
     force = Shown(
         lambda view: view._get(Force),
         lambda view, value: view._put(Force, value),
-        """(n, d) forces that fixes put on the points; add to it in ``initial_integrate``.
+        """(n, d) forces of fixes; add to it in ``initial_integrate``.
 
-        Only for fixes with ``point_fields = (Force,)``. It is zero before the first of them.
+        For fixes with ``point_fields = (Force,)``. Zero before the first of them.
         """,
     )
     temperature = Shown(
-        lambda view: view._heat(Temperature), doc="(n,) temperatures, where heat flows; read only."
+        lambda view: view._heat(Temperature), doc="(n,), with heat conduction; read only."
     )
     heat_supply = Shown(
         lambda view: view._heat(Supply),
         lambda view, value: view._put(Supply, value[:, None]),
-        "(n,) heat per time that fixes bring; add to it in ``supply_heat``.",
+        "(n,) heat per time of fixes; add to it in ``supply_heat``.",
     )
 
     def _heat(self, kind: type) -> np.ndarray:
         return self._rows.take(_declared(kind, "point", NO_HEAT))[:, 0]
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
-        """Set the velocity gradient of points whose transfer stores one (APIC, TPIC ...).
+        """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
-        ``gradient(moves, step)`` returns the derivatives (n, d) of the velocity `component` with
-        respect to the coordinates of the grid (reference positions if `moves` is False); `step` is
-        a length much smaller than a cell. It is called only if points store a gradient.
+        ``gradient(moves, step)`` returns the derivatives (n, d) of the velocity `component` in the
+        coordinates of the grid (reference positions if not `moves`); `step` is a length much
+        smaller than a cell. Called only if points store a gradient.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
         here = slice(component * d, component * d + d)
-        for block, rows, own in self._rows.parts:
+        for block, rows, places in self._rows.parts:
             points, kept = block.points, field(block.points.fields, Moment)
             if kept is None:
                 continue
             if slopes is None:
                 slopes = np.nan_to_num(gradient(s.frame.moves, simulation.hub.domain.h / 16)).T
-            given = np.zeros((d * d, len(rows)), kept.dtype)
-            given[here] = slopes[:, own]
-            if not s.transfer.traits.keeps_gradient:
-                # B = D grad v, as computed from nodes
-                places = points.x[simulation.now] if points.home is None else points.home
-                where = np.ascontiguousarray(places[:, rows])
-                shown, grid = given, points.grid[rows]
-                given = np.zeros_like(shown)
-                export_velocity_moment(s.basis, s.kin, s.grids, grid, where, shown, given)
-            kept[here, rows] = given[here]
+            moment = np.zeros((d * d, len(rows)), kept.dtype)
+            moment[here] = slopes[:, places]
+            if not s.transfer.traits.keeps_gradient:  # B = D grad v, as computed from nodes
+                x = points.x[simulation.now] if points.home is None else points.home
+                x = np.ascontiguousarray(x[:, rows])
+                gradients, grid = moment, points.grid[rows]
+                moment = np.zeros_like(gradients)
+                export_velocity_moment(s.basis, s.kin, s.grids, grid, x, gradients, moment)
+            kept[here, rows] = moment[here]
 
-    def set_stress(self, given: dict[str, np.ndarray]) -> None:
-        """Set components of Cauchy stress of rate-form laws: ``{"11": (n,) values, ...}``."""
+    def set_stress(self, components: dict[str, np.ndarray]) -> None:
+        """Set components of Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
         s = self._simulation.setup
         names = s.kin.symmetric_names
-        flags = np.array([name in given for name in names])
+        flags = np.array([name in components for name in names])
         values = np.stack(
-            [np.broadcast_to(given.get(name, 0.0), len(self.ids)) for name in names], axis=1
+            [np.broadcast_to(components.get(name, 0.0), len(self.ids)) for name in names], axis=1
         ).astype(s.nodes.sums.dtype)
-        for block, rows, own in self._rows.parts:
+        for block, rows, places in self._rows.parts:
             points = arrays.known_to_laws(block.points)
             if len(rows) and can(elastic_law(block.laws), with_stress):
                 chosen = np.zeros(len(points.id), np.bool_)
                 chosen[rows] = True
                 stress = np.zeros((len(points.id), len(names)), values.dtype)
-                stress[rows] = values[own]
+                stress[rows] = values[places]
                 impose_stress(s.kin, points, block.laws, chosen, flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
-        """Set temperatures (n,) of points whose materials have one."""
+        """Set temperatures (n,) where materials have one."""
         s = self._simulation.setup
-        for block, rows, own in self._rows.parts:
+        for block, rows, places in self._rows.parts:
             points = arrays.known_to_laws(block.points)
-            own_values = np.ascontiguousarray(values[own], s.nodes.sums.dtype)
-            impose_temperature(s.kin, points, block.laws, np.asarray(rows), own_values)
+            T = np.ascontiguousarray(values[places], s.nodes.sums.dtype)
+            impose_temperature(s.kin, points, block.laws, np.asarray(rows), T)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
-        """Set a dump column to `values` (n,): position, velocity, stress, T, or a part's field."""
+        """Set a dump column (n,): position, velocity, stress, T, or a declared field."""
         d, hub = self._simulation.kin.dimension, self._simulation.hub
         attribute, k = VECTORS.get(name, ("", 0))
         kind, column = declared_columns(hub, "point_fields").get(name, (None, 0))
@@ -463,38 +494,32 @@ class PointsView(View):
 
     @Shown
     def reference_position(self) -> np.ndarray:
-        """(n, d) positions before the first step; read only."""
+        """(n, d) before the first step; read only."""
         return places_before(self._simulation.hub, self._numbers)
 
 
 def set_columns(
     simulation: Any,
-    given: Mapping[str, Any],
+    columns: Mapping[str, Any],
     ids: np.ndarray | None = None,
     place: Place | None = None,
 ) -> None:
-    """Set columns of points (ids from 0; default all) between two steps.
+    """Set columns of points (ids from 0; default all) between two steps, to numbers or (n,).
 
-    Values are numbers, or one per point.
-
-    Raises
-    ------
-    ScriptError
-        If the column is derived from others, or values have the wrong shape or are not finite.
+    Raises ScriptError for derived columns, wrong shapes and values that are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids
-    view = PointsView(simulation, ids[present[ids]], then=False)
-    for name, values in given.items():
+    view = PointsView(simulation, ids[present[ids]])
+    for name, values in columns.items():
         array = np.asarray(values, float)
-        what = ""
+        wanted = f"is a number, or one for each of {len(ids)} points"
         if array.shape not in ((), ids.shape):
-            what = f"is a number, or one for each of {len(ids)} points, not an array of the shape "
-            what += str(array.shape)
-        elif not np.isfinite(array).all():
-            what = "has numbers that are not finite"
-        if what:
-            raise ScriptError(f"'{name}' {what}", place=place)
+            raise ScriptError(
+                f"'{name}' {wanted}, not an array of the shape {array.shape}", place=place
+            )
+        if not np.isfinite(array).all():
+            raise ScriptError(f"'{name}' has numbers that are not finite", place=place)
         try:
             view.set_column(name, np.broadcast_to(array, ids.shape)[present[ids]])
         except ScriptError as error:
@@ -503,31 +528,3 @@ def set_columns(
     if view.moved:
         simulation.control.clock[0].drift = np.inf
     simulation.changed()
-
-
-class PieceView(PointsView):
-    """Points of a group on this process, in storage order.
-
-    For hooks that treat each point separately (`Fix.point_by_point`). Positions are read-only.
-    Before the first step (`in_steps` False) a view has only part of the points.
-    """
-
-    position = Shown(PointsView.position.read)
-
-    def __init__(self, simulation: Any, parts: list[tuple], then: bool, *, in_steps: bool):
-        parts = parts or [(simulation.setup.blocks[0], np.empty(0, np.int64))]
-        ids = [block.points.id[rows] for block, rows in parts]
-        super().__init__(simulation, np.concatenate(ids), then)
-        own = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
-        found = [Part(*part, slice(*places)) for part, places in zip(parts, own, strict=True)]
-        self._found = Rows(simulation.setup, found, self._numbers, np.ones(len(self.ids), np.bool_))
-        self._in_steps = in_steps
-
-    def total(self, terms: Any) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over all points of the group, rounded once."""
-        if self._in_steps:
-            return super().total(terms)
-        raise ValueError(
-            "points.total(terms) is known in steps alone; before the first, points come in pieces "
-            "where point_by_point is True"
-        )

@@ -21,7 +21,7 @@ from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import unique
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
-from karamelo_py.scene.views import NodesView, PieceView, PointsView
+from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
 
@@ -298,10 +298,9 @@ def _at_heated_points_python_hooks(hooks, s):
 def view_of(simulation: Any, fix: Fix, *, then: bool) -> PointsView:
     """Show the points of a fix, or the local ones."""
     if fix.point_by_point:
-        return PieceView(
-            simulation, list(simulation.points.rows_of(fix.group)), then, in_steps=True
-        )
-    return PointsView(simulation, simulation.points.members(fix.group), then)
+        pieces = list(simulation.points.rows_of(fix.group))
+        return PointsView(simulation, then=then, pieces=pieces)
+    return PointsView(simulation, simulation.points.members(fix.group), then=then)
 
 
 def views_of(simulation: Any, fix: Fix) -> Iterator[PointsView]:
@@ -309,5 +308,5 @@ def views_of(simulation: Any, fix: Fix) -> Iterator[PointsView]:
     if not fix.point_by_point:
         yield view_of(simulation, fix, then=False)
         return
-    for part in simulation.points.rows_of(fix.group):
-        yield PieceView(simulation, [part], False, in_steps=False)
+    for piece in simulation.points.rows_of(fix.group):
+        yield PointsView(simulation, pieces=[piece], in_steps=False)

@@ -1,6 +1,6 @@
-"""Read the mesh in an input deck of Abaqus or CalculiX.
+"""Read the mesh in an Abaqus or CalculiX deck.
 
-Supports parts, instances with translation and rotation, sets, surfaces, and generated nodes and
+Supports parts, instances with translation and rotation, sets, surfaces, generated nodes and
 elements. Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX
 CrunchiX manual).
 """
@@ -16,10 +16,10 @@ from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
 from karamelo_py.scene.meshes.elements import SHAPES
 from karamelo_py.script.errors import ScriptError
 
-_MOST = 2**31  # bytes of a deck with its includes
+_MOST = 2**31  # bytes, with includes
 _REFUSED = ("NCOPY", "ELCOPY", "NMAP")
-# Corners of faces S1, S2, ... (Abaqus Analysis User's Guide, "Two- and three-dimensional solid
-# element library"), from 0.
+# Corners, from 0, of faces S1, S2, ... (Abaqus Analysis User's Guide, "Two- and three-dimensional
+# solid element library").
 _FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -52,32 +52,32 @@ class _Keyword(NamedTuple):
     name: str
     options: dict[str, str]
     lines: list[str]
-    number: int  # line in its file
+    number: int
     file: Path
 
 
 class _Elements(NamedTuple):
-    type: str  # in Abaqus
+    type: str  # Abaqus type
     numbers: np.ndarray  # (n,)
-    nodes: np.ndarray  # (n, c) node numbers in the deck
+    nodes: np.ndarray  # (n, c) deck's node numbers
 
 
 class _Part:
-    """Nodes, elements and sets of a part, of the assembly, or of a deck without parts."""
+    """Nodes, elements and sets of a part, the assembly or a deck without parts."""
 
     def __init__(self) -> None:
         self.numbers: list[np.ndarray] = []
         self.places: list[np.ndarray] = []
         self.elements: list[_Elements] = []
         self.skipped: list[tuple[str, int]] = []
-        # Contents of each set: numbers, or names of sets.
+        # Sets: numbers, or names of sets.
         self.nodes: dict[str, list[np.ndarray | str]] = {}
         self.groups: dict[str, list[np.ndarray | str]] = {}
         self.surfaces: dict[str, list[tuple[str, str]]] = {}
         self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x
 
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ascending node numbers (n,), and positions; the last definition of a node counts."""
+        """Ascending node numbers (n,) and positions; the last definition of a node counts."""
         if not self.numbers:
             return np.empty(0, np.int64), np.empty((0, 3))
         numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
@@ -91,16 +91,16 @@ class _Instance(NamedTuple):
     move: Callable[[np.ndarray], np.ndarray]
 
 
-def _wrong(keyword: _Keyword, what: str, expected: str | None = None) -> ScriptError:
+def _wrong(keyword: _Keyword, error: str, expected: str | None = None) -> ScriptError:
     return ScriptError(
-        f"{keyword.file.name}, line {keyword.number}: *{keyword.name} {what}",
+        f"{keyword.file.name}, line {keyword.number}: *{keyword.name} {error}",
         argument="file",
         expected=expected,
     )
 
 
 def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
-    """Yield the keywords of a deck with their data lines; included files are inserted."""
+    """Yield keywords with their data lines, those of included files, too."""
     lines = path.read_text("utf-8", errors="replace").splitlines()
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
@@ -144,7 +144,7 @@ def _table(keyword: _Keyword, least: int, most: int) -> np.ndarray:
 
 
 def _flat(keyword: _Keyword) -> np.ndarray:
-    """All integers of the data lines (n,), regardless of line breaks."""
+    """Integers (n,) of all data lines."""
     try:
         words = ",".join(keyword.lines).replace(" ", "").split(",")
         return np.array([word for word in words if word], np.int64)
@@ -153,7 +153,7 @@ def _flat(keyword: _Keyword) -> np.ndarray:
 
 
 def _rows(keyword: _Keyword, count: int) -> np.ndarray:
-    """Elements (n, count) of *ELEMENT, whose lines continue until they have `count` numbers.
+    """Elements (n, count); lines continue until they have `count` numbers.
 
     Extra numbers on the last line, such as inner nodes of C3D8I, are ignored, as in CalculiX.
     """
@@ -178,34 +178,34 @@ def _cylindrical(x: np.ndarray) -> np.ndarray:
 
 
 def _spherical(x: np.ndarray) -> np.ndarray:
-    """Convert from radius, longitude and latitude in degrees."""
+    """From radius, longitude and latitude in degrees."""
     turn, rise = np.radians(x[:, 1]), np.radians(x[:, 2])
     flat = x[:, 0] * np.cos(rise)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), x[:, 0] * np.sin(rise)], axis=1)
 
 
 def _system(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Make the map from local coordinates: origin, a point on the x axis, one in the x-y plane."""
+    """Map from local coordinates: origin, a point on the x axis, one in the x-y plane."""
     if not keyword.lines:
         return lambda x: x
-    given = _table(keyword, 3, 6)
-    origin, along = given[0, :3], given[0, 3:]
-    if len(given) == 1:  # the x axis is parallel to the global x-y plane
+    points = _table(keyword, 3, 6)
+    origin, along = points[0, :3], points[0, 3:]
+    if len(points) == 1:  # x axis parallel to the global x-y plane
         way = along - origin
-        beside = np.array([-way[1], way[0], 0.0]) if way[:2].any() else np.array([0.0, 1, 0])
+        in_plane = np.array([-way[1], way[0], 0.0]) if way[:2].any() else np.array([0.0, 1, 0])
     else:
-        way, beside = along - origin, given[1, :3] - origin
+        way, in_plane = along - origin, points[1, :3] - origin
     if not way.any():
         return lambda x: x + origin
     e1 = way / np.linalg.norm(way)
-    e3 = np.cross(e1, beside)
+    e3 = np.cross(e1, in_plane)
     e3 /= np.linalg.norm(e3)
     axes = np.stack([e1, np.cross(e3, e1), e3])
     return lambda x: origin + x @ axes
 
 
 def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Make the motion of an instance: translation, then rotation about two points, in degrees."""
+    """Motion of an instance: translation, then rotation about two points, in degrees."""
     rows = [_table(keyword._replace(lines=[line]), 1, 7)[0] for line in keyword.lines[:2]]
     shift = rows[0][:3] if rows else np.zeros(3)
     if len(rows) < 2:
@@ -218,7 +218,7 @@ def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _kind(name: str) -> tuple[str, int] | None:
-    """Return the family of an Abaqus element type and its number of nodes."""
+    """Family and number of nodes of an Abaqus element type."""
     for kind, pattern in _TYPES:
         match = pattern.fullmatch(name)
         if match:
@@ -227,9 +227,9 @@ def _kind(name: str) -> tuple[str, int] | None:
     return None
 
 
-def _into(sets: dict, name: str | None, what: np.ndarray | str) -> None:
+def _into(sets: dict, name: str | None, item: np.ndarray | str) -> None:
     if name:
-        sets.setdefault(name.upper(), []).append(what)
+        sets.setdefault(name.upper(), []).append(item)
 
 
 class _Deck:
@@ -237,7 +237,7 @@ class _Deck:
         self.path = path
         self.parts: dict[str, _Part] = {}
         self.instances: list[_Instance] = []
-        self.whole = self.scope = _Part()  # the assembly, or a deck without parts
+        self.whole = self.scope = _Part()
         self.assembly: list[tuple[dict, str, str, list]] = []
         for keyword in _keywords(path):
             reads = _READ.get(keyword.name)
@@ -248,7 +248,7 @@ class _Deck:
             if reads:
                 reads(self, keyword)
 
-    # ---- keywords, one method each ----------------------------------------------------------
+    # ---- keywords ----
 
     def _part(self, keyword: _Keyword) -> None:
         self.scope = self.parts.setdefault(keyword.options.get("NAME", "").upper(), _Part())
@@ -272,11 +272,11 @@ class _Deck:
     def _node(self, keyword: _Keyword) -> None:
         table = _table(keyword, 1, 4)
         kind = (keyword.options.get("SYSTEM") or "R")[0].upper()
-        known = {"R": lambda x: x, "C": _cylindrical, "S": _spherical}
-        if kind not in known:
+        maps = {"R": lambda x: x, "C": _cylindrical, "S": _spherical}
+        if kind not in maps:
             raise _wrong(keyword, f"has the system '{kind}'", "R, C or S")
         numbers = table[:, 0].astype(np.int64)
-        self._add_nodes(numbers, self.scope.system(known[kind](table[:, 1:])))
+        self._add_nodes(numbers, self.scope.system(maps[kind](table[:, 1:])))
         _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
@@ -289,8 +289,8 @@ class _Deck:
         for first, last, step in _table(keyword, 2, 3).astype(np.int64):
             numbers = np.arange(first, last + 1, step or 1)
             ends = self._places(keyword, np.array([first, last]))
-            part = (numbers - first) / max(last - first, 1)
-            self._add_nodes(numbers, ends[0] + part[:, None] * (ends[1] - ends[0]))
+            fraction = (numbers - first) / max(last - first, 1)
+            self._add_nodes(numbers, ends[0] + fraction[:, None] * (ends[1] - ends[0]))
             _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _nfill(self, keyword: _Keyword) -> None:
@@ -307,9 +307,9 @@ class _Deck:
                 _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _places(self, keyword: _Keyword, numbers: np.ndarray) -> np.ndarray:
-        known, places = self.scope.table()
-        at = np.searchsorted(known, numbers)
-        if not len(known) or (known[np.minimum(at, len(known) - 1)] != numbers).any():
+        defined, places = self.scope.table()
+        at = np.searchsorted(defined, numbers)
+        if not len(defined) or (defined[np.minimum(at, len(defined) - 1)] != numbers).any():
             raise _wrong(keyword, "names a node that is not defined above")
         return places[at]
 
@@ -325,10 +325,10 @@ class _Deck:
 
     def _elgen(self, keyword: _Keyword) -> None:
         for row in _table(keyword, 2, 10).astype(np.int64):
-            found = [e for e in self.scope.elements if row[0] in e.numbers]
-            if not found:
+            named = [e for e in self.scope.elements if row[0] in e.numbers]
+            if not named:
                 raise _wrong(keyword, f"of element {row[0]}, which is not defined above")
-            type_, numbers, nodes = found[-1]
+            type_, numbers, nodes = named[-1]
             numbers, nodes = numbers[numbers == row[0]], nodes[numbers == row[0]]
             for count, by_nodes, by_number in row[1:].reshape(3, 3):
                 steps = np.arange(max(count, 1))[:, None]
@@ -356,7 +356,7 @@ class _Deck:
             items = [w.upper() for w in words if w and not w.lstrip("-").isdigit()]
             items.append(np.array([int(w) for w in words if w.lstrip("-").isdigit()], np.int64))
         instance = keyword.options.get("INSTANCE", "").upper()
-        if instance:  # in the assembly, with numbers of a part
+        if instance:  # in the assembly, by numbers of a part
             self.assembly.append((sets, name.upper(), instance, items))
             return
         for item in items:
@@ -372,10 +372,10 @@ class _Deck:
             of, face = (word.strip().upper() for word in (line + ",").split(",")[:2])
             self.scope.surfaces.setdefault(name, []).append((of, face))
 
-    # ---- sets by numbers ---------------------------------------------------------------------
+    # ---- sets by numbers ----
 
     def _numbers(self, sets: dict, name: str) -> np.ndarray:
-        """Return the numbers (n,) in a set, or the number that `name` is."""
+        """Numbers (n,) in a set, or the number that `name` is."""
         if name.lstrip("-").isdigit():
             return np.array([int(name)])
         return np.unique(np.concatenate([np.empty(0, np.int64), *self._resolved(sets, name, ())]))
@@ -387,43 +387,46 @@ class _Deck:
             elif item not in above:
                 yield from self._resolved(sets, item, (*above, name))
 
-    # ---- the mesh ----------------------------------------------------------------------------
+    # ---- the mesh ----
 
     def mesh(self) -> Mesh:
-        """Merge all bodies; their nodes and elements are numbered consecutively."""
+        """Merge all bodies, with consecutive node and element numbers."""
         bodies = self.instances or [
             _Instance(name, part, lambda x: x) for name, part in self.parts.items()
         ]
         if self.whole.numbers or not bodies:
             bodies = [*bodies, _Instance("", self.whole, lambda x: x)]
-        found = _Found()
+        merged = _Found()
         for body in bodies:
-            self._add(found, body)
+            self._add(merged, body)
         for sets, name, instance, items in self.assembly:
-            known = found.nodes if sets is self.whole.nodes else found.groups
-            numbered = found.node_numbers if sets is self.whole.nodes else found.numbers
+            sets_merged = merged.nodes if sets is self.whole.nodes else merged.groups
+            numbered = merged.node_numbers if sets is self.whole.nodes else merged.numbers
             table = numbered.get(instance, numbered[bodies[-1].name])
             for item in items:
-                said = known.get(f"{instance}.{item}", []) if isinstance(item, str) else [
+                said = sets_merged.get(f"{instance}.{item}", []) if isinstance(item, str) else [
                     _looked_up(table, item)
                 ]  # fmt: skip
-                known.setdefault(name, []).extend(said)
+                sets_merged.setdefault(name, []).extend(said)
         if self.instances:  # assembly sets made of INSTANCE.SET and of each other
-            for sets, known in ((self.whole.nodes, found.nodes), (self.whole.groups, found.groups)):
+            for sets, sets_merged in (
+                (self.whole.nodes, merged.nodes),
+                (self.whole.groups, merged.groups),
+            ):
                 for name, items in sets.items():
                     for item in items:
                         if isinstance(item, str):
-                            known.setdefault(name, []).extend(known.get(item, []))
-            self._add_surfaces(found, _Instance("", self.whole, lambda x: x))
-        return found.mesh()
+                            sets_merged.setdefault(name, []).extend(sets_merged.get(item, []))
+            self._add_surfaces(merged, _Instance("", self.whole, lambda x: x))
+        return merged.mesh()
 
-    def _add(self, found: "_Found", body: _Instance) -> None:
+    def _add(self, merged: "_Found", body: _Instance) -> None:
         numbers, places = body.part.table()
-        table = numbers, np.arange(len(numbers)) + sum(map(len, found.points))
-        found.points.append(body.move(places))
-        found.node_numbers[body.name] = table
+        table = numbers, np.arange(len(numbers)) + sum(map(len, merged.points))
+        merged.points.append(body.move(places))
+        merged.node_numbers[body.name] = table
         for kind, count in body.part.skipped:
-            found.skipped[kind] = found.skipped.get(kind, 0) + count
+            merged.skipped[kind] = merged.skipped.get(kind, 0) + count
         made = [np.empty((2, 0), np.int64)]
         for elements in body.part.elements:
             nodes = _looked_up(table, elements.nodes.ravel(), keep=True)
@@ -435,33 +438,33 @@ class _Deck:
                     f"{elements.nodes[row, column]}, which is not defined",
                     argument="file",
                 )
-            made.append(np.stack([elements.numbers, found.count + np.arange(len(nodes))]))
-            found.add(elements.type, nodes)
+            made.append(np.stack([elements.numbers, merged.count + np.arange(len(nodes))]))
+            merged.add(elements.type, nodes)
         numbers = np.concatenate(made, axis=1)
         numbers = numbers[:, np.argsort(numbers[0], kind="stable")]
-        found.numbers[body.name] = numbers[0], numbers[1]
-        found.groups.setdefault(body.name, []).append(numbers[1])
-        for sets, known, numbered in (
-            (body.part.nodes, found.nodes, table),
-            (body.part.groups, found.groups, found.numbers[body.name]),
+        merged.numbers[body.name] = numbers[0], numbers[1]
+        merged.groups.setdefault(body.name, []).append(numbers[1])
+        for sets, sets_merged, numbered in (
+            (body.part.nodes, merged.nodes, table),
+            (body.part.groups, merged.groups, merged.numbers[body.name]),
         ):
             for name in sets:
                 at = _looked_up(numbered, self._numbers(sets, name))
                 for key in {name, f"{body.name}.{name}"} if body.name else {name}:
-                    known.setdefault(key, []).append(at)
-        self._add_surfaces(found, body)
+                    sets_merged.setdefault(key, []).append(at)
+        self._add_surfaces(merged, body)
 
-    def _add_surfaces(self, found: "_Found", body: _Instance) -> None:
+    def _add_surfaces(self, merged: "_Found", body: _Instance) -> None:
         for name, items in body.part.surfaces.items():
             for of, face in items:
                 if of.isdigit():
-                    held = [_looked_up(found.numbers[body.name], np.array([int(of)]))]
+                    elements = [_looked_up(merged.numbers[body.name], np.array([int(of)]))]
                 else:
-                    held = found.groups.get(f"{body.name}.{of}", found.groups.get(of, []))
-                if re.fullmatch(r"S[1-6]", face) and held:
-                    key = int(face[1]) - 1, np.concatenate(held)
-                    for known in {name, f"{body.name}.{name}"} if body.name else {name}:
-                        found.surfaces.setdefault(known, []).append(key)
+                    elements = merged.groups.get(f"{body.name}.{of}", merged.groups.get(of, []))
+                if re.fullmatch(r"S[1-6]", face) and elements:
+                    key = int(face[1]) - 1, np.concatenate(elements)
+                    for key_of_set in {name, f"{body.name}.{name}"} if body.name else {name}:
+                        merged.surfaces.setdefault(key_of_set, []).append(key)
 
 
 _READ: dict[str, Callable[[_Deck, _Keyword], None]] = {
@@ -473,17 +476,17 @@ _READ: dict[str, Callable[[_Deck, _Keyword], None]] = {
 
 
 def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool = False):
-    """Look up the numbers `of` (n,) in a table; unknown ones are left out, or -1."""
+    """Numbers of the mesh for numbers (n,) of the deck; unknown ones are left out, or -1."""
     numbers, stands = table
     if not len(numbers):
         return np.full(len(of), -1) if keep else np.empty(0, np.int64)
     at = np.minimum(np.searchsorted(numbers, of), len(numbers) - 1)
-    known = numbers[at] == of
-    return np.where(known, stands[at], -1) if keep else stands[at[known]]
+    is_listed = numbers[at] == of
+    return np.where(is_listed, stands[at], -1) if keep else stands[at[is_listed]]
 
 
 class _Found:
-    """Nodes, elements and sets of all bodies; elements are numbered from 0 in order."""
+    """Nodes, elements and sets of all bodies; elements are numbered from 0."""
 
     def __init__(self) -> None:
         self.points: list[np.ndarray] = []
@@ -493,7 +496,7 @@ class _Found:
         self.groups: dict[str, list[np.ndarray]] = {}
         self.surfaces: dict[str, list[tuple[int, np.ndarray]]] = {}
         self.skipped: dict[str, int] = {}
-        # For each body: numbers in the deck, ascending, and numbers in the mesh.
+        # By body: ascending numbers in the deck, and numbers in the mesh.
         self.node_numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         self.numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
@@ -513,31 +516,31 @@ class _Found:
             )
         faces: dict[str, list[CellBlock]] = {}
         for name, items in self.surfaces.items():
-            for side, held in items:
+            for side, numbers_of_set in items:
                 for block, of in zip(cells, numbers, strict=True):
                     corners = _FACES.get(block.family, ())
-                    nodes = block.nodes[np.isin(of, held)]
+                    nodes = block.nodes[np.isin(of, numbers_of_set)]
                     if side < len(corners) and len(nodes):
                         kind = FACE_TYPES[len(corners[side])]
                         faces.setdefault(name, []).append(CellBlock(kind, nodes[:, corners[side]]))
         every = [*cells, *(cell for parts in faces.values() for cell in parts)]
         none = [np.zeros(len(cell.nodes), bool) for cell in every]
         sets = {}
-        for name, held in self.groups.items():
+        for name, numbers_of_set in self.groups.items():
             if name:
-                of_set = np.concatenate([np.empty(0, np.int64), *held])
+                of_set = np.concatenate([np.empty(0, np.int64), *numbers_of_set])
                 sets[name] = [np.isin(of, of_set) for of in numbers] + none[len(cells) :]
         for name, parts in faces.items():
             mine = {id(cell) for cell in parts}
             sets[name] = [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
         points = np.concatenate(self.points)
         node_sets = {}
-        for name, held in self.nodes.items():
+        for name, numbers_of_set in self.nodes.items():
             node_sets[name] = np.zeros(len(points), bool)
-            node_sets[name][np.concatenate([np.empty(0, np.int64), *held])] = True
+            node_sets[name][np.concatenate([np.empty(0, np.int64), *numbers_of_set])] = True
         return Mesh(points, every, sets, node_sets, self.skipped)
 
 
 def read_deck(path: Path) -> Mesh:
-    """Read the mesh in a deck; raise ScriptError naming the line that cannot be read."""
+    """Raise ScriptError naming the line that cannot be read."""
     return _Deck(path).mesh()

@@ -1,4 +1,4 @@
-"""Read or generate meshes with Gmsh: its own formats, MED, UNV, and geometries."""
+"""Read or generate meshes with Gmsh: its own formats, MED, UNV, Nastran, geometries."""
 
 import contextlib
 import re
@@ -15,7 +15,7 @@ from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-# Names that differ from Gmsh's by more than capitals.
+# Other than Gmsh's names in lower case.
 _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
 
 
@@ -25,7 +25,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[Any]:
-    """Open a model file in Gmsh; other open models of the process stay unchanged."""
+    """Open a file in Gmsh; other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -45,14 +45,11 @@ def _model(path: Path) -> Iterator[Any]:
 
 
 def begin(gmsh: Any) -> None:
-    """Initialize Gmsh.
-
-    It resets SIGPIPE, and a live page that is closed, or a pipe, would end the program.
-    """
+    """Initialize Gmsh, which resets SIGPIPE: a closed pipe or live page would end the program."""
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
-        with contextlib.suppress(ValueError):  # only the main thread may set it
+        with contextlib.suppress(ValueError):  # main thread only
             signal.signal(signal.SIGPIPE, before)
 
 
@@ -60,7 +57,7 @@ def begin(gmsh: Any) -> None:
 def alone(path: Path) -> Iterator[Path]:
     """Yield a link to a file (or a copy) in an empty folder.
 
-    Gmsh also reads an options file next to the file that it opens, and options may run programs.
+    Gmsh reads an options file next to the file that it opens, and options may run programs.
     """
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name
@@ -76,7 +73,7 @@ def _reason(error: BaseException, path: Path) -> str:
 
 
 def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh:
-    """Mesh the geometry in a file up to `dimension`, with edges up to `size` if given."""
+    """Mesh a geometry up to `dimension`, with edges up to `size`."""
     try:
         with _model(path) as gmsh:
             if size:
@@ -84,7 +81,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             gmsh.model.mesh.generate(dimension)
             if not len(gmsh.model.mesh.getNodes()[0]):
                 raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
-            # If there are physical groups, only they are the mesh.
+            # Physical groups, if any, are the mesh.
             groups = {d for d, _ in gmsh.model.getPhysicalGroups()}
             if groups and min(groups) > dimension:
                 raise ScriptError(
@@ -103,7 +100,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             expected="its libraries installed: on Debian and Ubuntu, apt install " + _LIBRARIES,
             hint=f"or mesh it elsewhere: gmsh -{dimension} {path.name} -o {path.stem}.msh",
         ) from None
-    except Exception as error:  # Gmsh has one class for all its errors
+    except Exception as error:  # Gmsh's only class of errors
         raise ScriptError(
             f"Gmsh cannot mesh {path.name}: {_reason(error, path)}",
             argument="file",
@@ -112,7 +109,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
-    """Read the mesh in a file that Gmsh supports; its errors become ValueError."""
+    """Read a mesh; Gmsh's errors become ValueError."""
     with alone(path) as link:
         try:
             with _model(link) as gmsh:
@@ -124,26 +121,24 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """Parts of a Gmsh file that its library drops.
-
-    These are names of empty groups, and in versions 1 and 2 the group of each element: Gmsh assigns
-    all elements of a geometrical entity to the groups of the entity.
+    """What Gmsh's library drops: names of empty groups, and in versions 1 and 2 the group of each
+    element (Gmsh assigns the groups of a geometrical entity to all its elements).
     """
 
     def __init__(self, path: Path):
         with path.open("rb") as file:
             head = file.read(1_000_000)
         names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", head, re.S)
-        found = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
-        self.names = {(int(dim), int(number)): name for dim, number, name in found}
-        self.groups: dict[int, int] | None = None  # of elements, by number
+        groups = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
+        self.names = {(int(dim), int(number)): name for dim, number, name in groups}
+        self.groups: dict[int, int] | None = None  # by element number
         version = re.match(rb"\$MeshFormat\s+([12])\S* +0", head)
         if not version and b"$NOD" not in head:
             return
         pattern = rb"\$ELM\s+\d+(.*?)\$END|\$Elements\s+\d+(.*?)\$End"
         section = re.search(pattern, path.read_bytes(), re.S)
         if section and (section[1] or version):
-            at = 2 if section[1] else 3  # number, type, [count of tags,] group
+            at = 2 if section[1] else 3  # number, type, [tag count,] group
             rows = (line.split(None, at + 1) for line in (section[1] or section[2]).splitlines())
             self.groups = {int(row[0]): int(row[at]) for row in rows if len(row) > at}
 
@@ -151,31 +146,31 @@ class _Header:
 def _taken(gmsh: Any, only_groups: bool = False, of_file: _Header | None = None) -> Mesh:
     tags, points, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
-    known = tags[order]
-    if (known[1:] == known[:-1]).any():
+    ascending = tags[order]
+    if (ascending[1:] == ascending[:-1]).any():
         raise ValueError("two nodes have one number, or one has the number 0")
     names = dict(of_file.names) if of_file else {}
     for dim, number in gmsh.model.getPhysicalGroups():
         names.setdefault((dim, number), gmsh.model.getPhysicalName(dim, number).strip())
-    # By element type: nodes and groups (n,), -1 for none.
-    found: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    # By element type: nodes, and groups (-1: none).
+    by_kind: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for dim, tag in gmsh.model.getEntities():
         numbers = gmsh.model.getPhysicalGroupsForEntity(dim, tag)
         if only_groups and not len(numbers):
             continue
-        for kind, own, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
+        for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
             count = gmsh.model.mesh.getElementProperties(kind)[3]
             if of_file and of_file.groups is not None:
-                groups = np.array([[of_file.groups.get(int(n), -1)] for n in own])
+                groups = np.array([[of_file.groups.get(int(n), -1)] for n in elements])
             else:
-                groups = np.tile(np.append(numbers, -1).astype(int), (len(own), 1))
-            at = np.searchsorted(known, nodes).reshape(-1, count)
-            found.setdefault(int(kind), []).append((at, groups))
+                groups = np.tile(np.append(numbers, -1).astype(int), (len(elements), 1))
+            at = np.searchsorted(ascending, nodes).reshape(-1, count)
+            by_kind.setdefault(int(kind), []).append((at, groups))
     cells = []
     sets: dict[str, list[np.ndarray]] = {}
     for keys in sorted(names, key=lambda keys: keys[::-1]):
         sets.update({key: [] for key in (names[keys], str(keys[1])) if key})
-    for kind, parts in found.items():
+    for kind, parts in by_kind.items():
         name, dim, _, count, reference, primary = gmsh.model.mesh.getElementProperties(kind)
         family = _FAMILIES.get(name.split()[0], name.split()[0].lower())
         natural = np.reshape(reference, (count, -1))[:, :dim] if dim else None

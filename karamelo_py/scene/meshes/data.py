@@ -1,4 +1,4 @@
-"""Mesh data as returned by every reader: nodes, cells by type, named sets."""
+"""Mesh data, as every reader returns it: nodes, cells by type, named sets."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.script.errors import unknown
 
-# Families of cell types: meshio's names without the number of nodes.
+# By family of cell types: meshio's name without the number of nodes.
 DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
     "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
@@ -16,11 +16,11 @@ DIMENSIONS = {
 class CellBlock(NamedTuple):
     """Cells of one type."""
 
-    type: str  # meshio's name, such as tetra10
-    nodes: np.ndarray  # (n, c) node numbers from 0, corners first
+    type: str  # meshio's, such as tetra10
+    nodes: np.ndarray  # (n, c) numbers from 0, corners first
     # (c, d) natural coordinates of the nodes; None: VTK's order.
     reference: np.ndarray | None = None
-    label: str = ""  # the name of the type in the file, if different
+    label: str = ""  # name in the file, if different
 
     @property
     def family(self) -> str:
@@ -34,15 +34,14 @@ class CellBlock(NamedTuple):
 class Mesh(NamedTuple):
     points: np.ndarray  # (N, 3)
     cells: list[CellBlock]
-    sets: dict[str, list[np.ndarray]]  # by name, a mask (n,) for each item of `cells`
-    node_sets: dict[str, np.ndarray]  # by name, a mask (N,)
-    left_out: dict[str, int]  # elements that solids ignore, such as springs: count by type
+    sets: dict[str, list[np.ndarray]]  # masks (n,), one per block of `cells`
+    node_sets: dict[str, np.ndarray]  # masks (N,)
+    left_out: dict[str, int]  # counts of elements that are no solids, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Return the cells of a named set, or all.
+        """Cells of a named set, or all; a node set selects outer faces with all nodes in it.
 
-        A node set selects the outer faces with all nodes in it. Raises ScriptError for an unknown
-        or empty set.
+        Raises ScriptError for an unknown or empty set.
         """
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
@@ -58,19 +57,19 @@ class Mesh(NamedTuple):
         ]
 
     def _name_of(self, group: str) -> str:
-        """Find a set, ignoring case if that is unambiguous."""
-        known = [*self.sets, *(name for name in self.node_sets if name not in self.sets)]
-        alike = [name for name in known if name.casefold() == group.casefold()]
-        name = group if group in known else alike[0] if len(alike) == 1 else None
+        """Ignores case if that is unambiguous."""
+        names = [*self.sets, *(name for name in self.node_sets if name not in self.sets)]
+        alike = [name for name in names if name.casefold() == group.casefold()]
+        name = group if group in names else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Gmsh groups have numbers and perhaps names. Numbers that occur for one dimension only
-            # need no dimension in front.
-            once = [name for name in known if name.rpartition(":")[2] not in {*known} - {name}]
+            # Gmsh groups have numbers and perhaps names; a number that only one dimension has needs
+            # no dimension in front.
+            once = [name for name in names if name.rpartition(":")[2] not in {*names} - {name}]
             named = [name for name in once if not name.isdigit()] or once
             raise unknown(message, group, named, argument="group")
-        held = self.sets.get(name) or [self.node_sets[name]]
-        if not any(mask.any() for mask in held):
+        masks = self.sets.get(name) or [self.node_sets[name]]
+        if not any(mask.any() for mask in masks):
             raise unknown(
                 f"the physical group '{name}' of the mesh is empty",
                 group,
@@ -80,7 +79,7 @@ class Mesh(NamedTuple):
         return name
 
 
-# Faces of elements by corners, counter-clockwise from outside; in 2D the interior is on the left.
+# Corners of faces, counter-clockwise from outside; in 2D the interior is on the left.
 FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -96,16 +95,16 @@ FACES: dict[str, tuple[tuple[int, ...], ...]] = {
 FACE_TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
 
 
-def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[CellBlock]:
-    """Faces whose nodes all are in `held` (N,), and that belong to one element only."""
+def outer_faces_of(mesh: Mesh, mask: np.ndarray) -> list[CellBlock]:
+    """Faces of one element only, with all nodes in the mask (N,)."""
     highest = max((cells.dimension for cells in mesh.cells if cells.family in FACES), default=0)
     faces: dict[int, list[np.ndarray]] = {}
     for cells in mesh.cells:
         if cells.dimension == highest:
             for face in FACES[cells.family]:
                 nodes = cells.nodes[:, face]
-                faces.setdefault(len(face), []).append(nodes[held[nodes].all(axis=1)])
-    found = []
+                faces.setdefault(len(face), []).append(nodes[mask[nodes].all(axis=1)])
+    blocks = []
     for corners, parts in faces.items():
         nodes = np.concatenate(parts)
         _, first, count = np.unique(
@@ -113,7 +112,7 @@ def outer_faces_of(mesh: Mesh, held: np.ndarray) -> list[CellBlock]:
         )
         outer = nodes[first[count == 1]]
         if len(outer):
-            found.append(CellBlock(FACE_TYPES[corners], outer))
-    if not found:  # single nodes without a face
-        found.append(CellBlock("vertex", np.flatnonzero(held)[:, None]))
-    return found
+            blocks.append(CellBlock(FACE_TYPES[corners], outer))
+    if not blocks:  # nodes without a face
+        blocks.append(CellBlock("vertex", np.flatnonzero(mask)[:, None]))
+    return blocks

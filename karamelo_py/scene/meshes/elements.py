@@ -1,4 +1,4 @@
-"""Supported elements, their exact volumes and centroids, and their orientation."""
+"""Elements: volumes, centroids and orientation."""
 
 import itertools
 import math
@@ -10,23 +10,24 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
-# A shape with less than this part of size^dimension is flat: its volume is round-off.
+# Relative to size^dimension; less is round-off.
 _FLAT = 1e-12
-# Nodes this close (relative to the size of the mesh) to the plane of a 2D mesh lie in it.
+# Distance from the plane of a 2D mesh, relative to the size of the mesh, within which nodes lie in
+# it.
 _PLANE = 1e-9
-_CHUNK = 4096  # elements of many nodes integrated at once
+_CHUNK = 4096  # elements integrated at once
 
 
 class Shape(NamedTuple):
-    """A family of elements; nodes are in the order of meshio, which is VTK's."""
+    """A family of elements; nodes in meshio's order, which is VTK's."""
 
     name: str
     words: str  # plural
     dimension: int
-    # Order of the corners that reverses the orientation.
+    # Corner order of the reversed orientation.
     mirrored: tuple[int, ...]
     corners: tuple[tuple[float, ...], ...]  # natural coordinates
-    simplex: bool = False  # natural coordinates >= 0 with a sum <= 1; else from -1 to 1
+    simplex: bool = False  # coordinates >= 0 with a sum <= 1; else from -1 to 1
 
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -48,7 +49,7 @@ SHAPES = {
     )
 }
 
-# Pairs of corners with mid-edge nodes of second-order elements, in order, then faces.
+# Corners whose mean is a further node of second-order elements, in order: edges, then faces.
 _MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -71,14 +72,14 @@ class MeshElements(NamedTuple):
     """Elements of one shape."""
 
     shape: Shape
-    numbers: np.ndarray  # (n, c) of their corners
-    corners: np.ndarray  # (n, c, d) positions of the corners
-    nodes: np.ndarray | None = None  # (n, k, d) all nodes, if there are more than corners
-    reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of the nodes
-    bulge: float = 0.0  # distance of such nodes from the straight shape, relative to the size
+    numbers: np.ndarray  # (n, c) of the corners
+    corners: np.ndarray  # (n, c, d) positions
+    nodes: np.ndarray | None = None  # (n, k, d) all nodes, if more than corners
+    reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
+    bulge: float = 0.0  # distance of `nodes` from the straight shape, relative to the size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
-        """Reverse the orientation of `which` (n,), as elements with corners only."""
+        """Reverse the orientation of `which` (n,); corners only."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()
         numbers[which], corners[which] = numbers[which][:, order], corners[which][:, order]
@@ -88,10 +89,10 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Return the elements of `dimension` in a mesh or its named `group`, one item per type.
+    """Elements of `dimension` in a mesh or its named `group`, one item per type.
 
-    With `lower`, a group of lower dimension, such as a boundary, is accepted. Raises ScriptError if
-    there are none, for other types, and for a mesh outside z = 0 in 2D or off the x axis in 1D.
+    `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError if there are
+    none, for other types, and for a mesh outside z = 0 in 2D or off the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -118,20 +119,20 @@ def elements_of(
     kinds: dict[tuple[str, tuple], list[np.ndarray]] = {}
     for cells in wanted:
         kinds.setdefault((cells.family, _reference(cells)), []).append(cells.nodes)
-    found = []
+    groups = []
     for (name, reference), parts in kinds.items():
         shape, numbers = SHAPES[name], _once(np.concatenate(parts))
         corners = len(shape.corners)
-        found.append(MeshElements(shape, numbers[:, :corners], positions[numbers[:, :corners]]))
+        groups.append(MeshElements(shape, numbers[:, :corners], positions[numbers[:, :corners]]))
         if len(reference) > corners:
             nodes = positions[numbers[:, : len(reference)]]
             bulge = _bulge(shape, nodes, reference)
-            found[-1] = found[-1]._replace(nodes=nodes, reference=reference, bulge=bulge)
-    return found
+            groups[-1] = groups[-1]._replace(nodes=nodes, reference=reference, bulge=bulge)
+    return groups
 
 
 def _in_order(cells: CellBlock) -> CellBlock:
-    """Reorder pixels and voxels (row by row), and split six-sided prisms into halves."""
+    """Reorder pixels and voxels (row by row), and halve six-sided prisms."""
     order = {
         "pixel": ("quad", [[0, 1, 3, 2]]),
         "voxel": ("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]]),
@@ -140,31 +141,33 @@ def _in_order(cells: CellBlock) -> CellBlock:
     if cells.type not in order:
         return cells
     name, parts = order[cells.type]
-    return CellBlock(name, np.concatenate([cells.nodes[:, part] for part in parts]))
+    return CellBlock(name, np.concatenate([cells.nodes[:, corners] for corners in parts]))
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates of the nodes used; only corners if the others are unknown."""
+    """Natural coordinates of the nodes used; only corners if others are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
-        given = tuple(map(tuple, cells.reference.tolist()))
+        coordinates = tuple(map(tuple, cells.reference.tolist()))
     else:
         corners = np.array(shape.corners, float)
         middles = [corners[list(of)].mean(axis=0) for of in _MIDDLES.get(shape.name, ())]
-        given = tuple(map(tuple, np.concatenate([corners, *(m[None] for m in middles)]).tolist()))
-        if count > len(given):
-            given = given[: len(corners)]
-    while len(given) > len(shape.corners):
-        given = given[: min(count, len(given))]
-        if _exponents(shape.name, len(given)) is not None:
-            return given
-        given = given[: len(given) - 1]  # the centre node moves no boundary
-    return given[: len(shape.corners)]
+        coordinates = tuple(
+            map(tuple, np.concatenate([corners, *(m[None] for m in middles)]).tolist())
+        )
+        if count > len(coordinates):
+            coordinates = coordinates[: len(corners)]
+    while len(coordinates) > len(shape.corners):
+        coordinates = coordinates[: min(count, len(coordinates))]
+        if _exponents(shape.name, len(coordinates)) is not None:
+            return coordinates
+        coordinates = coordinates[: len(coordinates) - 1]  # the centre node moves no boundary
+    return coordinates[: len(shape.corners)]
 
 
 @lru_cache
 def _exponents(name: str, count: int) -> tuple[tuple[int, ...], ...] | None:
-    """Monomials (count, d) spanning shape functions of so many nodes; None if unknown."""
+    """Monomials (count, d) that span the shape functions; None if unknown."""
     d = SHAPES[name].dimension
     for p in range(1, 11):
         every = tuple(itertools.product(range(p + 1), repeat=d))
@@ -195,7 +198,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Remove repeated elements: older formats repeat those in two physical groups."""
+    """Drop repeated elements: older formats repeat those in two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -205,23 +208,21 @@ def _accepted(dimension: int) -> str:
 
 
 def _check_plane(positions: np.ndarray, dimension: int) -> None:
-    """Refuse nodes off the x axis in 1D or off the plane z = 0 in 2D."""
-    beside = np.abs(positions[:, dimension:]).max() if dimension < 3 else 0.0
-    if beside > _PLANE * np.ptp(positions, axis=0).max():
+    distance = np.abs(positions[:, dimension:]).max() if dimension < 3 else 0.0
+    if distance > _PLANE * np.ptp(positions, axis=0).max():
         raise ScriptError(
             f"the mesh does not lie {'on the x axis' if dimension == 1 else 'in the plane z = 0'}: "
-            f"a node is {beside:g} away from it",
+            f"a node is {distance:g} away from it",
             argument="file",
             expected=f"a mesh for {dimension}D",
         )
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """Return the elements with positive orientation, their volumes (n,) and centroids (n, d).
+    """Elements with positive orientation, volumes (n,) and centroids (n, d).
 
-    They are integrals of det J and x det J over the mapped element, with curved edges and warped
-    faces, by a Gauss rule of the degree that makes them exact. Raises ScriptError for a flat or
-    twisted element.
+    Integrals of det J and x det J over the mapped element, with curved edges and warped faces, by a
+    Gauss rule of exact degree. Raises ScriptError for a flat or twisted element.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes
@@ -230,23 +231,23 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     centroid = np.empty((len(nodes), shape.dimension))
     twisted = np.zeros(len(nodes), bool)
     for first in range(0, len(nodes), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        # Relative to the first node, so that a mesh far from the origin loses no digits.
-        local = nodes[part] - nodes[part, :1]
+        batch = slice(first, first + _CHUNK)
+        # Relative to the first node: no digits are lost far from the origin.
+        local = nodes[batch] - nodes[batch, :1]
         weights, x = _integrated(shape, reference, local)
-        volume[part] = weights.sum(axis=1)
-        twisted[part] = (weights * np.sign(volume[part])[:, None] <= 0).any(axis=1)
+        volume[batch] = weights.sum(axis=1)
+        twisted[batch] = (weights * np.sign(volume[batch])[:, None] <= 0).any(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):  # refused below
-            moment = (weights[:, :, None] * x).sum(axis=1) / volume[part, None]
-        centroid[part] = nodes[part, 0] + moment
+            moment = (weights[:, :, None] * x).sum(axis=1) / volume[batch, None]
+        centroid[batch] = nodes[batch, 0] + moment
     flat = np.abs(volume) <= _FLAT * np.ptp(nodes, axis=1).max(axis=1) ** shape.dimension
-    for bad, what in ((flat, "has no volume"), (twisted, "is twisted: it overlaps itself")):
+    for bad, error in ((flat, "has no volume"), (twisted, "is twisted: it overlaps itself")):
         if bad.any():
             number = int(np.argmax(bad))
             where = ", ".join(f"{c:g}" for c in nodes[number].mean(axis=0))
             raise ScriptError(
                 f"element {number + 1} of the {len(volume)} {shape.words} with "
-                f"{nodes.shape[1]} nodes {what}; it lies at ({where})",
+                f"{nodes.shape[1]} nodes {error}; it lies at ({where})",
                 argument="file",
                 expected="elements with a volume, their nodes in the order of the format",
             )
@@ -254,7 +255,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
 
 
 def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted det J (n, q) and position (n, q, d) at Gauss points."""
+    """Weighted det J (n, q) and positions (n, q, d) at Gauss points."""
     if shape.simplex and len(reference) == len(shape.corners):
         edges = nodes[:, 1:] - nodes[:, :1]
         weights = np.linalg.det(edges)[:, None] / math.factorial(shape.dimension)
@@ -266,7 +267,7 @@ def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.n
 
 @lru_cache
 def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights (q,), shape functions (q, c) and their slopes (q, c, d) at Gauss points."""
+    """Weights (q,), shape functions (q, c) and slopes (q, c, d) at Gauss points."""
     shape = SHAPES[name]
     exponents = _exponents(name, len(reference))
     order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with merged corners
@@ -274,7 +275,7 @@ def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np
     at, weight = np.polynomial.legendre.leggauss(-(-(d + 1) * order // 2))
     points = np.array(list(itertools.product(at, repeat=d)))
     weights = np.prod(list(itertools.product(weight, repeat=d)), axis=1)
-    # A square collapsed to a triangle, a cube to a tetrahedron (Duffy 1982).
+    # Collapsed square or cube (Duffy 1982).
     room = np.ones(len(points))
     for axis in range({"triangle": 2, "tetra": 3, "wedge": 2}.get(name, 0)):
         weights = weights / 2 * room
@@ -292,7 +293,7 @@ def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (q, c) of the nodes at `reference`, and slopes (q, c, d), at `points`."""
+    """Shape functions (q, c) of nodes at `reference`, and slopes (q, c, d), at `points`."""
     if name == "pyramid":
         return _of_pyramids(points)
     exponents, inverse = _coefficients(name, reference)
@@ -308,7 +309,7 @@ def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndar
 
 
 def _of_pyramids(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """As `_functions`, for a cube whose four upper corners coincide."""
+    """`_functions` of a cube whose upper corners coincide."""
     cube = SHAPES["hexahedron"].corners
     functions, slopes = _functions("hexahedron", cube, points)
     upper = [of[:, 4:].sum(axis=1, keepdims=True) for of in (functions, slopes)]

@@ -1,4 +1,4 @@
-"""Check that Gmsh geometries only describe a shape, against a list of allowed commands."""
+"""Accept only Gmsh geometries that describe a shape, by a list of allowed commands."""
 
 import re
 import tomllib
@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 from karamelo_py.script.errors import ScriptError
 
-# Comments, strings, numbers, words and signs of Gmsh's language.
+# Gmsh's comments, strings, numbers, words and signs.
 _TOKEN = re.compile(
     r"""//[^\n]*|/\*.*?(?:\*/|\Z)|"[^"]*"|'[^']*'|(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d+)?"""
     r"""|[A-Za-z_][A-Za-z0-9_]*|\S""",
     re.S,
 )
-_LONGEST = 1000  # characters; Gmsh cuts longer strings, and reads the rest as commands
-# When Gmsh skips a condition, loop or macro, it searches for the first letters of these words (and
-# of If, For, Macro, Function) and drops the letter after a match, which may start a string.
+_LONGEST = 1000  # characters; Gmsh cuts longer strings and reads the rest as commands
+# Skipping a condition, loop or macro, Gmsh searches for the first letters of these words (and of
+# If, For, Macro, Function) and drops the letter after a match, which may start a string.
 _ENDS = re.compile(r"EndIf|EndFor|Else|Return")
 _LOSES = re.compile(r"(?:^|[^A-Za-z_])[EFIMR]$")
 _MAY = "run a program, or read or write a file"
@@ -25,16 +25,16 @@ _WORDS, _NO_NAMES, _FIELDS = (
     frozenset(_LISTS[name].split()) for name in ("describe", "act", "fields")
 )
 
-# Display options of the program; no other option may name a file or a command.
+# Display options; no other option may name a file or a command.
 _GENERAL = re.compile(
     r"ExpertMode|NumThreads|Terminal|Verbosity|SmallAxes|Color|(?:Axes|Light|Trackball)\w*"
     r"|(?:Min|Max|Rotation|RotationCenter|Scale|Translation)[XYZ]|RotationCenterGravity"
 )
 _OPTION_ACTS = re.compile(r"Command|File(?!Version|s)")
-_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # they write to files with a > after the text
+_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # to a file with a > after the text
 _READS = frozenset(("Include", "Merge", "MergeWithBoundingBox"))
 _AFTER_NAMES = frozenset(("In", "Using", "Left", "Right", "Alternate"))
-_NAMES = frozenset(("For", "Macro", "Function"))  # a name follows
+_NAMES = frozenset(("For", "Macro", "Function"))
 # Gmsh readers without commands, by ending as Gmsh spells it.
 _DATA = frozenset(
     ending
@@ -42,7 +42,7 @@ _DATA = frozenset(
                   "med", "bdf", "nas", "ply", "cgns")
     for ending in (f".{lower}", f".{lower.upper()}")
 )  # fmt: skip
-# Other files that may be read, if they begin as a mesh and not as commands.
+# Files that may be read if they begin as a mesh.
 _KINDS = frozenset(("", ".geo", ".geo_unrolled", ".pos", ".opt", ".msh", ".msh2", ".msh4"))
 _MESH = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")
 _PAIRS = {"(": ")", "[": "]", "{": "}"}
@@ -63,22 +63,22 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Refuse a geometry that does more than describe a shape, also in files that it includes.
+    """Refuse a geometry that does more than describe a shape, or includes one.
 
-    In a `trusted` geometry, only commands that would end this program are refused.
+    Of a `trusted` geometry, only commands that would end this program are refused.
     """
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
     if not trusted:
-        given = {name for tokens in files.values() for name in _given(tokens)}
+        defined = {name for tokens in files.values() for name in _given(tokens)}
         for tokens in files.values():
             for k in range(len(tokens)):
-                _check(tokens, k, given)
+                _check(tokens, k, defined)
 
 
-def _refuse(token: _Token, what: str, *, trusted: bool = False) -> None:
+def _refuse(token: _Token, reason: str, *, trusted: bool = False) -> None:
     raise ScriptError(
-        f"{token.file.name}, line {token.line}: {what}",
+        f"{token.file.name}, line {token.line}: {reason}",
         argument="file",
         expected="a geometry that describes a shape and no more",
         hint=None if trusted else "the option --trust-geometries lets it",
@@ -86,8 +86,8 @@ def _refuse(token: _Token, what: str, *, trusted: bool = False) -> None:
 
 
 def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None:
-    """Read a file in Gmsh's language and the files that it names."""
-    # Gmsh also reads an options file next to any file.
+    """Read a file in Gmsh's language and those that it includes."""
+    # Gmsh also reads the options next to a file.
     for file in (path, path.with_name(f"{path.name}.opt")):
         if file in files or not file.is_file():
             continue
@@ -100,7 +100,6 @@ def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None
 
 
 def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> None:
-    """Read the file that a command includes."""
     token = tokens[k]
     name, end = [*(other.text for other in tokens[k + 1 : k + 3]), "", ""][:2]
     other = token.file.parent / name[1:-1]
@@ -115,7 +114,7 @@ def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> No
 
 
 def _is_data(path: Path) -> bool:
-    """Tell whether Gmsh merges a file with a reader without commands."""
+    """Gmsh merges the file with a reader without commands."""
     with path.open("rb") as file:
         return path.suffix in _DATA or (path.suffix in _KINDS and file.read(12).startswith(_MESH))
 
@@ -131,14 +130,16 @@ def _tokens(path: Path, trusted: bool) -> Iterator[_Token]:
         if (is_comment or is_text) and not trusted:
             long = is_text and (len(text) > _LONGEST or "\n" in text or _ENDS.search(text))
             if long or "\0" in text or _LOSES.search(before):
-                what = "a text over several lines, a very long one, or one with words such as EndIf"
-                _refuse(_Token(text, line, path), f"{what} can hide what would {_MAY}")
+                suspect = (
+                    "a text over several lines, a very long one, or one with words such as EndIf"
+                )
+                _refuse(_Token(text, line, path), f"{suspect} can hide what would {_MAY}")
         if not is_comment:
             yield _Token(text, line, path)
 
 
 def _after(tokens: list[_Token], k: int) -> int:
-    """Skip brackets that start at `k`, such as the index of a list."""
+    """Skip brackets that start at `k`."""
     while k < len(tokens) and tokens[k].text in ("~", *_PAIRS):
         opened, depth = tokens[k].text, 0
         closed = _PAIRS.get(opened)
@@ -156,7 +157,7 @@ def _texts(tokens: list[_Token], k: int, count: int) -> list[str]:
 
 
 def _given(tokens: list[_Token]) -> Iterator[str]:
-    """Yield the names that a file defines for numbers, strings and macros."""
+    """Yield names that a file defines for numbers, strings and macros."""
     constants = False
     for k, token in enumerate(tokens):
         before = tokens[k - 1].text if k else ""
@@ -172,7 +173,7 @@ def _given(tokens: list[_Token]) -> Iterator[str]:
                 yield token.text
 
 
-def _check(tokens: list[_Token], k: int, given: set[str]) -> None:
+def _check(tokens: list[_Token], k: int, defined: set[str]) -> None:
     """Refuse the token `k` if it does more than describe a shape."""
     token, word = tokens[k], tokens[k].text
     if not token.is_word:
@@ -197,7 +198,7 @@ def _check(tokens: list[_Token], k: int, given: set[str]) -> None:
         if _OPTION_ACTS.search(word):
             _refuse(token, f"the option {word} might {_MAY}")
     elif word not in _WORDS | _FIELDS and before not in _NAMES:
-        if word not in given:
+        if word not in defined:
             _refuse(token, f"{word} is no word that only describes a shape, and might {_MAY}")
         if follows is not token and (
             follows.is_text or (follows.is_word and follows.text not in _AFTER_NAMES)

@@ -1,4 +1,4 @@
-"""Skins of bodies: triangle shells from files, and outer faces of meshes."""
+"""Skins of bodies: shells of triangles, and outer faces of meshes."""
 
 import numpy as np
 
@@ -7,17 +7,17 @@ from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Vertices this close (relative to the size of the surface) are the same, written with few digits.
+# Distance between equal vertices, relative to the size: files have few digits.
 _WELD = 1e-6
 _SAMPLES = 4000  # positions on a shell for testing whether it lies in another
-_SETS = 8  # of shells that do not overlap, at most
+_SETS = 8  # at most, of shells that do not overlap
 
 
 class Skin:
-    """Surface of a body: sets of `faces` (m, d, d), each of them closed.
+    """Surface of a body: sets of `faces` (m, d, d), each closed.
 
-    A position is in the body if one of the sets encloses it, or within `tolerance` of a face. An
-    `open` skin encloses nothing.
+    A position is in the body if a set encloses it, or within `tolerance` of a face. An `open` skin
+    encloses nothing.
     """
 
     def __init__(
@@ -25,16 +25,16 @@ class Skin:
     ):
         self.tolerance, self.open = tolerance, open
         self.surfaces: list[Surface] = [surface_of(faces, tolerance, odd=odd) for faces in sets]
-        # Enclosed length or area or volume; unknown if sets may overlap.
+        # Length, area or volume; None if sets may overlap.
         self.volume = None if open or odd or len(sets) > 1 else float(abs(_volumes(sets[0]).sum()))
 
     @property
     def faces(self) -> np.ndarray:
-        """Corners of all faces (m, d, d)."""
+        """Corners (m, d, d)."""
         return np.concatenate([surface.faces for surface in self.surfaces])
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth of positions (n, >= d) in the body, negative outside, up to `reach`."""
+        """Depth (n,) of positions (n, >= d), negative outside, up to `reach`."""
         if self.open:
             return -np.minimum.reduce([distances(surface, x, reach) for surface in self.surfaces])
         return np.maximum.reduce([depths(surface, x, reach) for surface in self.surfaces])
@@ -45,7 +45,7 @@ class Skin:
 
 
 def _volumes(faces: np.ndarray) -> np.ndarray:
-    """Signed volumes (m,) below faces (m, d, d), which sum to the enclosed volume."""
+    """Signed volumes (m,) below faces (m, d, d); their sum is the enclosed volume."""
     d = faces.shape[2]
     if d == 1:
         return faces[:, 0, 0] * np.where(np.arange(len(faces)) % 2, 1, -1)
@@ -53,26 +53,26 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
     return np.linalg.det(local) / (1, 2, 6)[d - 1]
 
 
-# --- meshes -----------------------------------------------------------------------------------
+# --- meshes ---
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Return the faces (m, d, d) that belong to one element only, oriented outwards.
+    """Faces (m, d, d) of one element only, oriented outwards.
 
-    Faces with four corners are split along the diagonal from the lowest node number, so that
-    neighbours agree and leave no gap. In 1D they come in pairs, the lower one first.
+    Faces with four corners are split along the diagonal from the lowest node number: neighbours
+    agree and leave no gap. In 1D they come in pairs, the lower one first.
     """
-    found: list[np.ndarray] = []
-    for part in parts:
-        solid, _, _ = measured(part)
+    triangles: list[np.ndarray] = []
+    for elements in parts:
+        solid, _, _ = measured(elements)
         local = FACES[solid.shape.name]
         for size in dict.fromkeys(map(len, local)):
             some = [list(face) for face in local if len(face) == size]
             numbers = np.concatenate([solid.numbers[:, face] for face in some])
             once = _once(np.sort(numbers, axis=1))
             corners = np.concatenate([solid.corners[:, face] for face in some])[once]
-            found += _halves(numbers[once], corners) if size == 4 else [corners]
-    faces = np.concatenate(found)
+            triangles += _halves(numbers[once], corners) if size == 4 else [corners]
+    faces = np.concatenate(triangles)
     if faces.shape[2] == 1:
         return np.sort(faces, axis=0)[_once(np.sort(faces[:, :, 0], axis=0))]
     order = np.lexsort(np.moveaxis(faces, 2, 0)[::-1], axis=1)
@@ -81,17 +81,19 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Convert elements of lower dimension to simplices (m, d, d); a line in 3D is a triangle."""
-    found: list[np.ndarray] = []
-    for part in parts:
-        corners, d = part.corners, part.corners.shape[2]
-        whole = _halves(part.numbers, corners) if corners.shape[1] == 4 else [corners]
-        found += [np.concatenate([c, c[:, -1:]], axis=1) if c.shape[1] < d else c for c in whole]
-    return np.concatenate(found)
+    """Simplices (m, d, d) of elements of lower dimension; a line in 3D is a triangle."""
+    simplices: list[np.ndarray] = []
+    for elements in parts:
+        corners, d = elements.corners, elements.corners.shape[2]
+        whole = _halves(elements.numbers, corners) if corners.shape[1] == 4 else [corners]
+        simplices += [
+            np.concatenate([c, c[:, -1:]], axis=1) if c.shape[1] < d else c for c in whole
+        ]
+    return np.concatenate(simplices)
 
 
 def _once(rows: np.ndarray) -> np.ndarray:
-    """Return the rows (n, k) that occur an odd number of times, as ascending indices."""
+    """Ascending indices of the rows (n, k) that occur an odd number of times."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     begin = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
@@ -106,32 +108,32 @@ def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
     return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
 
 
-# --- shells from files ------------------------------------------------------------------------
+# --- shells from files ---
 
 
 def triangles_of(mesh: Mesh) -> np.ndarray:
-    """Return the triangles (m, 3) of a surface; quadrilaterals are split inside their outline."""
-    found = [np.empty((0, 3), np.int64)]
+    """Triangles (m, 3) of a surface; quadrilaterals are split inside their outline."""
+    parts = [np.empty((0, 3), np.int64)]
     for cells in mesh.cells:
         nodes = cells.nodes
         if cells.type == "triangle":
-            found.append(nodes)
+            parts.append(nodes)
         elif cells.type == "quad":
             a, b, c, d = (mesh.points[nodes[:, k]] for k in range(4))
             sides = np.cross(b - a, c - a) * np.cross(c - a, d - a)
             turned = np.where(sides.sum(axis=1)[:, None] < 0, np.roll(nodes, 1, axis=1), nodes)
-            found += [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
-    return np.concatenate(found)
+            parts += [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
+    return np.concatenate(parts)
 
 
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
-    """Make the skin of a body from closed shells: `points` (n, 3), `triangles` (m, 3) of them.
+    """Skin of closed shells of `points` (n, 3), `triangles` (m, 3).
 
     A shell inside another is a cavity, whatever its orientation. Overlapping shells form one body.
     An edge with an odd number of triangles is an error.
     """
     triangles = _closed(points, triangles)
-    for sided in (True, False):  # oriented as in the file; else reoriented consistently
+    for sided in (True, False):  # oriented as in the file; else reoriented
         some = _single(triangles, sided=sided)
         some = some if sided else _turned(some)
         edge, way = _edges(some)
@@ -152,22 +154,22 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
     within = _within(shells, lo, hi, tolerance)
     depth = within.sum(axis=1)
     shells = [s[:, ::-1] if n % 2 else s for s, n in zip(shells, depth, strict=True)]
-    # A shell joins the set of the shell around it; outermost ones are separated if boxes overlap.
+    # A shell joins the set of the shell around it; outermost ones are apart if boxes overlap.
     sets: list[list[int]] = []
     for outer in np.flatnonzero(depth == 0):
-        own = [outer, *np.flatnonzero(within[:, outer])]
+        members = [outer, *np.flatnonzero(within[:, outer])]
         for one in sets:
             apart = (lo[outer] >= hi[one] - tolerance) | (hi[outer] <= lo[one] + tolerance)
             if apart.any(axis=1).all() or (len(sets) == _SETS and one is sets[-1]):
-                one += own
+                one += members
                 break
         else:
-            sets.append(own)
+            sets.append(members)
     return Skin([np.concatenate([shells[k] for k in one]) for one in sets], tolerance)
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Merge equal vertices of triangles; raise an error if the surface is open."""
+    """Merge equal vertices; raise ScriptError if the surface is open."""
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
@@ -194,13 +196,13 @@ def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (3 m,) of triangles: lower and higher vertex, and 1 or -1 for the direction."""
+    """Edges (3 m,) of triangles: lower and higher vertex, and direction (1 or -1)."""
     a, b = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     return np.minimum(a, b), np.maximum(a, b), np.where(a < b, 1, -1)
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number the edges (3 m,) of triangles, equal ones alike; 1 or -1 for the direction."""
+    """Numbers (3 m,) of edges, equal ones alike, and directions (1 or -1)."""
     low, high, way = _ends(triangles)
     return np.unique(low * (triangles.max() + 1) + high, return_inverse=True)[1].ravel(), way
 
@@ -219,7 +221,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Reorient triangles so that two at an edge run through it in opposite directions."""
+    """Reorient triangles: two at an edge run through it in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -227,17 +229,17 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
     ends = np.stack([order[pairs], order[pairs + 1]], axis=1)
     turned = (way[ends[:, 0]] == way[ends[:, 1]]).tolist()
-    beside: list[list[tuple[int, bool]]] = [[] for _ in range(m)]
+    neighbours: list[list[tuple[int, bool]]] = [[] for _ in range(m)]
     for (a, b), other in zip((ends % m).tolist(), turned, strict=True):
-        beside[a].append((b, other))
-        beside[b].append((a, other))
+        neighbours[a].append((b, other))
+        neighbours[b].append((a, other))
     sides: list[bool | None] = [None] * m
     for first in range(m):
         stack = [first] if sides[first] is None else []
         sides[first] = bool(sides[first])
         while stack:
             one = stack.pop()
-            for other, differs in beside[one]:
+            for other, differs in neighbours[one]:
                 if sides[other] is None:
                     sides[other] = sides[one] != differs
                     stack.append(other)
@@ -245,9 +247,9 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number the shells (m,) that triangles belong to, connected by edges (3 m,).
+    """Number the shells (m,) of triangles connected by edges (3 m,).
 
-    If the triangles are not oriented, only edges of two triangles connect.
+    Triangles without orientation are connected only by edges of two triangles.
     """
     edges = np.ascontiguousarray(edge.reshape(3, -1).T)
     if not sided:
@@ -282,7 +284,7 @@ def _within(
 
 
 def _sample(faces: np.ndarray) -> np.ndarray:
-    """Return positions (n, 3) on triangles: corners, and along edges."""
+    """Positions (n, 3) at corners and along edges of triangles."""
     some = faces[:: max(1, 21 * len(faces) // _SAMPLES)]
-    part = np.linspace(0, 1, 8)[:-1, None, None, None]
-    return ((1 - part) * some + part * np.roll(some, -1, axis=1)).reshape(-1, 3)
+    fraction = np.linspace(0, 1, 8)[:-1, None, None, None]
+    return ((1 - fraction) * some + fraction * np.roll(some, -1, axis=1)).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Reader of Wavefront files (.obj): polygons, with or without textures."""
+"""Reader of Wavefront .obj: polygons, with or without textures."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def read_obj(path: Path) -> Mesh:
-    """Read faces, with polygons split into triangles; objects and groups become sets."""
+    """Read faces, polygons as triangles; objects and groups become sets."""
     points: list[list[float]] = []
     faces: dict[int, list[list[int]]] = {3: [], 4: []}
     owners: dict[int, list[tuple[str, ...]]] = {3: [], 4: []}
@@ -41,13 +41,15 @@ def read_obj(path: Path) -> Mesh:
             ) from None
     kinds = [n for n in faces if faces[n]]
     cells = [CellBlock({3: "triangle", 4: "quad"}[n], np.array(faces[n])) for n in kinds]
-    known = dict.fromkeys(name for n in kinds for of in owners[n] for name in of)
-    sets = {name: [np.array([name in of for of in owners[n]]) for n in kinds] for name in known}
+    names_used = dict.fromkeys(name for n in kinds for of in owners[n] for name in of)
+    sets = {
+        name: [np.array([name in of for of in owners[n]]) for n in kinds] for name in names_used
+    }
     return Mesh(np.array(points, float).reshape(-1, 3), cells, sets, {}, {})
 
 
 def _split(points: list[list[float]], corners: list[int]) -> list[list[int]]:
-    """Split a polygon into triangles around a corner from which all of it is visible."""
+    """Split a polygon into a fan from a corner that sees all of it."""
     count = len(corners)
     for start in range(count):
         fan = [

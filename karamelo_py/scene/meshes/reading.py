@@ -1,7 +1,7 @@
 """Entry point for mesh files: chooses the reader.
 
-Gmsh reads its own formats, MED and UNV, and meshes geometries; Abaqus decks have a reader here;
-meshio reads the rest, and Gmsh's formats if Gmsh's library is missing.
+Gmsh reads its own formats, MED, UNV and Nastran, and meshes geometries; Abaqus decks and OBJ have
+readers here; meshio reads the rest, and Gmsh's formats if Gmsh's library is missing.
 """
 
 import contextlib
@@ -26,11 +26,11 @@ from karamelo_py.script.errors import FAILURES, ScriptError
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 _BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas")
-# First bytes of Gmsh's formats; Gmsh takes other text for its geometry language.
+# Other text is Gmsh's geometry language to Gmsh.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
-_BY_ENDING = (".unv", ".bdf", ".nas")  # Gmsh recognises these by ending
+_BY_ENDING = (".unv", ".bdf", ".nas")  # recognised by ending
 _MED = b"\x89HDF"
-# Files of other programs with endings used by meshes: their first bytes, and advice.
+# Other programs' files with endings of meshes: first bytes, and advice.
 _FOREIGN = (
     (re.compile(rb"\s*MFEM"), "a mesh of MFEM", "in MFEM, write it as .vtu or .msh"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
@@ -42,7 +42,7 @@ _FOREIGN = (
 
 
 class MeshFile(InputFile):
-    """Annotation: a file that `read` can read, judged by its ending."""
+    """Annotation: a file that `read` can read, by its ending."""
 
     endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH} - {".svg"}
 
@@ -59,7 +59,7 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
         )
     if path.suffix.lower() in GEOMETRIES:
         refuse_commands(path, trusted=trusted)
-    # Cached, because regions and solids often use the same file.
+    # Cached: regions and solids often use the same file.
     cad = path.suffix.lower() in CAD
     return _read(
         path.resolve(), dimension, size if cad else None, (status.st_mtime_ns, status.st_size)
@@ -92,7 +92,7 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
 
 
 def _refuse_what_is_no_cad(path: Path) -> None:
-    """Refuse a file whose content does not match its CAD ending: the library would print."""
+    """Compare first bytes with a CAD ending: on a mismatch, the library would print."""
     with path.open("rb") as file:
         begin = file.read(1024)
     right = {
@@ -105,13 +105,13 @@ def _refuse_what_is_no_cad(path: Path) -> None:
 
 
 def _by_content(path: Path) -> Mesh:
-    """Choose the reader by the first bytes, else by the ending."""
+    """Choose the reader by first bytes, else by ending."""
     with path.open("rb") as file:
         begin = file.read(4096)
     ending = path.suffix.lower()
-    for pattern, what, remedy in _FOREIGN:
+    for pattern, program, remedy in _FOREIGN:
         if pattern.match(begin):
-            raise _unreadable(path, f"it is {what}", hint=remedy)
+            raise _unreadable(path, f"it is {program}", hint=remedy)
     if ending in (".inp", ".msh") and re.search(rb"^\*[A-Za-z]", begin, re.M):
         return read_deck(path)
     if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
@@ -164,7 +164,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
         meshio._mesh.topological_dimension.setdefault(name, dimension)
         meshio._vtk_common.vtk_to_meshio_type.setdefault(number, name)
     try:
-        # meshio prints messages, and ends the process if no format fits.
+        # meshio prints, and ends the process if no format fits.
         with (
             contextlib.redirect_stdout(io.StringIO()),
             contextlib.redirect_stderr(io.StringIO()),
@@ -183,14 +183,14 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Yield named sets of elements, and integer tags as ``name`` and ``name:number``."""
-    for name, held in mesh.cell_sets.items():
+    """Yield named sets, and integer tags as ``name`` and ``name:number``."""
+    for name, elements in mesh.cell_sets.items():
         if not name.startswith("gmsh:"):
             yield (
                 name,
                 [
                     np.isin(np.arange(len(block.data)), () if of is None else of)
-                    for block, of in zip(mesh.cells, held, strict=True)
+                    for block, of in zip(mesh.cells, elements, strict=True)
                 ],
             )
     tags = {
@@ -205,7 +205,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
             yield f"{name}:{number}", masks
             if len(tags) == 1 or name == "gmsh:physical":
                 yield str(number), masks
-            for group in getattr(mesh, "cell_tags", {}).get(int(number), ()):  # from MED
+            for group in getattr(mesh, "cell_tags", {}).get(int(number), ()):  # MED
                 yield group, masks
     for name, (number, dimension) in mesh.field_data.items():
         arrays = tags.get("gmsh:physical", [])
@@ -220,7 +220,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
 
 
 def _reason(error: BaseException) -> str:
-    """Return an exception as one line; meshio hides the fact that no format fits."""
+    """An exception as one line; meshio hides that no format fits."""
     said = str(error).strip()
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:
