@@ -59,7 +59,7 @@ class Console:
 
     @property
     def terminal(self) -> bool:
-        """Whether `out` is an interactive terminal."""
+        """Tell whether `out` is an interactive terminal."""
         if self._terminal is None:
             isatty = getattr(self.out, "isatty", None)
             self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"

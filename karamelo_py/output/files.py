@@ -53,7 +53,7 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text; on failure the file keeps its content."""
+    """Write a text; on failure the file is unchanged."""
     with whole(path) as file:
         file.write(text.encode())
 

@@ -147,7 +147,7 @@ def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | 
 
 
 def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
-    """Whether each section across an axis (n,) cuts the surface."""
+    """Tell whether each section across an axis (n,) cuts the surface."""
     within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
     return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
@@ -259,7 +259,7 @@ class Front:
         return lines
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
-        """Whether all cells `around` x (n, 2) are in front of these heights."""
+        """Tell whether all cells `around` x (n, 2) are in front of these heights."""
         return -_largest(-self.height, around)[self._cells(x)] > height + 3 * self.cell
 
 

@@ -41,7 +41,7 @@ class Output:
 
     @property
     def takes_part(self) -> bool:
-        """Whether this process takes part in writing dumps."""
+        """Tell whether this process takes part in writing dumps."""
         return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:

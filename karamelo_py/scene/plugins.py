@@ -178,7 +178,7 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
 
 
 def misfit(function: Callable, count: int) -> str:
-    """Why a function cannot be called with `count` arguments, or ""."""
+    """Say why a function cannot be called with `count` arguments, or ""."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
     except TypeError as error:

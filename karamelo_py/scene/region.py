@@ -115,11 +115,11 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def shape(self) -> Any:
-        """What `kernels.surfaces.depth` takes for `distance`, or None."""
+        """Argument of `kernels.surfaces.depth` for `distance`, or None."""
         return None
 
     def outline(self) -> Any:
-        """What it takes for `depth`."""
+        """Argument for `depth`."""
         shape = self.shape()
         return Outside(shape) if self.exterior and shape is not None else shape
 

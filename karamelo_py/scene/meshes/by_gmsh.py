@@ -121,8 +121,9 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """What Gmsh's library drops: names of empty groups, and in versions 1 and 2 the group of each
-    element (Gmsh assigns the groups of a geometrical entity to all its elements).
+    """Parts of a file that Gmsh's library drops: names of empty groups; groups by element.
+
+    In versions 1 and 2 Gmsh assigns the groups of a geometrical entity to all its elements.
     """
 
     def __init__(self, path: Path):

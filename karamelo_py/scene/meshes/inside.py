@@ -208,7 +208,7 @@ def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Keep one of several equal triangles, and none where two shells touch."""
+    """Drop repeated triangles, and all of them where two shells touch."""
     same = np.sort(triangles, axis=1)
     order = np.lexsort(same.T)
     begin = np.flatnonzero(np.r_[True, (np.diff(same[order], axis=0) != 0).any(axis=1)])
