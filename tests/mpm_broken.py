@@ -421,7 +421,7 @@ class Less(NamedTuple):
 
 remembers(Forgetful, ep=0.0, R=0.0)
 shear_response.on(Forgetful)(radial_return)
-flow_stress.on(Forgetful)(lambda strength, memory, *others: (strength.G, strength.G))
+flow_stress.on(Forgetful)(lambda strength, *others: (strength.G, strength.G))
 updated_memory.on(Forgetful)(lambda strength, memory, increment, dt: Less(memory.ep))
 
 
@@ -450,15 +450,17 @@ for kind in (Lone, Misnaming, Renaming, Constant):
     remembers(kind, ep=0.0, R=0.0)
     shear_response.on(kind)(radial_return)
 flow_stress.on(Lone)(lambda strength, *others: strength.G)
-flow_stress.on(Misnaming)(lambda strength, memory, *others: (memory.R1, strength.G))
+flow_stress.on(Misnaming)(lambda strength, before, *others: (before.memory.R1, strength.G))
 updated_memory.on(Renaming)(lambda strength, memory, *others: memory._replace(R1=0.0))
 
 
 class Misshapen(Forgetful): ...  # remembers nothing of its own
 
 
-shear_response.on(Misshapen)(lambda strength, kin, s, *others: (s, ()))
-flow_stress.on(Constant)(lambda strength, memory, *others: (strength.G + memory.R, strength.G))
+shear_response.on(Misshapen)(lambda strength, kin, step, *others: (step.s, ()))
+flow_stress.on(Constant)(
+    lambda strength, before, *others: (strength.G + before.memory.R, strength.G)
+)
 
 
 for kind, number in ((Endless, inf), (Uncountable, nan)):

@@ -384,8 +384,8 @@ def _initial_part_swelling(part, like):
 
 
 @part_after.on(Swelling)
-def _part_after_swelling(part, memory, law, kin, j, s, memories, dt):
-    return (memory[0] + dt,)
+def _part_after_swelling(part, memory, law, step, memories):
+    return (memory[0] + step.dt,)
 
 
 @part_pressure.on(Swelling)

@@ -273,7 +273,7 @@ def test_the_return_is_the_closest_point(s, phi, share, c):
     trial = tuple(sorted(s, reverse=True))
     if trial[0] - trial[2] + (trial[0] + trial[2]) * sa - 2 * k <= 1e-9:
         return
-    t = np.array(returned_to_plane(trial, k, sa, sb, G, K))
+    t = np.array(returned_to_plane(trial, (k, sa, sb), G, K))
     assert t[0] >= t[1] - 1e-12 and t[1] >= t[2] - 1e-12
     assert t[0] - t[2] + (t[0] + t[2]) * sa - 2 * k == pytest.approx(0, abs=1e-11)
     gap = np.array(trial) - t

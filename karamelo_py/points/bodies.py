@@ -1,4 +1,4 @@
-"""Points as bodies: their size, and forces between two points that touch as spheres."""
+"""Points as bodies: size, and forces between two points that touch as spheres."""
 
 from math import pi, sqrt
 from typing import NamedTuple
@@ -23,10 +23,7 @@ class MinimizePenetration(NamedTuple):
 
 
 def face(kin, volume, x):
-    """Area of a point of this volume: a face of a cube.
-
-    Per unit thickness in 2D, per radian if axisymmetric.
-    """
+    """Area of a point as a cube: per unit thickness in 2D, per radian if axisymmetric."""
     if isinstance(kin, Axisymmetric):
         return sqrt(volume * x[0])  # r times the side of the square volume / r
     if kin.dimension == 2:
@@ -35,7 +32,7 @@ def face(kin, volume, x):
 
 
 def radius(kin, volume, x):
-    """Radius of a point as a body: half the side of a cube of its volume."""
+    """Half the side of a cube of this volume."""
     if isinstance(kin, Axisymmetric):
         # The volume is one radian of a ring.
         return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
@@ -69,12 +66,12 @@ def rub(mu, hold, load, mean, unused, stop):
 
     A free point is stopped by `stop`, m v/dt. A point that carries others would creep, because it
     is loaded again in each step. Therefore a spring along the surface, as stiff as the normal
-    contact, is stretched by the slip. Its force `hold` is returned to the friction cone (Wriggers
+    contact, is stretched by the slip; its force `hold` is returned to the friction cone (Wriggers
     2006, "Computational Contact Mechanics", chapter 5).
 
-    The load comes in pulses, because points bounce on a stiff contact. So a step may use friction
-    left `unused` in earlier steps, up to mu times the `mean` load. A point that slides all the time
-    has mu times the load of each step.
+    The load comes in pulses, because points bounce on a stiff contact: a step may use friction left
+    `unused` in earlier steps, up to mu times the `mean` load. A point that slides all the time has
+    mu times the load of each step.
     """
     mean = mean + NEW * (load - mean)
     unused = (1 - NEW) * unused + mu * load
@@ -85,12 +82,11 @@ def rub(mu, hold, load, mean, unused, stop):
 
 
 def along(v, normal):
-    """Return the tangential part of a vector; all of it if the normal is 0."""
+    """Tangential part of a vector; all of it if the normal is 0."""
     square = normal.squared()
     return v + -(dot(v, normal) / square if square > 0 else 0.0) * normal
 
 
 def _shortened(v, most):
-    """Return a vector, shortened to at most this length."""
     size = sqrt(v.squared())
     return (most / size if size > most else 1.0) * v

@@ -25,12 +25,10 @@ class DeformationGradient(Field):
 
     @staticmethod
     def start(kin: Any) -> tuple[float, ...]:
-        """The unit tensor."""
         return tuple(map(float, unit(kin)))
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """True if the state of a law does not contain F."""
         return not deformation.defined(type(law))
 
 
@@ -55,12 +53,12 @@ def of_places_before(frame, kin, dl):
 
 
 def strained(frame, kin, f, dl):
-    """The new F, if the frame needs it, from the `dl` of the frame and the old F."""
+    """New F, if the frame needs it, from the `dl` of the frame and the old F."""
     return f if frame.moves else f + dl
 
 
 def force_stress(frame, kin, tau, f):
-    """The stress that gives nodal forces, per reference volume."""
+    """Stress that gives nodal forces, per reference volume."""
     return tau if frame.moves else tau.nominal(f)
 
 

@@ -1,7 +1,4 @@
-"""The regular grid under a basis: origin, cells and node numbers.
-
-A scene may have several grids with separate nodes; a :class:`Grid` is a row of their table.
-"""
+"""The regular grid under a basis: origin, cells and node numbers."""
 
 from typing import Any, NamedTuple
 
@@ -13,7 +10,7 @@ Count = Any
 
 
 class Grid(NamedTuple):
-    """One regular grid. Lengths are in the units of the scene, counts in cells."""
+    """One of the grids of a scene. Lengths are in the units of the scene, counts in cells."""
 
     x0: Length  # lower corner
     y0: Length
@@ -35,7 +32,6 @@ class Grid(NamedTuple):
 
 
 def renumbered(grid, first, step_x, step_y):
-    """The grid with other node numbers."""
     return grid._replace(first=first, step_x=step_x, step_y=step_y)
 
 
@@ -50,7 +46,6 @@ def in_cells(grid, direction, x):
 
 
 def cells_along(grid, direction):
-    """Number of cells along a direction."""
     return pick(direction, grid.nx, grid.ny, grid.nz)
 
 
@@ -66,7 +61,7 @@ def inside(grid, kin, x):
 
 
 def node_position(grid, n):
-    """(x, y, z) of node `n` of the grid."""
+    """(x, y, z) of node `n`."""
     local = n - grid.first
     x = grid.x0 + (local // grid.step_x) * grid.spacing
     y = grid.y0 + (local % grid.step_x // grid.step_y) * grid.spacing

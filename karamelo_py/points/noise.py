@@ -29,7 +29,7 @@ CUBIC = Borne((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1, damps
 
 
 def borne(basis: Any) -> Borne:
-    """Return the limits of a basis: its own, or those for similar bases."""
+    """Limits of a basis: its own, or those of similar bases."""
     traits = basis.traits
     usual = BOXES if traits.steep_edge else QUADRATIC
     return traits.borne or (JUMPS if traits.gradient_jumps else usual)
@@ -41,7 +41,7 @@ WITH = "with {scene.transfer_name} and the basis {scene.basis_name}"
 
 
 def drifts(transfer: type) -> None:
-    """Register the warning for drifting bodies with `transfer`."""
+    """Register the warning for drifting bodies."""
     known_failure(
         transfer,
         "noise of a drift",
@@ -55,7 +55,7 @@ def drifts(transfer: type) -> None:
 
 
 def turns(transfer: type) -> None:
-    """Register the warning for rotating bodies with `transfer`, or with users of this field."""
+    """Register the warning for rotating bodies, for transfers or users of a field."""
     known_failure(
         transfer,
         "noise of a rotation",

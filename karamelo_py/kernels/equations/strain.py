@@ -42,8 +42,8 @@ class Strain(Task):
         growth = frames.spatial_increment(w.frame, w.kin, dl, f)
         load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
         strained = large(growth) if load_step else growth  # domains grow by the whole gradient
-        beside = pt.load(fbar.PressureBeside, (pt.dt,))
-        state = laws.advance_beside(law, w.kin, old, strained, pt.dt, sum(beside))
+        extra = sum(pt.load(fbar.PressureBeside, (pt.dt,)))
+        state = laws.advance_fbar(law, w.kin, old, laws.FbarStep(strained, pt.dt, extra))
         store(w.points.state, pt.p, state)
         now = frames.strained(w.frame, w.kin, f, dl)
         store(pt.of(frames.DeformationGradient), pt.p, now)

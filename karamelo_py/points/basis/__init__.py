@@ -1,19 +1,13 @@
-"""Bases: the nodes that a point sees, with weights and gradients. One file each.
+"""Bases: the nodes in a point's stencil, with weights and gradients. One file each.
 
-A basis is a NamedTuple of its parameters, often empty (its class is the tag), with the point
-functions declared here. Their arguments:
+A basis is a NamedTuple of its parameters, often empty (its class is the tag), with `traits` and the
+point functions declared here. `grid` is the :class:`~karamelo_py.points.grid.Grid` of the point;
+`place` a flat tuple of its position and the stored shape of its domain (nothing, half sizes,
+corners ...); `stencil` the result of `locate`.
 
-grid
-    the :class:`~karamelo_py.points.grid.Grid` of the point;
-place
-    a flat tuple: the position of the point, then the stored shape of its domain (nothing, half
-    sizes, corners ...);
-stencil
-    the result of `locate`.
-
-A basis that is a product of one function per direction gives only `along` and calls
-:func:`karamelo_py.points.basis.product.register`. Each has `traits` (:class:`BasisTraits`); with
-corners it has an `element`, too (:class:`~karamelo_py.points.basis.cpdi.Element`).
+A product of one function per direction only needs `along` and
+:func:`karamelo_py.points.basis.product.register`. A basis with corners has an `element`
+(:class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
 from math import inf
@@ -53,26 +47,26 @@ class BasisTraits(NamedTuple):
 
 @point_function()
 def locate(basis, kin, grid, place):
-    """The stencil of a point: whatever the functions below need, computed once per point."""
+    """The stencil of a point: what the functions below need, computed once per point."""
 
 
 @point_function()
 def support(basis, kin):
-    """The number of nodes a point sees; a constant at compile time."""
+    """Number of nodes of a stencil; a constant at compile time."""
 
 
 @point_function()
 def entry(basis, kin, grid, stencil, k):
     """(node number, weight N, gradient of N) of the k-th node of a stencil.
 
-    The gradient is a vector; in axisymmetry with N / r after it (`Gradient` of the kinematics). A
+    The gradient is a vector; in axisymmetry followed by N / r (`Gradient` of the kinematics). A
     node may occur more than once: its parts are summed.
     """
 
 
 @point_function()
 def reach(basis, kin, grid, stencil, k):
-    """X_I - x, the vector from the point to the k-th node of its stencil."""
+    """X_I - x, from the point to the k-th node of its stencil."""
 
 
 @point_function()
@@ -82,27 +76,27 @@ def affine_weight(basis, kin, grid, stencil, k):
 
 @point_function(otherwise=True)
 def walled(basis, faces):
-    """The same basis, also modified at walls inside the grid (see `splines.AtWalls`)."""
+    """The basis, also modified at walls inside the grid (see `splines.AtWalls`)."""
     return basis
 
 
 @point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
-    """The part of a point's affine moment that MUSL maps to the nodes the second time."""
+    """Part of a point's affine moment that MUSL maps to the nodes the second time."""
     return moment
 
 
 def leave_moment_out(basis, grid, moment):
-    """Map no moment the second time: B D^-1 is unbounded where D vanishes.
+    """No moment the second time: B D^-1 is unbounded where D vanishes.
 
-    The velocity that deforms the points omits it; the points retain B, so nothing is lost.
+    The velocity that deforms the points omits it; the points retain B.
     """
     return (grid.h - grid.h) * moment
 
 
 @point_function(otherwise=True)
 def first_node(basis, like):
-    """Return the offset to a position in cells, whose integer part is then its first node."""
+    """Offset to a position in cells, whose integer part is then its first node."""
     return 0
 
 
@@ -110,7 +104,7 @@ def first_node(basis, like):
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Count the numbers of a place after the position, in `d` dimensions."""
+    """Count of numbers of a place after the position, in `d` dimensions."""
     shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
@@ -130,28 +124,25 @@ def deformed(basis, kin, place, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """Return the reach of the corners of the point's domain, in cells; 0 without corners.
-
-    Or the distance of the nodes that they may scatter to, if that is larger.
-    """
+    """Reach of the domain's corners, or of the nodes they scatter to, in cells; or 0."""
     return grid.h - grid.h
 
 
 @point_function(otherwise=True)
 def carried(basis, kin):
-    """Count the corners of the domain that move with the grid; constant at compile time."""
+    """Count of domain corners that move with the grid; constant at compile time."""
     return 0
 
 
 @point_function(otherwise=True)
 def placed(basis, kin):
-    """Count the corners stored by position, directly after the point's position."""
+    """Count of corners stored by position, directly after the point's position."""
     return 0
 
 
 @point_function(otherwise=True)
 def carrier(basis, kin, grid, stencil, corner):
-    """The nodes that carry a corner, and their weights: a :class:`Weighted`."""
+    """Nodes that carry a corner, and their weights: a :class:`Weighted`."""
     return ()
 
 

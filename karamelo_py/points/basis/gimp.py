@@ -19,8 +19,6 @@ STRETCHED = "half_size", "half_size", "deformation"  # present and initial half 
 
 
 class _Box(NamedTuple):
-    """Base of these bases."""
-
     in_lanes = True
     traits = BasisTraits(
         cells=3, least_nodes=4, steady_moment=True, steep_edge=True, shape=("half_size",)
@@ -148,7 +146,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, place, direction, least, most):
-    """Centre and both ends of a domain along one direction, in cells, before cutting at walls."""
+    """Centre and ends of a domain along one direction, in cells, before cutting at walls."""
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
     half = min(max(half, least), most)
@@ -156,10 +154,7 @@ def box(grid, kin, place, direction, least, most):
 
 
 def in_cell(lo, hi, j):
-    """Integrate over the part of [lo, hi] in the cell between nodes j and j + 1.
-
-    The integrals of 1 and of the hat function of node j + 1 over the part.
-    """
+    """Integrals of 1 and of the hat of node j + 1 over [lo, hi] in the cell from node j."""
     p = max(lo - j, 0)
     q = min(hi - j, 1)
     length = max(q - p, 0)
@@ -169,7 +164,7 @@ def in_cell(lo, hi, j):
 def averaged_hats(cells, grid, first, lo, hi):
     """Hats from node `first`, averaged over [lo, hi].
 
-    The domain lies within this number of `cells` from that node; lengths are in cells, from it.
+    Lengths are in cells from that node; the domain lies within this number of `cells` from it.
     """
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
@@ -212,9 +207,9 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
 
 
 def _end(at, first, top):
-    """The cell from node `first` that contains an end of a box, and the position in it.
+    """Cell from node `first` that contains an end of a box, and the position in it.
 
-    For an end beyond a wall: the cell at the wall, at most the `top`-th.
+    For an end beyond a wall the cell at the wall, at most the `top`-th.
     """
     b = at - first
     i = min(max(int(b), 0), min(top, 2))

@@ -43,7 +43,7 @@ known_failure(
 
 
 def _meet_again(basis, scene):
-    """Return True if bodies have time to fly through the domain, and collide or bounce again."""
+    """Check whether bodies have time to fly through the domain, and collide or bounce again."""
     domain, share = scene.hub.domain, scene.hub.update.dt_factor
     far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
     small = share is not None and share <= SMALL_SHARE

@@ -1,8 +1,4 @@
-"""Bases that are a product of one function per direction: hats, splines, uniform GIMP.
-
-The one-dimensional part is the point function `along`; the rest is the same product for any number
-of directions.
-"""
+"""Bases that are a product of one function per direction: hats, splines, uniform GIMP."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +10,7 @@ from karamelo_py.points.kinematics import Axisymmetric, gradient, product, vecto
 
 
 class Along(NamedTuple):
-    """The nodes that a point sees in one direction."""
+    """Nodes of a stencil in one direction."""
 
     first: int  # number of the first of them in this direction
     r: float  # distance of the point from it, in cells
@@ -25,14 +21,14 @@ class Along(NamedTuple):
 
 
 class Stencil(NamedTuple):
-    """The nodes that a point sees, in any numbering."""
+    """Nodes of a stencil, in any numbering."""
 
     lines: tuple[Along, ...]  # along each direction
     inv_r: float  # 1 / r of an axisymmetric point
 
 
 def sees_same_nodes(stencil):
-    """Check that the points in all lanes see the same nodes."""
+    """Check whether the points in all lanes have the same nodes."""
     first, *rest = (is_one(line.first) for line in stencil.lines)
     for same in rest:
         first = first & same
@@ -40,14 +36,14 @@ def sees_same_nodes(stencil):
 
 
 def with_one_node(stencil):
-    """The stencil of points with the same nodes: their numbers have no lanes."""
+    """The stencil of points with the same nodes: node numbers have no lanes."""
     lines = tuple(type(line)(first_lane(line.first), *line[1:]) for line in stencil.lines)
     return Stencil(lines, stencil.inv_r)
 
 
 @point_function()
 def along(basis, kin, grid, place, direction):
-    """The nodes that a point sees in one direction: an :class:`Along`."""
+    """Nodes of a stencil in one direction: an :class:`Along`."""
 
 
 @point_function(otherwise=True)
@@ -70,12 +66,12 @@ def inverse_spread(basis, grid):
 
 @point_function(otherwise=True)
 def evenly(basis, grid, stencil):
-    """Check that D^-1 of a point is `inverse_spread`."""
+    """Check whether D^-1 of a point is `inverse_spread`."""
     return True
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """The gradient of a weight; in axisymmetry with N / r after it, on the axis dN/dr."""
+    """Gradient of a weight; in axisymmetry followed by N / r, on the axis dN/dr."""
     if isinstance(kin, Axisymmetric):
         slopes = (*slopes, where(inv_r > 0, weight * inv_r, slopes[0]))
     return gradient(kin, slopes)
@@ -104,7 +100,7 @@ def node_number(grid, first, steps):
 
 
 def cell_number(kin, grid, place):
-    """Number of the cell of a point, among the cells of all grids."""
+    """Number of the cell of a point, over all grids."""
     number = 0
     for k in range(kin.dimension):
         count = cells_along(grid, k)
@@ -113,7 +109,7 @@ def cell_number(kin, grid, place):
 
 
 def digits(k, base, d):
-    """Split a number into `d` digits in a base, the highest first."""
+    """The `d` digits of a number in a base, the highest first."""
     found: list = []
     for _ in range(d - 1):
         found = [k % base, *found]
@@ -122,23 +118,22 @@ def digits(k, base, d):
 
 
 def item(values, k):
-    """Return values[k], for a k known only at run time."""
+    """values[k], for a k known only at run time."""
     return values[k]
 
 
 def each_for_its_own(weights, others):
-    """Products of weights; for each direction, one factor is replaced by that of `others`."""
+    """Products of weights; for each direction, its factor is replaced by the one in `others`."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
 
 
 def places_of(stencil, k):
-    """Return the node indices on each line of the k-th node of a stencil."""
+    """Node indices on each line of the k-th node of a stencil."""
     return digits(k, len(stencil.lines[0].weights), len(stencil.lines))
 
 
 def weights_of(stencil, at):
-    """Return the weights along each direction."""
     return [item(line.weights, n) for line, n in zip(stencil.lines, at, strict=True)]
 
 

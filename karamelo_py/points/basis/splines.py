@@ -1,7 +1,7 @@
 """B-splines, modified at the walls of the grid: three or four nodes per direction.
 
-Held nodes inside the grid also make walls (:class:`AtWalls`). A separate class with the same
-functions handles them, so that scenes without such walls pay nothing.
+Nodes held inside the grid also make walls (:class:`AtWalls`), by a separate class: scenes without
+such walls pay nothing.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ class AtWalls(NamedTuple):
 
 @point_function(otherwise=True)
 def walls_beside(basis, kin, grid, place, direction):
-    """(whether the lower face of the point's cell is a wall, whether the upper is), or ()."""
+    """(lower face of the point's cell is a wall, upper face is), or ()."""
     return ()
 
 
@@ -36,7 +36,7 @@ def _walls_beside_at_walls(basis, kin, grid, place, direction):
 
 
 def hats(grid, a, cell, first, count):
-    """The hat functions of a cell, for `count` nodes from the `first`."""
+    """Hat functions of a cell, for `count` nodes from the `first`."""
     t, number = a - cell, cell - first
     weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
     slope = grid.inv_h
@@ -93,7 +93,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
 
 
 def in_bulk(basis, grid, line, direction):
-    """Return True if these are the splines, and not the functions at a wall."""
+    """Check whether a line has the splines, not the functions at a wall."""
     if isinstance(basis, AtWalls):
         return line.weights[0] * line.weights[2] > 0
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
@@ -129,7 +129,7 @@ class QuadraticSplineAtWalls(AtWalls):
 
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
-    """Give a basis `of` with walls inside the grid the functions of the one without."""
+    """Give `of`, a basis with walls inside the grid, the functions of the one without."""
     of.traits = basis.traits
     walled.on(basis)(lambda basis, faces: of(faces))
     walls_beside.on(of)(_walls_beside_at_walls)
@@ -220,7 +220,7 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
 
 
 def at_wall(grid, a, cell, last, below, above, inside):
-    """The modified functions of a cell at a wall; unused nodes of the four have no weight.
+    """Modified functions of a cell at a wall; unused nodes of the four have no weight.
 
     Without walls `inside` the grid, only a grid of one cell is between two.
     """

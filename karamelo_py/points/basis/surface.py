@@ -1,4 +1,4 @@
-"""Surface of a body, from the sums over the body's points at a node."""
+"""Distance of a body's surface from a node, from sums over the body's points at the node."""
 
 from typing import NamedTuple
 
@@ -15,12 +15,8 @@ ENTRIES = 256  # of a table, over a cell
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
     """Positions, in cells from a node, and the weights of the node there.
 
-    Parameters
-    ----------
-    basis
-        The basis; for bases with point domains the hat functions are averaged over a domain.
-    half
-        Half the size of a point, in cells.
+    `half` is half the size of a point, in cells. For bases with point domains, the hat functions
+    are averaged over a domain.
     """
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
@@ -41,17 +37,12 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Distance of a plane surface from a node, from the mean position of the body's points there.
+    """Distance of a plane surface from a node, for mean positions of the body's points there.
 
     Points of equal mass lie in layers below the surface, the first half of their size from it; both
     distances are in cells, along the outward normal. Row k belongs to a mean of k / ENTRIES - 3
     (after Nairn 2013, "Modeling imperfect interfaces in the material point method using
-    multimaterial methods", CMES 92(3), section 4, who uses a power law).
-
-    Parameters
-    ----------
-    basis, half
-        See `profile`.
+    multimaterial methods", CMES 92(3), section 4, who uses a power law). `half` as in `profile`.
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:

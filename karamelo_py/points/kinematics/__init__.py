@@ -32,7 +32,7 @@ COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 
 
 class Line(NamedTuple):
-    """One dimension: uniaxial strain."""
+    """1D: uniaxial strain."""
 
     word = "1D"
     dimension = 1
@@ -42,7 +42,7 @@ class Line(NamedTuple):
 
 
 class PlaneStrain(NamedTuple):
-    """Two dimensions, unit thickness, no strain out of the plane."""
+    """2D, unit thickness, no strain out of the plane."""
 
     word = "plane-strain"
     dimension = 2
@@ -52,10 +52,10 @@ class PlaneStrain(NamedTuple):
 
 
 class Axisymmetric(NamedTuple):
-    """Two dimensions, x the radius and y the axis: a body of revolution without torsion.
+    """2D, x the radius and y the axis: a body of revolution without torsion.
 
-    The gradient of a basis function N at such a point has three components, (dN/dr, dN/dz, N/r).
-    The last gives the hoop strain, and the force of the hoop stress.
+    The gradient of a basis function N has three components, (dN/dr, dN/dz, N/r). The last gives the
+    hoop strain, and the force of the hoop stress.
     """
 
     word = "axisymmetric"
@@ -66,7 +66,7 @@ class Axisymmetric(NamedTuple):
 
 
 class Space(NamedTuple):
-    """Three dimensions."""
+    """3D."""
 
     word = "3D"
     dimension = 3
@@ -85,15 +85,12 @@ def free_from(kin):
 
 
 def planar(kin):
-    """The tag whose tensors are d x d matrices over the same vectors.
-
-    For velocity moments, which have no hoop component.
-    """
+    """The tag whose tensors are d x d matrices over the same vectors: no hoop component."""
     return PlaneStrain() if isinstance(kin, Axisymmetric) else kin
 
 
 def total(terms):
-    """Sum terms from the first on; `sum` rounds differently from Python 3.12 on."""
+    """Sum from the first term on; `sum` rounds differently from Python 3.12 on."""
     made = terms[0]
     for term in terms[1:]:
         made = made + term
@@ -101,7 +98,6 @@ def total(terms):
 
 
 def product(factors):
-    """Multiply factors, from the first on."""
     made = factors[0]
     for factor in factors[1:]:
         made = made * factor
@@ -117,23 +113,12 @@ def dot(*vectors):
 
 
 class Elements(tuple):
-    """Components that exist in a kinematics.
+    """Components that exist in a kinematics `kin`.
 
-    Attributes
-    ----------
-    kin
-        The kinematics.
-    places
-        Row and column of each component (for vectors the direction, twice), from 0.
-    axes
-        Indices of rows.
-
-    Tensors also have:
-
-    acting
-        As `places`, but with the direction that a row acts along: the radius for hoop components.
-    rows
-        For each direction, index and column of the components that act along it, the last first.
+    `places` are row and column of each component (for vectors the direction, twice), from 0; `axes`
+    the indices of rows. Tensors also have `acting`, which is `places` with the direction that a row
+    acts along (the radius for hoop components), and `rows`: for each direction, index and column of
+    the components that act along it, the last first.
     """
 
     __slots__ = ()
@@ -175,30 +160,26 @@ class Elements(tuple):
         return self._make([a + p if i == j else a for a, (i, j) in pairs])
 
     def at(self):
-        """Map row and column to components."""
+        """Components by row and column."""
         return dict(zip(self.places, self, strict=True))
 
 
 def add_scaled(start, factor, a):
-    """start + factor a, rounded once."""
     return start._make([fma(factor, b, t) for t, b in zip(start, a, strict=True)])
 
 
 def add_outer(start, a, b):
-    """t_ij + a_i b_j, rounded once."""
     pairs = zip(start, start.acting, strict=True)
     return start._make([fma(a[i], b[j], t) for t, (i, j) in pairs])
 
 
 def add_product(start, s, gradient):
-    """v_i + s_ij g_j, each term rounded once (`Matrix.dot`)."""
     return s.vector._make(
         [add_row(s, terms, gradient, a) for a, terms in zip(start, s.rows, strict=True)]
     )
 
 
 def add_row(s, terms, gradient, a):
-    """a + s_ij g_j for one row, each term rounded once."""
     for k, j in terms:
         a = fma(s[k], gradient[j], a)
     return a
@@ -238,11 +219,9 @@ class Vector(Elements):
     __slots__ = ()
 
     def planar(self):
-        """Remove the hoop component."""
         return self if self.vector is type(self) else self.vector._make(self[:2])
 
     def squared(self):
-        """a_i a_i."""
         return total([a * a for a in self])
 
     def largest(self):
@@ -254,15 +233,10 @@ class Vector(Elements):
 
 
 class Matrix(Elements):
-    """Base of tensors, symmetric or not."""
-
     __slots__ = ()
 
     def dot(self, gradient):
-        """s_ij g_j of a stress and a gradient, each term rounded once: a nodal force.
-
-        Hoop components act along the radius.
-        """
+        """s_ij g_j of a stress and a gradient, each term rounded once; hoop parts act radially."""
         made = []
         for (k, j), *rest in self.rows:
             made.append(add_row(self, rest, gradient, self[k] * gradient[j]))
@@ -271,12 +245,12 @@ class Matrix(Elements):
         return out
 
     def columns(self):
-        """The columns as vectors, without the hoop component."""
+        """Columns as vectors, without the hoop component."""
         a, d = self.at(), self.kin.dimension
         return tuple([self.vector._make([a[i, j] for i in range(d)]) for j in range(d)])
 
     def diagonal(self):
-        """(t_xx, t_yy, t_zz), limited to the directions of vectors."""
+        """(t_xx, t_yy, t_zz) in the directions of vectors."""
         a = self.at()
         return self.vector._make([a[i, i] for i in range(self.kin.dimension)])
 
@@ -301,17 +275,15 @@ class Tensor(Matrix):
         )
 
     def transposed(self):
-        """t_ji."""
         a = self.at()
         return self._make([a[j, i] for i, j in self.places])
 
     def planar(self):
-        """Remove the hoop component."""
         made = self.vector.tensor
         return self if made is type(self) else made._make(self[:4])
 
     def generator(self):
-        """Return the matrix that gives strain and rotation of this increment, dt grad v."""
+        """The matrix that gives strain and rotation of this increment, dt grad v."""
         return self
 
     def strain_at_end(self):
@@ -365,14 +337,13 @@ class Tensor(Matrix):
         )
 
     def towards_rotation(self):
-        """One step of Newton's iteration to the rotation."""
         back = inv(self)
         g = sqrt(sqrt(total([t * t for t in back]) / total([t * t for t in self])))
         pairs = zip(self, back.transposed(), strict=True)
         return self._make([(0.5 * g) * a + (0.5 / g) * b for a, b in pairs])
 
     def turned_back(self, f):
-        """The symmetric part of R^T F."""
+        """Symmetric part of R^T F."""
         r, f = self.at(), f.at()
 
         def component(i, j):
@@ -395,7 +366,7 @@ POLAR_STEPS = 7
 
 
 def cofactor(a, d, i, j):
-    """Cofactor of a[i, j] in the d x d matrix with components `a`, by row and column."""
+    """Cofactor of a[i, j] in the d x d matrix of components `a`, by row and column."""
     if d == 1:
         return 1
     if d == 2:
@@ -405,7 +376,6 @@ def cofactor(a, d, i, j):
 
 
 def determinant(a, d):
-    """Determinant of the d x d matrix with components `a`, by row and column."""
     return total([a[0, j] * cofactor(a, d, 0, j) for j in range(d)])
 
 
@@ -418,7 +388,7 @@ def squares(a, axes, i, j):
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
     """dl of a step with a large rotation, and the logarithm of I + dl.
 
-    Strain and rotation are those of the logarithm: the constant dt grad v that leads to I + dl.
+    Strain and rotation are those of the logarithm, the constant dt grad v that leads to I + dl.
     """
 
     __slots__ = ()
@@ -427,11 +397,9 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.dl + other
 
     def at(self):
-        """Map row and column to components of dl."""
         return self.dl.at()
 
     def generator(self):
-        """Return the matrix that gives strain and rotation."""
         return self.logarithm
 
     def strain_at_end(self):
@@ -443,11 +411,11 @@ algebra(LargeIncrement)
 
 
 def large(dl):
-    """Compute strain and rotation of a step with a large rotation.
+    """Strain and rotation of a step with a large rotation.
 
     ln(I + dl) = 2 artanh(G / 2) with the midpoint gradient G = 2 dl (2 I + dl)^-1. For a pure
-    rotation G is skew (Hughes & Winget 1980), and so are its odd powers, so that it gives no strain
-    for any truncation. The error is G^7/448.
+    rotation G and its odd powers are skew (Hughes & Winget 1980): no strain for any truncation. The
+    error is G^7/448.
     """
     G = dl @ inv(I + 0.5 * dl)
     squared = G @ G
@@ -461,7 +429,7 @@ class SymmetricTensor(Matrix):
     __slots__ = ()
 
     def at(self):
-        """Map row and column to components, on both sides of the diagonal."""
+        """Components by row and column, on both sides of the diagonal."""
         a = dict(zip(self.places, self, strict=True))
         return a | {(j, i): value for (i, j), value in a.items()}
 
@@ -482,7 +450,6 @@ class SymmetricTensor(Matrix):
         return self.turned_in_plane(dl) if self.kin.dimension == 2 else self.turned_in_space(dl)
 
     def turned_in_plane(self, dl):
-        """See `turned`."""
         turn = dl.generator().at()
         xx, yy, zz, xy = self
         half = 0.25 * (turn[1, 0] - turn[0, 1])
@@ -503,7 +470,6 @@ class SymmetricTensor(Matrix):
         return self._make([xx + change, yy - change, zz, xy + shear])
 
     def turned_in_space(self, dl):
-        """See `turned`."""
         # R = I + k (T + T T), T the cross product with the scaled w / 2
         turn, s, axes = dl.generator().at(), self.at(), range(3)
         w = [0.25 * (turn[(i + 2) % 3, (i + 1) % 3] - turn[(i + 1) % 3, (i + 2) % 3]) for i in axes]
@@ -550,10 +516,7 @@ class SymmetricTensor(Matrix):
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
 
     def nominal(self, F):
-        """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress.
-
-        P times reference volume and reference gradient gives nodal forces.
-        """
+        """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress."""
         if self.kin.dimension == 1:
             return type(F)._make([self[0] / F[0]])
         a, back = self.at(), inv(F).at()
@@ -586,7 +549,7 @@ def _class(kind: type, tag: type, names: tuple) -> type:
 
 
 def _rows(one: type, whole: type) -> None:
-    """Set how the components of tensors act on vectors; `whole` is the class of F."""
+    """Set how components of tensors act on vectors; `whole` is the class of F."""
     d = one.kin.dimension
     one.acting = tuple((i if i < d else 0, j) for i, j in one.places)
     number = {(j, i): k for k, (i, j) in enumerate(one.places)}
@@ -615,22 +578,18 @@ for _tag in TAGS:
 
 
 def vector(kin, numbers):
-    """Make a vector of numbers."""
     return kin.Vector._make(numbers)
 
 
 def gradient(kin, numbers):
-    """Make the gradient of a basis function of numbers."""
     return kin.Gradient._make(numbers)
 
 
 def tensor(kin, numbers):
-    """Make a tensor of numbers."""
     return kin.Tensor._make(numbers)
 
 
 def symmetric_tensor(kin, numbers):
-    """Make a symmetric tensor of numbers."""
     return kin.Symmetric._make(numbers)
 
 
@@ -645,12 +604,11 @@ def nothing(kin):
 
 
 def zero(kin, like):
-    """The tensor 0 with numbers of the type of `like`, to start sums in loops."""
+    """The tensor 0, with numbers of the type of `like`, to start sums in loops."""
     return kin.Tensor._make([real(0, like) for _ in kin.Tensor.places])
 
 
 def zero_vector(kin, like):
-    """The vector 0, likewise."""
     return kin.Vector._make([real(0, like) for _ in kin.Vector.places])
 
 
@@ -674,7 +632,6 @@ def inv(f):
 
 
 def sym(a):
-    """(a_ij + a_ji) / 2."""
     a = a.generator()
     made, a = a.symmetric, a.at()
     return made._make(
@@ -683,12 +640,10 @@ def sym(a):
 
 
 def tr(s):
-    """Trace of a symmetric tensor."""
     return s[0] + s[1] + s[2]
 
 
 def dev(s):
-    """Deviator of a symmetric tensor."""
     return s + (-1 / 3 * tr(s)) * I
 
 
@@ -700,7 +655,7 @@ def inner(s, e):
 
 
 def von_mises(s):
-    """sqrt(3/2 s:s) of a deviatoric tensor, which is |s_xx - s_yy| in uniaxial stress."""
+    """sqrt(3/2 s:s) of a deviatoric tensor: |s_xx - s_yy| in uniaxial stress."""
     return sqrt(1.5 * inner(s, s))
 
 
@@ -713,6 +668,5 @@ def outer(a, b):
 
 
 def from_columns(columns):
-    """The tensor with these columns."""
     made = columns[0].tensor
     return made._make([columns[j][i] for i, j in made.places])

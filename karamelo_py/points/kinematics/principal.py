@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Compute principal values (3,) of a symmetric tensor, unordered, and their directions."""
+    """Principal values (3,) of a symmetric tensor, unordered, and their directions."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -19,10 +19,10 @@ def principal(s):
 
 @shared
 def from_principal(s, values, directions, slopes=None):
-    """Make the symmetric tensor with principal values in directions; of the class of `s`.
+    """Symmetric tensor of the class of `s` from principal values and directions.
 
     If each value is a function of the corresponding value of another tensor, `slopes` (3,) are its
-    derivatives, needed for derivatives at equal values.
+    derivatives, for derivatives at equal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)
@@ -42,7 +42,6 @@ def from_principal(s, values, directions, slopes=None):
 
 
 def principal_in_plane(s):
-    """See `principal`."""
     apart = 0.5 * (s.xx - s.yy)
     mean = 0.5 * (s.xx + s.yy)
     radius = sqrt(apart * apart + s.xy * s.xy)
@@ -54,7 +53,7 @@ def principal_in_plane(s):
 
 
 def jacobi_rotation(a, b, c):
-    """Find cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
+    """Cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
     cotangent = (b - a) / where(c == 0, 1, c + c)
     t = 1 / (abs(cotangent) + sqrt(cotangent * cotangent + 1))
     t = where(c == 0, 0, where(cotangent < 0, -t, t))
@@ -67,7 +66,6 @@ _SWEEPS = 8
 
 
 def principal_in_space(s):
-    """See `principal`."""
     # Jacobi rotations (Golub & Van Loan 2013, section 8.5): unlike closed forms, accurate to
     # round-off for equal principal values too.
     a, b, c, d, e, f = s
@@ -97,7 +95,7 @@ def rotated(k, g, u, v):
 
 
 def real_principal(s):
-    """See `principal`; also returns real numbers for values that are integers without strain."""
+    """`principal`, with real numbers for values that are integers without strain."""
     values, directions = principal(s)
     return [1.0 * x for x in values], directions
 
@@ -110,7 +108,6 @@ def logarithm_of(s):
 
 
 def exponential_of(s):
-    """exp of a symmetric tensor."""
     values, directions = real_principal(s)
     found = tuple([exponential(x) for x in values])
     return from_principal(s, found, directions, found)
@@ -146,7 +143,7 @@ def in_frame(s, directions):
 
 
 def out_of_frame(s, diagonal, shears, directions):
-    """Make the tensor with components in a frame; of the class of `s`."""
+    """Inverse of `in_frame`; of the class of `s`."""
     if s.kin.dimension == 2:
         a, b, c = diagonal
         k, g = directions
@@ -163,7 +160,7 @@ def out_of_frame(s, diagonal, shears, directions):
 
 
 def columns(numbers, n):
-    """Return the `n` slopes of numbers, each as a tuple."""
+    """The `n` slopes of numbers, each as a tuple."""
     return list(zip(*[slopes_of(x, n) for x in numbers], strict=True))
 
 
@@ -192,7 +189,6 @@ ALIKE = 1e-5
 
 
 def turning_ratios(values, directions, slopes):
-    """(f_a - f_b) / (s_a - s_b) of the pairs of principal values."""
     ratios = []
     for k, ((a, b), apart) in enumerate(zip(PAIRS, directions.apart, strict=False)):
         if isinstance(slopes, PairLimits):

@@ -1,23 +1,19 @@
 """Constitutive laws of one point, one file each: the style for scripts, and the point functions.
 
-A law is a NamedTuple of parameters (its class is the tag). It owns a state, a NamedTuple of numbers
-and tensors; kernels only load it, pass it on and store it. Tensors have the components of the
-kinematics `kin` (`karamelo_py.points.kinematics`); `j` = det F is the volume over the reference
-volume. A law may consist of parts, NamedTuples among its parameters (`eos_strength`).
+A law is a NamedTuple of parameters (its class is the tag). Its state is a NamedTuple of numbers and
+tensors, which kernels load, pass on and store. Tensors have the components of the kinematics `kin`
+(`karamelo_py.points.kinematics`); `j` = det F is the volume over the reference volume. A law may
+consist of parts, NamedTuples among its parameters (`eos_strength`).
 
 The class is also the style: its docstring is the manual, and its annotated fields are the
 arguments. If a script gives other parameters than the law uses, a classmethod `given` takes the
-arguments and returns the law. The method `checked` refuses values that annotations cannot, and
-returns the law or an equivalent simpler one.
+arguments and returns the law. `checked` refuses values that annotations cannot, and returns the law
+or an equivalent simpler one.
 
-A law with ``in_lanes``, as all its parts must have, is computed for several points at once. Its
-point functions do not branch on numbers of a point, except with `where`; those that do are named in
-``scalarised``. Points of other laws are processed one by one.
-
-Laws and their parts whose ``traits`` differ from the usual ones have them as a class attribute
-(:class:`LawTraits`).
-
-Output columns of a law are declared next to it (`column`).
+A law with ``in_lanes``, which all its parts need, is computed for several points at once. Its point
+functions do not branch on numbers of a point, except with `where`; those that do are listed in
+``scalarised``. Laws and parts with unusual traits have a class attribute ``traits``
+(:class:`LawTraits`). Output columns are declared with `column`.
 """
 
 from __future__ import annotations
@@ -31,7 +27,7 @@ from karamelo_py.compiler.compile import point_function, real
 
 
 class LawTraits(NamedTuple):
-    """Traits of a law, or of a part of one."""
+    """Traits of a law, or of a part."""
 
     rebounds: bool = False  # sustains tension and returns all the work done on it
     flows: bool = False  # holds no shape, as liquids and soils
@@ -42,12 +38,12 @@ class LawTraits(NamedTuple):
 
 
 def law_traits(part: Any) -> LawTraits:
-    """Return the traits of a law, of a part of one, or of its class."""
+    """Traits of a law, of a part, or of its class."""
     return getattr(part, "traits", LawTraits())
 
 
 def parameter(part: Any, name: str, otherwise: Any = 0.0) -> Any:
-    """Return a parameter of a law, or of a part of one, by its name."""
+    """A parameter of a law or part, by its name."""
     return part._asdict().get(name, otherwise) if isinstance(part, tuple) else otherwise
 
 
@@ -58,10 +54,7 @@ class Absent(NamedTuple):
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """The classes of a law and its parts: laws of one kind share kernels and arrays.
-
-    A table of laws (`karamelo_py.kernels.laws.law_table`) is of the kind of its laws.
-    """
+    """Classes of a law and its parts, or of a table of laws: one kind shares kernels and arrays."""
     parts = [law_kind(part) for part in law if isinstance(part, tuple)]
     return type(law), *(kind for part in parts for kind in part)
 
@@ -75,7 +68,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Check that a point function is defined for a law, or for one of its parts."""
+    """Check whether a point function is defined for a law or one of its parts."""
     kinds = (kind for kind in law_kind(law) if not law_traits(kind).wraps)
     return any(function.defined(kind) for kind in kinds)
 
@@ -84,22 +77,15 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
 def column(part: type, name: str, what: Callable | NamedTuple) -> None:
-    """Declare an output column of laws with `part`, or of this class.
+    """Declare an output column of laws with `part`, the class of a law or of a part.
 
-    Parameters
-    ----------
-    part
-        The class of the law, or of one of its parts.
-    name
-        Its name in dumps, plots and tables.
-    what
-        A point function of the whole law (`number`), or a tag of `shown`.
+    `what` is a point function of the whole law (`number`), or a tag of `shown`.
     """
     _columns.setdefault(part, {})[name] = what if isinstance(what, tuple) else what.tag
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """The output columns of a law, those from its parts first: name, and tag for `shown`."""
+    """Output columns of a law, those of its parts first: name, and tag for `shown`."""
     own = _columns.get(type(law), {})
     kinds = reversed(law_kind(law)[1:])
     found = {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
@@ -108,20 +94,19 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def of_part(law, what):
-    """The tag by which `law` shows the column `what` of one of its parts."""
+    """Tag by which `law` shows the column `what` of one of its parts."""
     return what
 
 
 @point_function()
 def shown(what, law, kin, state):
-    """The value of a tag for a point in `state`."""
+    """Value of a tag for a point in `state`."""
 
 
 def number(function: Callable) -> Callable:
-    """Mark a point function of (law, kin, state) as an output column.
+    """Make a point function of (law, kin, state) an output column, with a tag for kernels.
 
-    It gets a tag by which kernels choose by type. The tag's class is stored in the module of the
-    function, so that it can be imported, and kernels with it be cached.
+    The class of the tag is stored in the module of the function: cached kernels import it.
     """
     name = f"{function.__name__}_tag"
     made = namedtuple(name, (), module=function.__module__)
@@ -133,23 +118,31 @@ def number(function: Callable) -> Callable:
 
 @point_function()
 def initial_state(law, kin, like):
-    """The state of an undeformed, unstressed point."""
+    """State of an undeformed, unstressed point."""
 
 
 @point_function()
 def advance(law, kin, state, dl, dt):
-    """The state after the increment dl = dt grad v of a step dt."""
+    """State after the increment dl = dt grad v of a step dt."""
+
+
+class FbarStep(NamedTuple):
+    """An increment of a point with F-bar."""
+
+    dl: Any
+    dt: Any
+    extra: Any  # pressure that forces have beyond the point's own
 
 
 @point_function(otherwise=True)
-def advance_beside(law, kin, state, dl, dt, beside):
-    """As `advance`, if forces have `beside` more pressure than the point (F-bar)."""
-    return advance(law, kin, state, dl, dt)
+def advance_fbar(law, kin, state, step):
+    """As `advance`, for an `FbarStep`."""
+    return advance(law, kin, state, step.dl, step.dt)
 
 
 @point_function()
 def kirchhoff_stress(law, kin, state):
-    """det F times the Cauchy stress; times the reference volume it gives the nodal forces."""
+    """det F times the Cauchy stress; times the reference volume, it gives nodal forces."""
 
 
 @point_function()
@@ -169,7 +162,7 @@ def deformation(law, kin, state):
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """Return True if a law sums strains, so that load steps need their logarithm: a constant."""
+    """Check whether a law sums strains, so that load steps need their logarithm: a constant."""
     return True
 
 
@@ -180,19 +173,19 @@ def wave_speed_squared(law, kin, state):
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """Upper bound of `wave_speed_squared`, if that is cheaper: most points are slower anyway."""
+    """Upper bound of `wave_speed_squared`, if that is cheaper: most points are slower."""
     return wave_speed_squared(law, kin, state)
 
 
 @point_function(otherwise=True)
 def stretch_across(law, state):
-    """Stretch across a thin body, thickness over initial thickness; 1 for all other laws."""
+    """Stretch across a thin body, thickness over initial thickness; 1 for other laws."""
     return 1
 
 
 @point_function(otherwise=True)
 def is_round(law):
-    """Return True if a bar along x that is pulled contracts by the same in y and z."""
+    """Check whether a bar along x that is pulled contracts equally in y and z."""
     return True
 
 
@@ -210,12 +203,12 @@ def energy_density(law, kin, state):
 
 @point_function(otherwise=True)
 def constrained_velocity(law, own, given):
-    """Velocity of a point after a step: from the grid, or for rigid bodies their own."""
+    """Velocity of a point after a step: `given` by the grid, or `own` for rigid bodies."""
     return given
 
 
 def moves_as_told(law: tuple) -> bool:
-    """Return True for laws of rigid bodies."""
+    """Check whether a law is of rigid bodies."""
     return constrained_velocity.defined(type(law))
 
 
@@ -235,7 +228,7 @@ def damage(law, kin, state):
 @number
 @point_function()
 def damage_initiation(law, kin, state):
-    """Grows from 0, damage begins at 1; undefined for laws without damage."""
+    """Grows from 0; damage begins at 1. Undefined for laws without damage."""
 
 
 @number
@@ -247,7 +240,7 @@ def temperature(law, kin, state):
 
 @point_function(otherwise=True)
 def with_temperature(law, kin, state, T):
-    """The state at the temperature `T`; unchanged for laws without a temperature."""
+    """State at the temperature `T`; unchanged for laws without one."""
     return state
 
 
@@ -259,7 +252,7 @@ def heat_capacity(law, like):
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """The state with `heat` more internal energy per reference volume, if the law has any."""
+    """State with `heat` more internal energy per reference volume, if the law has any."""
     return state
 
 
@@ -282,7 +275,7 @@ def plastic_strain(law, kin, state):
 
 @point_function()
 def with_stress(law, kin, state, stress):
-    """The state with the Cauchy stress `stress` (initial_stress); undefined for laws without."""
+    """State with the Cauchy stress `stress` (initial_stress); undefined for laws without."""
 
 
 @point_function(otherwise=True)

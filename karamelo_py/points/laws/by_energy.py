@@ -1,9 +1,9 @@
 """Hyperelastic laws given by their stored energy, a formula.
 
 The formula is differentiated once, when a script defines the material. Its structure belongs to the
-class of the law, so that kernels contain it as code; its numbers are parameters. Laws that differ
-only in numbers have the same kernels, unless some of these are equal or small whole exponents.
-Formulas of invariants need no principal directions and are computed in lanes; formulas of principal
+class of the law, so kernels contain it as code; its numbers are parameters. Laws that differ only
+in numbers have the same kernels, unless some of these are equal or small whole exponents. Formulas
+of invariants need no principal directions and are computed in lanes; formulas of principal
 stretches take points one by one.
 """
 
@@ -55,7 +55,7 @@ class _ProgramWriter:
         self.numbers: dict[float, int] = {}
 
     def code(self, root: Term) -> Code:
-        """Write a formula; () if it is 0."""
+        """Stack program of a formula; () if it is 0."""
         if is_number(root, 0):
             return ()
         made: list[tuple[str, Any]] = []
@@ -78,7 +78,6 @@ class _ProgramWriter:
 
 
 def applied(operation, a, b):
-    """An operation on two numbers."""
     if operation == "+":
         return a + b
     if operation == "-":
@@ -91,7 +90,6 @@ def applied(operation, a, b):
 
 
 def of_one(operation, a):
-    """A function of a number."""
     if operation == "neg":
         return -a
     if operation == "sqrt":
@@ -112,7 +110,6 @@ def of_one(operation, a):
 
 
 def whole_power(a, n):
-    """a^n for a whole number n."""
     made = a
     for _ in range(abs(n) - 1):
         made = made * a
@@ -120,7 +117,7 @@ def whole_power(a, n):
 
 
 def evaluated(code, law, arguments):
-    """The value of a stack program at `arguments`, with the numbers of a law; 0 of no program."""
+    """Value of a stack program at `arguments`, with the numbers of a law; 0 of no program."""
     if not len(code):
         return 0
     stack = ()
@@ -142,7 +139,7 @@ def evaluated(code, law, arguments):
 
 
 class ByEnergy(OfDeformation):
-    """Base of laws by their energy; one class for each formula."""
+    """Base of laws with a stored energy; one class for each formula."""
 
     __slots__ = ()
     traits = LawTraits(rebounds=True)
@@ -180,8 +177,8 @@ IN_STRETCHES = {
 def law_of(rho: float, energy: Expression) -> NamedTuple:
     """Make the law of a stored energy per reference volume.
 
-    ScriptError for operations without a derivative, stress or no stiffness at rest, and formulas
-    that distinguish directions.
+    Raises ScriptError for operations without a derivative, stress or no stiffness at rest, and
+    formulas that distinguish directions.
     """
     term = energy._term
     for one in terms.in_order(term):
@@ -223,12 +220,11 @@ def _class_of(kind: type, codes: dict, count: int) -> type:
 
 
 def value_at(root: Term, stretches: Sequence[float]) -> float:
-    """The value of a formula of stretches."""
     return terms.evaluated(root, dict(zip(STRETCHES, stretches, strict=True)).__getitem__)
 
 
 def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float, float, float]:
-    """Lame's parameters and the energy at rest, of an energy that is isotropic and stable there."""
+    """Lame's parameters and energy at rest; refuse anisotropic and unstable energies."""
     rest = (1.0, 1.0, 1.0)
     at_rest, stress = value_at(energy, rest), value_at(slopes[0], rest)
     stiffness, lam = (value_at(curve, rest) for curve in curves)
@@ -262,7 +258,7 @@ def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float
 
 
 def directional_stiffness(law: NamedTuple, stretches: Sequence[float], a: int) -> float:
-    """l_a^2 d2W/dl_a^2 at principal stretches: rho c^2 of a wave along the direction `a`."""
+    """l_a^2 d2W/dl_a^2 at principal stretches: rho c^2 of a wave along direction `a`."""
     if isinstance(law, OfStretches):
         return stretches[a] ** 2 * evaluated(law.second[(0, 3, 5)[a]], law, stretches)
     squares = [x * x for x in stretches]
@@ -281,7 +277,7 @@ SCANNED = 0.5, 3.0  # stretches
 
 
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """The path and stretch nearest to rest at which a principal direction loses its stiffness."""
+    """Path and stretch nearest to rest at which a principal direction loses its stiffness."""
     found = []
     for path, stretches in PATHS.items():
         for end in SCANNED:
@@ -301,7 +297,6 @@ def first_instability(law: NamedTuple) -> tuple[str, float] | None:
 
 
 def squared(s):
-    """s s of a symmetric tensor."""
     a = s.at()
     return s._make(
         [
@@ -312,7 +307,6 @@ def squared(s):
 
 
 def invariants(b, J):
-    """I1, I2 and J of b = F F^T."""
     first = tr(b)
     return first, 0.5 * (first * first - inner(b, b)), J
 
@@ -383,7 +377,6 @@ def _shear_part_of_invariants(law, kin, state):
 
 
 def stretches_of(b):
-    """Principal stretches, and the directions of the tensor b = F F^T."""
     values, directions = real_principal(b)
     return tuple([sqrt(x) for x in values]), directions
 
@@ -432,7 +425,7 @@ def _shear_part_of_stretches(law, kin, state):
 
 
 def shear_between(law, at):
-    """The largest rho c^2 of shear waves: l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
+    """Largest rho c^2 of shear waves: l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
     slopes = [evaluated(code, law, at) for code in law.first]
     limits = limits_of(law, at, slopes)
     found = []
@@ -447,5 +440,4 @@ def shear_between(law, at):
 
 @laws.elastic_strain.on(ByEnergy)
 def _elastic_strain_by_energy(law, kin, state):
-    """Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I

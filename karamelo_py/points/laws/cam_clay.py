@@ -95,7 +95,6 @@ class CamClay(NamedTuple):
         *,
         pc: Annotated[float, Positive] | None = None,
     ):
-        """Make the law from its parameters."""
         if kappa >= lam:
             raise ScriptError(
                 f"swelling is as soft as virgin consolidation: kappa {kappa:g}, lam {lam:g}",
@@ -122,11 +121,13 @@ class State(NamedTuple):
 
 
 def pressure(law, e):
-    """Kirchhoff pressure for an elastic strain."""
+    """Kirchhoff pressure of an elastic strain."""
     return law.p0 * exp(-tr(e) / law.kappa)
 
 
-laws.initial_state.on(CamClay)(lambda law, kin, like: State(1, nothing(kin), law.pc, 0, 0))
+@laws.initial_state.on(CamClay)
+def _initial_state_cam_clay(law, kin, like):
+    return State(1, nothing(kin), law.pc, 0, 0)
 
 
 @laws.advance.on(CamClay)
@@ -134,10 +135,10 @@ def _advance_cam_clay(law, kin, state, dl, dt):
     trial = elastic_trial(Logarithmic(), state.e, dl)
     p, q = pressure(law, trial), 2 * law.G * von_mises(dev(trial))
     y, w = plastic_flow(law, q, p, state.pc)
-    share = 1 / (1 + w)
-    e = share * dev(trial) + (tr(trial) + y) / 3 * I
-    slip = (1 - share) * q / (3 * law.G)
-    work = pressure(law, e) * y + share * q * slip
+    scale = 1 / (1 + w)
+    e = scale * dev(trial) + (tr(trial) + y) / 3 * I
+    slip = (1 - scale) * q / (3 * law.G)
+    work = pressure(law, e) * y + scale * q * slip
     return State(
         state.J * det(I + dl),
         e,
@@ -152,26 +153,35 @@ def _advance_cam_clay(law, kin, state, dl, dt):
 # p exp(-y / kappa), and pc becomes pc exp(y / (lam - kappa)).
 
 
-def at_step(law, q, p, pc, y, w):
-    """Deviatoric stress, pressure and preconsolidation pressure after plastic flow."""
-    return q / (1 + w), p * exp(-y / law.kappa), pc * exp(y / (law.lam - law.kappa))
+class ClayStress(NamedTuple):
+    """Stress of a point, and its preconsolidation pressure."""
+
+    q: Any  # von Mises stress
+    p: Any
+    pc: Any
 
 
-def unbalanced(law, q, p, pc, y, w):
-    """Return the residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
-    q, p, pc = at_step(law, q, p, pc, y, w)
+def after_flow(law, trial, y, w):
+    q, p, pc = trial
+    return ClayStress(q / (1 + w), p * exp(-y / law.kappa), pc * exp(y / (law.lam - law.kappa)))
+
+
+def residuals(law, trial, y, w):
+    """Residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
+    q, p, pc = after_flow(law, trial, y, w)
     return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
 
 
-def corrections(law, q, p, pc, y, w, f, g):
-    """Newton corrections of y and w, from the residuals `f` and `g`."""
-    q, p, pc = at_step(law, q, p, pc, y, w)
-    c, apart = law.M**2 / (6 * law.G), 2 * p - pc
+def newton_step(law, trial, y, w, errors):
+    """Newton corrections of y and w."""
+    f, g = errors
+    q, p, pc = after_flow(law, trial, y, w)
+    c, slant = law.M**2 / (6 * law.G), 2 * p - pc
     falls, rises = p / law.kappa, pc / (law.lam - law.kappa)
-    fy = -apart * falls - p * rises
+    fy = -slant * falls - p * rises
     fw = -2 * q * q / (law.M**2 * (1 + w))
     gy = 1 + w * c * (2 * falls + rises)
-    gw = -c * apart
+    gw = -c * slant
     k = 1 / (fy * gw - fw * gy)
     return k * (fw * g - gw * f), k * (gy * f - fy * g)
 
@@ -182,13 +192,14 @@ _NEWTON = 4
 
 @shared
 def plastic_flow(law, q, p, pc):
-    """Find y and w that return a trial with q and p to the surface, or 0 inside it.
+    """y and w that return a trial with q and p to the surface; 0 inside it.
 
     With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution lies
     between y = 0, or p = pc if the trial has more, and the critical state, 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
-    q = where(yields, q, law.M * pc)  # a value outside the surface, for unused lanes
+    q = where(yields, q, law.M * pc)  # outside the surface, for unused lanes
+    trial = ClayStress(q, p, pc)
     c, a = law.M**2 / (6 * law.G), law.kappa * (law.lam - law.kappa) / law.lam
     isotropic = a * log(p / pc)
     critical = isotropic + a * log(real(2, p))
@@ -196,20 +207,19 @@ def plastic_flow(law, q, p, pc):
     high = where(critical > 0, critical, 0)
     y, w = 0.5 * (low + high), real(0, p)
     for _ in range(_BISECTIONS):
-        _, now, of_clay = at_step(law, q, p, pc, y, 0)
-        apart, above = 2 * now - of_clay, now * (of_clay - now)
+        _, p_now, pc_now = after_flow(law, trial, y, 0)
+        slant, above = 2 * p_now - pc_now, p_now * (pc_now - p_now)
         on_surface = law.M * sqrt(max(above, 0))
-        far = on_surface * (y / c + apart) > q * apart
-        near_top = on_surface > 0.5 * law.M * abs(apart)
+        far = on_surface * (y / c + slant) > q * slant
+        near_top = on_surface > 0.5 * law.M * abs(slant)
         w = where(
-            near_top, q / where(near_top, on_surface, 1) - 1, y / (c * where(near_top, 1, apart))
+            near_top, q / where(near_top, on_surface, 1) - 1, y / (c * where(near_top, 1, slant))
         )
         low, high = where(far, low, y), where(far, y, high)
         y = 0.5 * (low + high)
     w = max(w, 0)  # against rounding
     for _ in range(_NEWTON):
-        f, g = unbalanced(law, q, p, pc, y, w)
-        dy, dw = corrections(law, q, p, pc, y, w, f, g)
+        dy, dw = newton_step(law, trial, y, w, residuals(law, trial, y, w))
         y, w = y + dy, w + dw
     return where(yields, y, 0), where(yields, w, 0)
 
@@ -220,12 +230,13 @@ def _plastic_flow_slopes(law, q, p, pc):
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0
-    f, g = unbalanced(law, q, p, pc, y, w)
-    found = corrections(law, where(yields, q0, law.M * pc0), p0, pc0, y, w, f, g)
+    errors = residuals(law, ClayStress(q, p, pc), y, w)
+    at = ClayStress(where(yields, q0, law.M * pc0), p0, pc0)
+    changes = newton_step(law, at, y, w, errors)
     return tuple(
         [
             Dual(x, tuple([where(yields, s, 0) for s in change.slopes]))
-            for x, change in zip((y, w), found, strict=True)
+            for x, change in zip((y, w), changes, strict=True)
         ]
     )
 
@@ -240,16 +251,33 @@ def _cauchy_stress_cam_clay(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / state.J
 
 
-laws.by_rates.on(CamClay)(lambda law: False)
-laws.jacobian.on(CamClay)(lambda law, kin, state: state.J)
-laws.elastic_strain.on(CamClay)(lambda law, kin, state: state.e)
-laws.plastic_strain.on(CamClay)(lambda law, kin, state: state.ep)
-laws.dissipated_energy.on(CamClay)(lambda law, kin, state: state.loss)
+@laws.jacobian.on(CamClay)
+def _jacobian_cam_clay(law, kin, state):
+    return state.J
+
+
+@laws.elastic_strain.on(CamClay)
+def _elastic_strain_cam_clay(law, kin, state):
+    return state.e
+
+
+@laws.plastic_strain.on(CamClay)
+def _plastic_strain_cam_clay(law, kin, state):
+    return state.ep
+
+
+@laws.dissipated_energy.on(CamClay)
+def _dissipated_energy_cam_clay(law, kin, state):
+    return state.loss
+
+
+@laws.by_rates.on(CamClay)
+def _by_rates_cam_clay(law):
+    return False
 
 
 @laws.number
 def preconsolidation(law, kin, state):
-    """Preconsolidation pressure."""
     return state.pc
 
 

@@ -1,9 +1,8 @@
-"""Damage of one point: the fraction D of its strength that is lost.
+"""Damages: the fraction D of the strength of a point that is lost.
 
-A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`): the stress is 1 - D times the stress of the intact
-material, except for pressure. Equation of state and strength do not depend on it, so it enters
-once. Its memory is a tuple.
+A damage is a NamedTuple of parameters (its class is the tag) and a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). It scales stress and tension, not compression, by 1 - D;
+equation of state and strength do not depend on it. Its memory is a tuple.
 """
 
 from typing import Annotated, Any, NamedTuple
@@ -19,16 +18,22 @@ from karamelo_py.script.errors import ScriptError
 
 @point_function(otherwise=True)
 def initial_damage(damage, like):
-    """The memory of an intact point, or () without damage."""
+    """Memory of an intact point; () without damage."""
     return ()
 
 
-@point_function()
-def damage_after(damage, memory, strain, triaxiality, heat, dt):
-    """The memory after an increment of equivalent plastic strain in a step dt.
+class FlowStep(NamedTuple):
+    """Plastic flow of a point in a step."""
 
-    `triaxiality` is the mean stress over the von Mises stress.
-    """
+    strain: Any  # increment of the equivalent plastic strain
+    triaxiality: Any  # mean stress over von Mises stress
+    heat: Any  # `Warm` or ()
+    dt: Any
+
+
+@point_function()
+def damage_after(damage, memory, step):
+    """Memory after a `FlowStep`."""
 
 
 @point_function()
@@ -38,7 +43,7 @@ def integrity(damage, memory):
 
 @point_function()
 def initiation(damage, memory):
-    """Return the damage initiation: it grows to 1 before damage begins."""
+    """Grows from 0; damage begins at 1."""
 
 
 # Below this triaxiality, most metals have no finite failure strain.
@@ -98,7 +103,6 @@ class JohnsonCookDamage(NamedTuple):
     Tm: float
 
     def checked(self):
-        """Return the law after checks beyond the annotations."""
         check_temperatures(self.Tr, self.Tm)
         if not self.d1 + self.d2 > 0:
             raise ScriptError(
@@ -119,12 +123,19 @@ class Accumulated(NamedTuple):
     w: Any  # sum of plastic strain over failure strain
 
 
-initial_damage.on(JohnsonCookDamage)(lambda damage, like: Accumulated(0.0))
-initiation.on(JohnsonCookDamage)(lambda damage, memory: memory.w)
+@initial_damage.on(JohnsonCookDamage)
+def _initial_damage_johnson_cook_damage(damage, like):
+    return Accumulated(0.0)
+
+
+@initiation.on(JohnsonCookDamage)
+def _initiation_johnson_cook_damage(damage, memory):
+    return memory.w
 
 
 @damage_after.on(JohnsonCookDamage)
-def _damage_after_johnson_cook_damage(damage, memory, strain, triaxiality, heat, dt):
+def _damage_after_johnson_cook_damage(damage, memory, step):
+    strain, triaxiality, heat, dt = step
     grows = (strain > 0) & (triaxiality > _CLOSED)
     if not any_lane(grows):
         return memory

@@ -16,7 +16,7 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.by_energy import ByEnergy, first_instability
 from karamelo_py.points.laws.eos import bulk_modulus
 from karamelo_py.points.laws.eos_strength import EosStrength
-from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
+from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
 
 SLOW = 0.01  # wave speed with density and modulus exchanged, in m/s or mm/ms
 SMALL = 2.0  # degrees: friction angles are larger, unless given in radians
@@ -68,9 +68,9 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
     flow = parameter(strength, "yield_stress")
     hard = flow + parameter(strength, "H")
     if flow_stress.defined(type(strength)):
-        known = precompute(strength, memory, state.m.heat)
-        flow, _ = flow_stress(strength, memory, known, 0.0, state.m.heat, 1.0)
-        hard, _ = flow_stress(strength, memory, known, 1.0, state.m.heat, 1.0)
+        before = before_flow(strength, memory, state.m.heat)
+        flow, _ = flow_stress(strength, before, 0.0, 1.0)
+        hard, _ = flow_stress(strength, before, 1.0, 1.0)
     if flow > G > 0:
         yield (
             f"it yields at {flow:.3g}, above its shear modulus {G:.3g}: at a strain that no solid "

@@ -1,4 +1,4 @@
-"""Base of isotropic elastic laws, and of laws whose state is the deformation gradient."""
+"""Bases: isotropic elastic laws, and laws of the deformation gradient."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -30,7 +30,6 @@ class ElasticLaw(NamedTuple):
         kappa: Annotated[float, NonNegative] | None = None,
         alpha: float = 0.0,
     ):
-        """Make the law from Young's modulus and Poisson's ratio, and optional thermal constants."""
         return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 

@@ -1,11 +1,9 @@
-"""material eos-strength: a law in parts, found by their names.
+"""Material eos-strength: a law of parts, named in the script.
 
-Pressure comes from an equation of state, deviatoric stress from a strength. Viscosity, damage and
-temperature may be added. The parts are NamedTuples inside the law's, so that their types select
-their point functions; `Absent` marks missing parts, which have no numbers in the state. The state
-of a point is det F, the deviatoric stress of the intact material, the memory of each part
-(`Memory`), and the dissipated energy if there is any. Parts of other kinds, from plug-ins, are
-chained (`karamelo_py.points.laws.further`).
+Pressure comes from an equation of state, deviatoric stress from a strength; viscosity, damage and
+temperature are optional. Parts are NamedTuples inside the law's, so their types select their point
+functions; `Absent` marks missing parts, which have no numbers in the state. Parts of other kinds,
+from plug-ins, are chained (`karamelo_py.points.laws.further`).
 """
 
 from math import log, sqrt
@@ -18,7 +16,13 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr, von_mises
 from karamelo_py.points.laws import Absent, can, column, eos, law_traits, parameter, strengths
-from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
+from karamelo_py.points.laws.damages import (
+    FlowStep,
+    damage_after,
+    initial_damage,
+    initiation,
+    integrity,
+)
 from karamelo_py.points.laws.further import (
     chained,
     further_after,
@@ -26,7 +30,8 @@ from karamelo_py.points.laws.further import (
     initial_further,
 )
 from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
-from karamelo_py.points.laws.strengths.hardening import flow_stress, precompute
+from karamelo_py.points.laws.strengths import StrainStep
+from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
 from karamelo_py.points.laws.temperatures import (
     at_temperature,
     heated,
@@ -49,7 +54,6 @@ class Eos:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """Return the part that `argument` names."""
         return look_up(hub.parts[cls.kind], argument)
 
 
@@ -67,7 +71,6 @@ class Option:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """Return the part that `argument` names."""
         word = argument.word()
         optional = {
             kind: named for kind, named in hub.parts.items() if kind not in ("eos", "strength")
@@ -148,7 +151,6 @@ class EosStrength(NamedTuple):
         *parts: Option,
         strain: Literal["rate", "logarithmic"] = "rate",
     ):
-        """Make the law from the parts that a script has named, each by its kind."""
         kinds: dict[str, Any] = {}
         for part in parts:
             if part.kind in kinds:
@@ -178,7 +180,7 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """Report a temperature that affects neither strength, pressure nor damage, and is not read."""
+    """Check for a temperature without effect on strength, pressure and damage, never read."""
     pressures = parameter(law.eos, "thermal"), parameter(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
@@ -189,15 +191,15 @@ def _idle_heat(law, scene):
 
 
 def _strained(law, heat):
-    """Return flow stress and damage of a point after a plastic strain, at a temperature."""
-    strength, damage, strain, found = law.strength, law.damage, 0.1, []
+    """Flow stress and damage of a point after a plastic strain of 0.1."""
+    strength, damage, results = law.strength, law.damage, []
     if damage_after.defined(type(damage)):
-        found.append(damage_after(damage, initial_damage(damage, 1.0), strain, 1.0, heat, 1.0))
+        step = FlowStep(0.1, 1.0, heat, 1.0)
+        results.append(damage_after(damage, initial_damage(damage, 1.0), step))
     if flow_stress.defined(type(strength)):
-        memory = strengths.initial_memory(strength, 1.0)
-        known = precompute(strength, memory, heat)
-        found.append(flow_stress(strength, memory, known, strain, heat, 1.0))
-    return found
+        before = before_flow(strength, strengths.initial_memory(strength, 1.0), heat)
+        results.append(flow_stress(strength, before, 0.1, 1.0))
+    return results
 
 
 suggestion(
@@ -247,7 +249,7 @@ known_failure(
 
 
 def _locks(law, scene):
-    """Return True if a body flows at constant volume in load steps, which linear cells cannot."""
+    """Check for flow at constant volume in load steps, which linear cells cannot represent."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.axisymmetric
     flows = strengths.equivalent_plastic_strain.defined(type(law.strength))
     by_shear = flows and not strengths.pressure_response.defined(type(law.strength))
@@ -269,7 +271,7 @@ known_failure(
 
 
 class Memory(NamedTuple):
-    """States of the parts of a law at one point: tuples, empty for parts without a state."""
+    """States of the parts of a law; () for parts without a state."""
 
     energy: Any  # of the equation of state
     viscous: Any  # viscous pressure
@@ -305,32 +307,35 @@ def _initial_state_eos_strength(law, kin, like):
 
 @laws.advance.on(EosStrength)
 def _advance_eos_strength(law, kin, state, dl, dt):
-    return laws.advance_beside(law, kin, state, dl, dt, 0)
+    return laws.advance_fbar(law, kin, state, laws.FbarStep(dl, dt, 0))
 
 
-@laws.advance_beside.on(EosStrength)
-def _advance_beside_eos_strength(law, kin, state, dl, dt, beside):
+@laws.advance_fbar.on(EosStrength)
+def _advance_fbar_eos_strength(law, kin, state, step):
+    dl, dt, extra = step
     before, s, m = state
     J = before * det(I + dl)
-    s, eps = carried_along(law, kin, s, dl)
-    s, memory, work = strengths.respond(law.strength, law, kin, s, eps, J, m, dt, beside)
-    work = J * work * borne_share(law, m.damage)
-    viscous = viscous_after(law, J, m, tr(eps) / dt)
+    s, strain = carried_along(law, kin, s, dl)
+    step = StrainStep(s, strain, J, dt, extra)
+    s, memory, work = strengths.respond(law.strength, law, kin, step, m)
+    work = J * work * integrity_of(law, m.damage)
+    viscous = viscous_after(law, J, m, tr(strain) / dt)
     viscous_work = sum(viscous) * (before - J)
     energy = eos.compressed(law.eos, m.energy, before, J, work + viscous_work)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
     now = m._replace(energy=energy, viscous=viscous, strength=memory)
-    broken = broken_further(law, now, flow, s, J, dt)
+    intact = State(J, s, now)
+    damage = damage_after_flow(law, intact, flow, dt)
     heat = heated(law.temperature, m.heat, work * laws.specific_volume(law.eos))
-    gone = work + viscous_work + released(law, kin, J, s, now, broken)
+    gone = work + viscous_work + released(law, kin, intact, damage)
     loss = tuple([lost + gone for lost in m.loss])
-    further = further_after(law.further, m.further, law, kin, J, s, now, dt)
-    return State(J, s, now._replace(damage=broken, heat=heat, loss=loss, further=further))
+    further = further_after(law.further, m.further, law, step._replace(s=s), now)
+    return State(J, s, now._replace(damage=damage, heat=heat, loss=loss, further=further))
 
 
 def carried_along(law, kin, s, dl):
-    """Update the deviatoric stress for an increment, and return the strain that adds to it."""
+    """Rotate the deviatoric stress with the point; also return the strain that adds to it."""
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
@@ -364,9 +369,9 @@ def volume_energy(law, j, m):
 
 
 def full_pressure(law, j, m):
-    """The pressure in the stress: damage reduces tension, not compression."""
+    """Pressure in the stress: damage reduces tension, not compression."""
     p = intact_pressure(law, j, m)
-    return where(p < 0, p * borne_share(law, m.damage), p) + sum(m.viscous)
+    return where(p < 0, p * integrity_of(law, m.damage), p) + sum(m.viscous)
 
 
 def sound(law, j, m):
@@ -377,7 +382,7 @@ def sound(law, j, m):
 
 
 def unborne(law, j, m):
-    """The reduction of the squared speed of sound by damage.
+    """Reduction of the squared speed of sound by damage.
 
     A broken point in tension has no waves, however far it has expanded. When it closes again, at
     its initial volume, it has the waves of rubble; these always count, as it may close soon.
@@ -388,7 +393,7 @@ def unborne(law, j, m):
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     whole = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat) * j
     rubble = eos.bulk_modulus(law.eos, elastic * (closed / j), m.energy, m.heat) * closed
-    gone = max(whole - max(borne_share(law, m.damage) * whole, rubble), 0)
+    gone = max(whole - max(integrity_of(law, m.damage) * whole, rubble), 0)
     tension = intact_pressure(law, j, m) < 0
     return where(tension, gone * laws.specific_volume(law.eos), 0)
 
@@ -404,35 +409,36 @@ def viscous_after(law, j, m, rate):
 # --- damage -----------------------------------------------------------------------------------
 
 
-def borne_share(law, memory):
-    """The fraction of stress or energy that the damaged material sustains, 1 - D."""
+def integrity_of(law, memory):
+    """Fraction of stress or energy that the damaged material sustains, 1 - D."""
     return 1 if isinstance(law.damage, Absent) else integrity(law.damage, memory)
 
 
-def broken_further(law, m, strain, s, j, dt):
-    """Memory of the damage after an increment of plastic strain; () if nothing breaks."""
+def damage_after_flow(law, state, strain, dt):
+    """Memory of the damage after an increment of plastic strain; () without damage."""
     if isinstance(law.damage, Absent):
         return ()
-    p = intact_pressure(law, j, m)
+    J, s, m = state
+    p = intact_pressure(law, J, m)
     bound = von_mises(s) + 1e-3 * abs(p)
-    known = bound > 0
-    triaxiality = where(known, -p / where(known, bound, 1), 0)
-    return damage_after(law.damage, m.damage, strain, triaxiality, m.heat, dt)
+    stressed = bound > 0
+    triaxiality = where(stressed, -p / where(stressed, bound, 1), 0)
+    return damage_after(law.damage, m.damage, FlowStep(strain, triaxiality, m.heat, dt))
 
 
-def released(law, kin, j, s, m, broken):
-    """Stored energy released by an increment of damage."""
+def released(law, kin, state, damage):
+    """Stored energy released when the memory of the damage becomes `damage`."""
     if isinstance(law.damage, Absent):
         return 0
-    shear = j * strengths.shear_energy(law.strength, kin, s)
-    tension = intact_pressure(law, j, m) < 0
-    energy = shear + where(tension, volume_energy(law, j, m), 0)
-    return (integrity(law.damage, m.damage) - integrity(law.damage, broken)) * energy
+    J, s, m = state
+    shear = J * strengths.shear_energy(law.strength, kin, s)
+    tension = intact_pressure(law, J, m) < 0
+    energy = shear + where(tension, volume_energy(law, J, m), 0)
+    return (integrity(law.damage, m.damage) - integrity(law.damage, damage)) * energy
 
 
 def stress_left(law, state):
-    """The deviatoric stress after damage, (1 - D) s."""
-    return borne_share(law, state.m.damage) * state.s
+    return integrity_of(law, state.m.damage) * state.s
 
 
 # --- quantities of the whole law --------------------------------------------------------------
@@ -465,7 +471,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
     volume = laws.specific_volume(law.eos) * J
-    shear = 4 / 3 * strengths.shear_modulus(law.strength) * borne_share(law, m.damage)
+    shear = 4 / 3 * strengths.shear_modulus(law.strength) * integrity_of(law, m.damage)
     squared = (modulus + shear) * volume - unborne(law, J, m)
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
     if isinstance(law.viscosity, Absent):
@@ -476,17 +482,17 @@ def _wave_speed_squared_eos_strength(law, kin, state):
 
 @laws.shear_part.on(EosStrength)
 def _shear_part_eos_strength(law, kin, state):
-    shear = 2 * strengths.shear_modulus(law.strength) * borne_share(law, state.m.damage)
+    shear = 2 * strengths.shear_modulus(law.strength) * integrity_of(law, state.m.damage)
     return shear * laws.specific_volume(law.eos) * state.J
 
 
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """Return the energy released by unloading at this temperature, without plastic work."""
+    """Energy released by unloading at this temperature, without plastic work."""
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0
-    share = borne_share(law, m.damage)
+    share = integrity_of(law, m.damage)
     volume = where(tension, share * volume, volume)
     return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
 
@@ -506,7 +512,7 @@ def _plastic_strain_eos_strength(law, kin, state):
 
 @laws.shown.on(strengths.Remembered)
 def _shown_remembered(what, law, kin, state):
-    return state.m.strength[what.place]
+    return state.m.strength[what.index]
 
 
 @laws.with_stress.on(EosStrength)
@@ -523,7 +529,7 @@ def _with_stress_eos_strength(law, kin, state, stress):
 
 @laws.damage.on(EosStrength)
 def _damage_eos_strength(law, kin, state):
-    return 1 - borne_share(law, state.m.damage)
+    return 1 - integrity_of(law, state.m.damage)
 
 
 @laws.damage_initiation.on(EosStrength)

@@ -1,9 +1,7 @@
 """Further parts of a composed law, of kinds that plug-ins may define: any number of them.
 
-Lowering adds one itself on request: the plastic strain rate, for output.
-
 A part is a NamedTuple of parameters (its class is the tag). It may have a memory, and add a
-pressure. By default a part has no memory and adds nothing.
+pressure. Lowering adds one itself on request: the plastic strain rate, for output.
 """
 
 from functools import reduce
@@ -26,21 +24,20 @@ class Further(NamedTuple):
 
 
 def chained(parts: list) -> NamedTuple:
-    """The parts, one after the other."""
     return reduce(lambda rest, part: Further(part, rest), reversed(parts), Absent())
 
 
 @point_function(otherwise=True)
 def initial_part(part, like):
-    """The initial memory of a point."""
+    """Initial memory of a point."""
     return ()
 
 
 @point_function(otherwise=True)
-def part_after(part, memory, law, kin, j, s, memories, dt):
-    """The memory after a step dt to the volume ratio j and the deviatoric stress s.
+def part_after(part, memory, law, step, memories):
+    """The memory after a `StrainStep`, whose s is the deviatoric stress after the step.
 
-    `memories` are those of the other parts of the `law`.
+    `memories` are the memories of the other parts of the `law`.
     """
     return memory
 
@@ -58,21 +55,20 @@ def initial_further(parts, like):
     return initial_part(parts.part, like), initial_further(parts.rest, like)
 
 
-def further_after(parts, memory, law, kin, j, s, memories, dt):
-    """The memories after a step."""
+def further_after(parts, memory, law, step, memories):
     if isinstance(parts, Absent):
         return ()
-    own, rest = memory
-    after = part_after(parts.part, own, law, kin, j, s, memories, dt)
-    return after, further_after(parts.rest, rest, law, kin, j, s, memories, dt)
+    first, rest = memory
+    after = part_after(parts.part, first, law, step, memories)
+    return after, further_after(parts.rest, rest, law, step, memories)
 
 
 def further_pressure(parts, memory, p):
     """p plus the pressure of all parts."""
     if isinstance(parts, Absent):
         return p
-    own, rest = memory
-    return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, own)))
+    first, rest = memory
+    return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, first)))
 
 
 # Karamelo smooths over the time in which sound crosses this many cells.
@@ -101,14 +97,16 @@ class RateMemory(NamedTuple):
     ep: Any  # plastic strain, -1 if not known yet
 
 
-initial_part.on(PlasticRate)(lambda part, like: RateMemory(0.0, -1.0))
+@initial_part.on(PlasticRate)
+def _initial_part_plastic_rate(part, like):
+    return RateMemory(0.0, -1.0)
 
 
 @part_after.on(PlasticRate)
-def _part_after_plastic_rate(part, memory, law, kin, j, s, memories, dt):
+def _part_after_plastic_rate(part, memory, law, step, memories):
     ep = equivalent_plastic_strain(law.strength, memories.strength)
     before = where(memory.ep < 0, ep, memory.ep)
-    change = (ep - before - dt * memory.rate) / part.time
+    change = (ep - before - step.dt * memory.rate) / part.time
     return RateMemory(max(memory.rate + change, 0), ep)
 
 
@@ -118,13 +116,12 @@ def _shown_smoothed(what, law, kin, state):
 
 
 def last_memory(memories):
-    """Find the memory of the last of several further parts."""
-    own, rest = memories
-    return last_memory(rest) if len(rest) else own
+    first, rest = memories
+    return last_memory(rest) if len(rest) else first
 
 
 def has_rate(law: NamedTuple) -> bool:
-    """Check that a law has plastic strain, so that it has a rate."""
+    """Check whether a law has plastic strain, and thus a rate."""
     return hasattr(law, "further") and "ep" in laws.columns_of(law)
 
 
@@ -133,18 +130,18 @@ def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))
-    return law._replace(further=_behind(law.further, PlasticRate(CELLS * h / speed)))
+    return law._replace(further=_appended(law.further, PlasticRate(CELLS * h / speed)))
 
 
 def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
-    """The kinds of a law (`law_kind`) without the rate."""
+    """Kinds of a law (`law_kind`) without the rate."""
     if PlasticRate not in kinds:
         return kinds
     k = kinds.index(PlasticRate)
     return kinds[: k - 1] + kinds[k + 1 :]
 
 
-def _behind(parts: NamedTuple, part: NamedTuple) -> NamedTuple:
+def _appended(parts: NamedTuple, part: NamedTuple) -> NamedTuple:
     if isinstance(parts, Absent):
         return Further(part, parts)
-    return parts._replace(rest=_behind(parts.rest, part))
+    return parts._replace(rest=_appended(parts.rest, part))

@@ -22,7 +22,6 @@ class EnergyFormula:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Expression:
-        """Read the formula; variables of the script are numbers in it."""
         value = argument.value_with(SEEDS)
         if isinstance(value, str):
             raise ScriptError(
@@ -84,7 +83,6 @@ class HyperelasticFormula(OfInvariants, _Fields):
 
     @classmethod
     def given(cls, rho: Annotated[float, Positive], energy: EnergyFormula) -> Any:
-        """Make the law of a formula."""
         return law_of(rho, energy)
 
 
@@ -95,7 +93,6 @@ class _Numbers:
         self.numbers = numbers
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> float | Expression:
-        """Return a constant, or the seed of this name."""
         return self.numbers[name] if name in self.numbers else Expression.seed(name)
 
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Any:
@@ -103,7 +100,6 @@ class _Numbers:
         raise NotImplementedError(node.name)
 
     def hides(self, name: str) -> bool:
-        """Return False: functions have their usual meaning."""
         return False
 
 
@@ -149,7 +145,6 @@ class MooneyRivlin(OfInvariants, _Fields):
     def given(
         cls, rho: Annotated[float, Positive], C10: float, C01: float, K: Annotated[float, Positive]
     ) -> Any:
-        """Make the law from its constants."""
         formula = f"C10*(I1*J^(-2/3) - 3) + C01*(I2*J^(-4/3) - 3) + {VOLUME}"
         return ready(rho, formula, C10=C10, C01=C01, K=K)
 
@@ -186,7 +181,6 @@ class Yeoh(OfInvariants, _Fields):
     def given(
         cls, rho: Annotated[float, Positive], K: Annotated[float, Positive], *constants: float
     ) -> Any:
-        """Make the law from its constants."""
         if not 1 <= len(constants) <= 3:
             raise ScriptError(
                 "the energy has one to three terms", argument="constants", expected=cls.syntax
@@ -234,7 +228,6 @@ class Gent(OfInvariants, _Fields):
         Jm: Annotated[float, Positive],
         K: Annotated[float, Positive],
     ) -> Any:
-        """Make the law from its constants."""
         formula = f"-G*Jm/2*log(1 - (I1*J^(-2/3) - 3)/Jm) + {VOLUME}"
         return ready(rho, formula, G=G, Jm=Jm, K=K)
 
@@ -270,7 +263,6 @@ class SaintVenantKirchhoff(OfInvariants, _Fields):
     def given(
         cls, rho: Annotated[float, Positive], lam: float, G: Annotated[float, Positive]
     ) -> Any:
-        """Make the law from its constants."""
         formula = "lam/8*(I1 - 3)^2 + G/4*(I1^2 - 2*I2 - 2*I1 + 3)"
         return ready(rho, formula, lam=lam, G=G)
 
@@ -307,7 +299,6 @@ class Ogden(OfInvariants, _Fields):
     def given(
         cls, rho: Annotated[float, Positive], K: Annotated[float, Positive], *pairs: float
     ) -> Any:
-        """Make the law from the constants of its terms."""
         if len(pairs) % 2 or not 2 <= len(pairs) <= 8 or 0 in pairs[1::2]:
             raise ScriptError(
                 "the terms are pairs of mu and alpha, where no alpha is 0",

@@ -64,7 +64,6 @@ class LinearElastic(ElasticLaw):
         *,
         rate: Literal["jaumann", "none"] = "jaumann",
     ):
-        """Make the law from Young's modulus and Poisson's ratio, and optional thermal constants."""
         law = cls if rate == "jaumann" else FixedFrame
         return super(LinearElastic, law).given(rho, E, nu, cp, kappa, alpha)
 

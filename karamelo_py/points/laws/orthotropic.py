@@ -31,7 +31,7 @@ _Fields = namedtuple(
 
 
 class Directional(OfDeformation, _Fields):
-    """Law of a linear stiffness in the reference frame."""
+    """Law with a linear stiffness in the reference frame."""
 
     __slots__ = ()
     in_lanes = True
@@ -88,7 +88,7 @@ class Orthotropic(NamedTuple):
     spin: float = 0.0
 
     def checked(self):
-        """Return the law; refuse constants with which some strain would release energy."""
+        """Refuse constants with which some strain would release energy."""
         moduli = (self.E1, self.E2, self.E3, self.G23, self.G13, self.G12)
         compliance = np.diag([1 / modulus for modulus in moduli])
         compliance[0, 1] = compliance[1, 0] = -self.nu12 / self.E1
@@ -148,7 +148,6 @@ class Transverse(NamedTuple):
     tilt: float = 0.0
 
     def checked(self):
-        """Return the orthotropic law with equal axes 1 and 2."""
         if not -1 < self.nu < 1 or not self.nu3**2 < self.E3 / self.E * (1 - self.nu) / 2:
             raise ScriptError(
                 "with these Poisson's ratios some strain would release energy",
@@ -184,7 +183,7 @@ def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 
 def fastest(C: np.ndarray) -> float:
-    """The largest rho c^2 of plane waves: eigenvalues of C_ijkl n_j n_l over all directions n."""
+    """Largest rho c^2 of plane waves: eigenvalues of C_ijkl n_j n_l over all directions n."""
     z, turn = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 2 * np.pi, 121))
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
@@ -194,7 +193,7 @@ def fastest(C: np.ndarray) -> float:
 
 
 def couples(law: Any, scene: Any) -> bool:
-    """Return True if a body in 2D or 1D would shear out of its plane or line."""
+    """Check whether a body in 2D or 1D would shear out of its plane or line."""
     inside, outside = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}[scene.d]
     shears = [abs(law[STIFFNESS[a][b]]) for a in inside for b in outside]
     return max(shears, default=0) > COUPLED * law.fastest
@@ -219,7 +218,6 @@ known_failure(
 
 
 def stress_of(law, E):
-    """S = C:E, with the components of E."""
     strain = E.at()
 
     def component(i, j):
@@ -231,7 +229,6 @@ def stress_of(law, E):
 
 @laws.elastic_strain.on(Directional)
 def _elastic_strain_directional(law, kin, state):
-    """Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I
 
 

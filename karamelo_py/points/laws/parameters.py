@@ -1,4 +1,4 @@
-"""Checks and conversions of parameters of several laws, and sequences of numbers."""
+"""Checks and conversions of parameters, and sequences of numbers."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 
 
 def lame_parameters(E: float, nu: float) -> tuple[float, float]:
-    """Lame's parameters lambda and G; refuse a ratio without positive, finite elastic energy."""
+    """Lame's parameters lambda and G; ScriptError unless -1 < nu < 0.5."""
     if not -1 < nu < 0.5:
         raise ScriptError(
             f"Poisson's ratio {nu:g} is impossible",
@@ -48,7 +48,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """The reference rate in 1 + `factor` ln(rate/epsdot0), not 0; arbitrary if `factor` is 0."""
+    """Reference rate in 1 + `factor` ln(rate/epsdot0), not 0; arbitrary if `factor` is 0."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
@@ -64,8 +64,8 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers, a curve or a formula; kernels see an array.
 
-    Laws of one kind may have sequences of different lengths: the shorter ones are padded with their
-    last number, so a law that needs the length stores it separately.
+    Laws of one kind may have sequences of different lengths, which are padded with their last
+    number: a law that needs the length stores it separately.
     """
 
     values: tuple[float, ...]

@@ -1,4 +1,4 @@
-"""material rigid: a body with prescribed velocity. Its state is empty."""
+"""Material rigid: prescribed velocity, empty state."""
 
 from typing import Annotated, NamedTuple
 
@@ -43,7 +43,6 @@ class Rigid(NamedTuple):
 
     @classmethod
     def given(cls, rho: Annotated[float, Positive]):
-        """Make the law from the density."""
         return cls(1 / rho)
 
 

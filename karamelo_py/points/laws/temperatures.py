@@ -1,8 +1,8 @@
 """Temperature of one point, as changed by the law itself.
 
-A temperature is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature itself (`Warm`), which the
-other parts get as `heat`: () if the law has no temperature.
+A temperature is a NamedTuple of parameters (its class is the tag) and a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature itself (`Warm`), which other
+parts get as `heat`: () if the law has none.
 """
 
 from typing import Annotated, NamedTuple
@@ -14,7 +14,7 @@ from karamelo_py.points.laws.parameters import check_temperatures
 
 
 class Warm(NamedTuple):
-    """Temperature of a point, for laws with a temperature."""
+    """Temperature of a point."""
 
     T: float
 
@@ -38,7 +38,6 @@ def thermal_pressure(temperature, heat):
 
 
 def temperature_or(heat, otherwise):
-    """The temperature, or `otherwise` if the law has none."""
     return heat.T if len(heat) else otherwise
 
 
@@ -96,7 +95,6 @@ class PlasticWork(NamedTuple):
     Tm: float
 
     def checked(self):
-        """Return the law after a check of its temperatures."""
         check_temperatures(self.T0, self.Tm, "T0")
         return self
 

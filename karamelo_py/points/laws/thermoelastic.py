@@ -99,7 +99,7 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
 
 
 def of_elastic_law(function) -> None:
-    """Apply a function of the elastic law to the elastic part of a state."""
+    """Apply a function of laws to the elastic law within."""
 
     @function.on(Thermoelastic)
     def _of_elastic_law(law, kin, state):
@@ -114,7 +114,7 @@ of_elastic_law(laws.wave_speed_bound)
 
 @laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
-    """Return the energy released by unloading at this temperature."""
+    """Energy released by unloading at this temperature."""
     j = laws.jacobian(law, kin, state)
     elastic = laws.energy_density(law.elastic, kin, state.elastic)
     return elastic + expansion_pressure(law, state) * (1 - j)

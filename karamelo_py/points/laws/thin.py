@@ -3,7 +3,7 @@
 The wrapped law sees all three directions, with the tensors of `Axisymmetric`: xx, xy, yx, yy and
 zz. The strain increment q across the body is found such that the stress across it vanishes; in 1D
 it is the same in y and z. A secant method takes a fixed number of trials, so that points in lanes
-need no branches. What stress is left enters the next step (de Borst 1991; Klinkel & Govindjee
+need no branches. The remaining stress enters the next step (de Borst 1991; Klinkel & Govindjee
 2002).
 """
 
@@ -20,13 +20,7 @@ FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over r
 
 
 class Thin(NamedTuple):
-    """A law in a body without stress on its faces.
-
-    Attributes
-    ----------
-    law
-        The law in three dimensions.
-    """
+    """Law in a body without stress on its faces; `law` is the law in three dimensions."""
 
     law: Any
 
@@ -36,7 +30,7 @@ class Thin(NamedTuple):
 
 
 class ThinInLargeIncrements(Thin):
-    """A thin body under increments of any size."""
+    """Thin body under increments of any size."""
 
     __slots__ = ()
     trials = ENOUGH
@@ -56,7 +50,7 @@ class Within(NamedTuple):
 
 
 def across(law, kin, dl, q):
-    """The increment `dl` in the body, with q across it, as the wrapped law takes it."""
+    """The increment `dl` in the body, with q across it, for the wrapped law."""
     if isinstance(dl, LargeIncrement):
         step = across(law, kin, dl.dl, q)
         return large(step) if laws.by_rates(law) else step
@@ -98,8 +92,6 @@ def _advance_thin(law, kin, state, dl, dt):
 
 
 def _by_state(function):
-    """Let a function of (law, kin, state) take the wrapped law and its state."""
-
     def of_whole(law, kin, state):
         return function(law.law, WHOLE, state.whole)
 
@@ -107,8 +99,6 @@ def _by_state(function):
 
 
 def _by_law(function):
-    """Let a function of a law, and perhaps a number, take the wrapped law."""
-
     def of_whole(law, *like):
         return function(law.law, *like)
 
@@ -131,7 +121,6 @@ for _function in (laws.specific_volume, laws.heat_capacity, laws.conductivity):
 
 @laws.by_rates.on(Thin)
 def _by_rates_thin(law):
-    """Ask for the logarithm in load steps, which need more trials, whatever the wrapped law."""
     return True
 
 
@@ -158,7 +147,6 @@ def _slower(law, kin, state, squared):
 
 
 def _in_body(kin, s):
-    """The components that the kinematics of the body has."""
     return kin.Symmetric._make(s[: len(kin.symmetric_names)])
 
 

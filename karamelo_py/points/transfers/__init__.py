@@ -1,19 +1,13 @@
 """Transfers: mapping of velocity from points to nodes and back. One file for each family.
 
-A transfer is a NamedTuple of its parameters (its class is the tag). It defines the data that a
-point stores in addition to its velocity (`keeps`: nothing, or a tensor such as the affine moment B)
-and the velocity update from the nodes:
+A transfer is a NamedTuple of its parameters (its class is the tag). It defines what a point stores
+in addition to its velocity (nothing, or a tensor such as the affine moment B, in `point_fields`),
+and the velocity update from v_pic = sum_I N_I v*_I, the updated nodal velocity at the point, and dv
+= sum_I N_I (v*_I - v_I), its change during the step.
 
-v_pic
-    sum_I N_I v*_I, the updated nodal velocity at the point
-dv
-    sum_I N_I (v*_I - v_I), its change during the step
-
-Functions of a node take a view of it: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and
-`kin` (:mod:`karamelo_py.kernels.views`). Every class has `traits`, and names the fields of points
-that it needs in `point_fields`.
-
-The default for undefined functions is PIC: nothing is stored, only v is mapped.
+Functions of a node get a view of it: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and
+`kin` (:mod:`karamelo_py.kernels.views`). The default for undefined functions is PIC: nothing is
+stored, only v is mapped.
 """
 
 from typing import NamedTuple
@@ -34,24 +28,23 @@ class TransferTraits(NamedTuple):
 
 
 class Moment(Field):
-    """The tensor that points store in addition to velocity: its moment B or its gradient L."""
+    """Tensor that points store in addition to velocity: their moment B or gradient L."""
 
     shape = planar
 
 
 def flip_coefficient(transfer) -> float:
-    """Return the fraction of its velocity that a point retains in a step; 0 as in PIC."""
+    """Fraction of its velocity that a point retains in a step; 0 as in PIC."""
     return transfer.alpha if transfer.traits.retains else 0.0
 
 
 def stores_moment(transfer) -> bool:
-    """Return True if points store moments or gradients of their velocity."""
     return Moment in declared([transfer], "point_fields")
 
 
 @point_function()
 def updated_velocity(transfer, v, v_pic, dv):
-    """The point's velocity after the step."""
+    """Velocity of a point after the step."""
 
 
 @point_function(otherwise=True)
@@ -62,16 +55,16 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_shares(transfer, like):
-    """Return the lost fractions of the kinetic energy that mapping to the nodes and back removes.
+    """Two fractions of the kinetic energy, removed by mapping to the nodes and back, that are lost.
 
-    Two numbers. The rest returns with the data stored by points. Undefined if unknown: the energy
-    is then lost without a record.
+    The rest returns with the data stored by points. Undefined if unknown: the energy is then lost
+    without a record.
     """
 
 
 @point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
-    """The velocity that moves the point; `v` is its velocity after the step, `j` `known_volume`."""
+    """Velocity that moves a point; `v` is its velocity after the step, `j` `known_volume`."""
     return v_pic
 
 
@@ -83,28 +76,28 @@ def known_volume(transfer, law, kin, state):
 
 @point_function(otherwise=True)
 def nodal_momentum(transfer, pt, node):
-    """Return the momentum that a point gives to a node. `pt` has `mass`, `v` and `moment`."""
+    """Momentum that a point gives to a node. `pt` has `mass`, `v` and `moment`."""
     return node.N * pt.mass * pt.v
 
 
 @point_function(otherwise=True)
 def affine_velocity(transfer, moment, inverse_d):
-    """C, if the velocity that a point gives to node X with its weight is v + C (X - x).
+    """C, if a point gives the node X the velocity v + C (X - x) with its weight; otherwise ().
 
-    `inverse_d` is (D^-1,), or () if D is not constant. Returns () if C is unknown.
+    `inverse_d` is (D^-1,), or () if D is not constant.
     """
     return ()
 
 
 @point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
-    """Return the moment of a point at rest, as a tuple: empty for transfers that store none."""
+    """Moment of a point at rest, as a tuple: empty for transfers that store none."""
     return ()
 
 
 @point_function(otherwise=True)
 def add_moment(transfer, node, v, moment):
-    """Add the contribution of a node of velocity `v` to the moment."""
+    """The moment plus the contribution of a node of velocity `v`."""
     return moment
 
 
@@ -119,22 +112,19 @@ def by_arms(transfer, inverse_d):
 
 @point_function(otherwise=True)
 def gradient_weight(transfer, node):
-    """Return the weight of a node in strains and forces: by default `node.grad_N`."""
+    """Weight of a node in strains and forces."""
     return node.grad_N
 
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Return True if N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
+    """Check whether N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
     return False
 
 
 @point_function(otherwise=True)
 def straining(transfer, kin, gradient):
-    """Return the strain's term in a gather of velocity and gradient: `gradient`.
-
-    Or (), if the point stores the velocity gradient.
-    """
+    """The strain's term in a gather of velocity and gradient; () if points store the gradient."""
     return gradient
 
 

@@ -89,13 +89,13 @@ def _in_step_flip_per_time(transfer, kept):
 
 
 def take_nodal_velocity(transfer: type) -> None:
-    """Let the points of `transfer` take the nodal velocity after the step, as in PIC."""
+    """Let points take the nodal velocity after the step, as in PIC."""
     lost_shares.on(transfer)(lambda transfer, like: (1.0, 1.0))
     updated_velocity.on(transfer)(lambda transfer, v, v_pic, dv: v_pic)
 
 
 def blend(transfer: type) -> None:
-    """Update the velocity of points with `transfer` as in FLIP, by its `alpha`."""
+    """Update the velocity of points as in FLIP, by `alpha` of the transfer."""
 
     @updated_velocity.on(transfer)
     def _updated_velocity_transfer(transfer, v, v_pic, dv):
@@ -110,7 +110,7 @@ def blend(transfer: type) -> None:
 
 
 def swings(transfer: type) -> None:
-    """Register the warning for large vibrations with `transfer`: only usl, which damps, is safe."""
+    """Register the warning for large vibrations: only usl, which damps, is safe."""
     known_failure(
         transfer,
         "large vibrations",
@@ -130,12 +130,12 @@ def swings(transfer: type) -> None:
 
 
 def _turns_away(transfer, scene):
-    """Return True if a free body rotates so often that the loss per revolution adds up."""
+    """Check whether a free body rotates so often that the loss per revolution adds up."""
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
 def slows(transfer: type) -> None:
-    """Register the warning for bodies that rotate many times with `transfer`.
+    """Register the warning for bodies that rotate many times.
 
     Points move with the grid velocity u, and store v: each step changes the angular momentum by the
     sum of m u x v dt, for any step (disks in 2D, E 100 times the rotational energy, 4 and 8 cells
@@ -161,13 +161,13 @@ def slows(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """Return True if points lag a free rotation by 3 % or more, over a radian or more."""
+    """Check whether points lag a free rotation by 3 % or more, over a radian or more."""
     lag = scene.lag
     return lag.share > LAG and 2 * pi * lag.turns > 1
 
 
 def _brakes(transfer, scene):
-    """Return the energy loss of a free rotation: (1 - alpha) of the lag in each step, twice."""
+    """Energy loss of a free rotation: (1 - alpha) of the lag in each step, twice."""
     lag, simulation = scene.lag, scene.simulation
     if not lag.share > 0:
         return None
@@ -177,7 +177,7 @@ def _brakes(transfer, scene):
 
 
 def lags(transfer: type) -> None:
-    """Register the warning for free rotations with `transfer` in the total frame.
+    """Register the warning for free rotations in the total frame.
 
     Points move with the grid velocity, and store another: a square of n cells rotates too slowly by
     2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).

@@ -16,16 +16,15 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass that XPIC has removed from a point so far; velocity not in the series yet."""
+    """Energy per mass that XPIC has removed from a point; velocity not in the series yet."""
 
     @staticmethod
     def shape(kin: Any) -> int:
-        """A number and a vector."""
         return 1 + kin.dimension
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """Return True if points of a law take the transfer's energy loss as heat."""
+        """True if points of a law take the transfer's energy loss as heat."""
         return can(law, taken_heat)
 
 
@@ -34,7 +33,6 @@ class Series(SummedField):
 
     @staticmethod
     def shape(kin: Any) -> int:
-        """Two vectors."""
         return 2 * kin.dimension
 
 

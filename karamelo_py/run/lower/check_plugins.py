@@ -183,8 +183,8 @@ def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None
     if not (is_foreign(kind) and hardening.flow_stress.defined(kind)):
         return
     memory, heat, dt = state.m.strength, state.m.heat, strain / strain if strain else 1
-    known = hardening.precompute(strength, memory, heat)
-    found = hardening.flow_stress(strength, memory, known, strain, heat, dt)
+    before = hardening.before_flow(strength, memory, heat)
+    found = hardening.flow_stress(strength, before, strain, dt)
     _expect(part, hardening.flow_stress, found, 2)
     _numbers(part, f"flow_stress, or its slope, at a plastic strain of {strain:g}", found, strain)
     if shear_response.find((kind,)) is hardening.radial_return:

@@ -11,7 +11,7 @@ from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.points.laws import can
-from karamelo_py.points.laws.strengths import initial_memory, share_beside
+from karamelo_py.points.laws.strengths import fbar_fraction, initial_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
@@ -34,9 +34,9 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 def takes_average(law: Any) -> bool:
     """Return True if the yield surface of a law uses part of the averaged pressure (F-bar)."""
-    if not can(law, share_beside):
+    if not can(law, fbar_fraction):
         return False
-    return bool(share_beside(law.strength, initial_memory(law.strength, 1.0)) > 0)
+    return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
 
 
 class NoContact(NamedTuple):

@@ -1,15 +1,14 @@
-"""Convected particle domain interpolation: a point sees the nodes around its domain's corners.
+"""Convected particle domain interpolation: the nodes around the corners of a point's domain.
 
-Over the domain of a point, each basis function is replaced by a simple function through its values
-at the corners x_c (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
+Over the domain, each basis function is replaced by a simple function through its values at the
+corners x_c (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
 
-    N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
+     N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
 
-with w_c and g_c, the means over the domain of the function of corner c and of its gradient. The
-domains tile the body however far it stretches, so it does not fracture numerically.
-
-A family of domains derives from `ConvectedDomain` and defines only :func:`domain`. Domains with
-stored corners that move with the grid derive from `CarriedDomain`, and also define `upright`.
+with w_c and g_c the domain means of the function of corner c and of its gradient. Domains tile the
+body however far it stretches, so it does not fracture numerically. A family derives from
+`ConvectedDomain` and defines :func:`domain`; one with stored corners that the grid moves derives
+from `CarriedDomain` and also defines `upright`.
 """
 
 from math import inf
@@ -26,7 +25,7 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 
 
 class Element(NamedTuple):
-    """The kind of element whose corners a family of domains stores."""
+    """Kind of element whose corners a family of domains stores."""
 
     kind: str  # its name in meshes
     corners: int
@@ -38,11 +37,10 @@ class Element(NamedTuple):
 class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; they add `dimension` and `shape`.
 
-    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I. The centre differs
-    from the point if corners lie beyond the grid, or in quadrilaterals and hexahedra that are not
-    parallelograms. Linear momentum stays exact, and angular momentum belongs to the centres. The
-    angular momentum of the points then varies by 0.1 % of its variation with FLIP (a spinning
-    square, Q4).
+    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I, which differs from
+    the point if corners lie beyond the grid, or in quadrilaterals and hexahedra that are not
+    parallelograms. Linear momentum stays exact, and angular momentum belongs to the centres: that
+    of the points varies by 0.1 % of its variation with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -94,7 +92,7 @@ def domain(basis, kin, place):
 
 @point_function()
 def upright(basis, kin, place):
-    """Return True if the domain is not folded: the Jacobian is positive at every corner."""
+    """Check that the domain is not folded: the Jacobian is positive at every corner."""
 
 
 class Corner(NamedTuple):
@@ -106,7 +104,7 @@ class Corner(NamedTuple):
 
 
 class CornerStencil(NamedTuple):
-    """Corners of a domain, from which its nodes follow. Unused fields cost nothing."""
+    """Corners of a domain. Unused fields cost nothing."""
 
     corners: tuple[Corner, ...]
     weights: tuple[float, ...]  # of the corners, and their gradients
@@ -118,10 +116,9 @@ class CornerStencil(NamedTuple):
 
 
 class AtCorners(NamedTuple):
-    """Tag instead of a basis: the corners of a point's domain take the role of nodes.
+    """Tag for code that uses weight or gradient of a node once, as a factor: corners as nodes.
 
-    A node number is then a :class:`~karamelo_py.compiler.compile.Weighted`. For code that uses the
-    weight or the gradient of a node once, as a factor.
+    A node number is then a :class:`~karamelo_py.compiler.compile.Weighted`.
     """
 
     basis: NamedTuple
@@ -131,7 +128,7 @@ class AtCorners(NamedTuple):
 
 
 def along_cell(grid, direction, x):
-    """Cell of a corner in one direction, position in it (0 to 1), and both together.
+    """Cell of a corner in one direction, position in it (0 to 1), and their sum.
 
     A corner beyond the grid is moved to its face, so weights still sum to one.
     """
@@ -143,7 +140,6 @@ def along_cell(grid, direction, x):
 
 
 def corner_at(kin, grid, x):
-    """Find where a corner at `x` lies on the grid."""
     cell, fractions, at = zip(*[along_cell(grid, i, x[i]) for i in range(len(x))], strict=True)
     return Corner(tuple(cell), tuple(fractions), vector(kin, at))
 
@@ -155,13 +151,13 @@ def hat(corner, j):
 
 
 def node_around(grid, corner, j):
-    """Number of the j-th node of a corner's cell, and number of the first node."""
+    """Number of the first node of a corner's cell, and offset of the j-th."""
     first = node_number(grid, grid.first, corner.cell)
     return first, node_number(grid, 0, digits(j, 2, len(corner.cell)))
 
 
 def around(grid, corner):
-    """The nodes around a corner, and their weights."""
+    """Nodes around a corner, and their weights."""
     nodes = range(2 ** len(corner.cell))
     rows = tuple([beside(*node_around(grid, corner, j)) for j in nodes])
     return Weighted(rows, tuple([hat(corner, j) for j in nodes]))
@@ -218,7 +214,6 @@ def _locate_corners(basis, kin, grid, place):
 
 
 def seen_at_corner(kin, stencil, c):
-    """The c-th corner of a stencil, its weight, and its gradient."""
     weight, slopes = item(stencil.weights, c), item(stencil.gradients, c)
     return item(stencil.corners, c), weight, with_hoop(kin, weight, slopes, stencil.inv_r)
 

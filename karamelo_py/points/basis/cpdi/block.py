@@ -1,8 +1,7 @@
 """The nodes around a domain in 2D, each once: three by three.
 
-Corners of one domain mostly lie in two neighbouring cells along each direction, and most nodes of
-these cells are seen from several corners. Contributions of points are summed over the corners
-before they are added to the nodes. In 3D this costs more than it saves: 27 nodes, eight corners.
+Most nodes are seen from several corners, so contributions are summed over the corners before they
+are added to the nodes. In 3D this costs more than it saves: 27 nodes, eight corners.
 """
 
 from collections.abc import Iterable
@@ -19,7 +18,7 @@ WIDTH = 3  # nodes along each direction
 
 
 class NodeBlock(NamedTuple):
-    """The nodes next to a point, with weights and gradients. Unused fields cost nothing."""
+    """Nodes next to a point, with weights and gradients. Unused fields cost nothing."""
 
     first: tuple[int, ...]  # number of the first of them, along each direction
     weights: tuple[float, ...]
@@ -29,18 +28,18 @@ class NodeBlock(NamedTuple):
 
 
 class InBlock(NamedTuple):
-    """Tag instead of a basis: the point sees a :class:`NodeBlock`."""
+    """Tag instead of a basis: the point has a :class:`NodeBlock`."""
 
     basis: NamedTuple
 
 
 def _hats(a):
-    """The linear basis functions of three nodes, `a` cells from the first."""
+    """Linear basis functions of three nodes, `a` cells from the first."""
     return max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)
 
 
 def block_of(kin, grid, stencil):
-    """The block of a point; () in 3D."""
+    """Block of a point; () in 3D."""
     if kin.dimension > 2:
         return ()
     first, ahead, holds = [], [], True
@@ -60,12 +59,12 @@ def block_of(kin, grid, stencil):
 
 
 def is_whole(block):
-    """Check that the points in all lanes see only nodes of their blocks."""
+    """Check whether the points in all lanes see only nodes of their blocks."""
     return len(block) > 0 and all_lanes(block.holds)
 
 
 def is_one_block(block):
-    """Check that the points in all lanes see only nodes of one block."""
+    """Check whether the points in all lanes see only nodes of one block."""
     if len(block) == 0:
         return False
     row, line = block.first
@@ -74,12 +73,12 @@ def is_one_block(block):
 
 @shared
 def of_one(block):
-    """The block of points with the same nodes: their numbers have no lanes."""
+    """Block of points with the same nodes: node numbers have no lanes."""
     return NodeBlock(tuple([first_lane(number) for number in block.first]), *block[1:])
 
 
 def _spread_out(hats: Iterable, values: Iterable) -> tuple:
-    """Values of the corners at the nodes, by products of the functions along both directions."""
+    """Values of corners at the nodes, by products of the functions along both directions."""
     totals: tuple = ()
     for (rows, line), value in zip(hats, values, strict=True):
         pairs = [(value * row, hat) for row in rows for hat in line]

@@ -7,8 +7,6 @@ from karamelo_py.points.kinematics import Space, cofactor, determinant, dot, tot
 
 
 class _Parallel(cpdi.ConvectedDomain):
-    """Base of domains given by half edges."""
-
     __slots__ = ()
     traits = cpdi.ConvectedDomain.traits._replace(shape=("half_edges",))
 
@@ -41,7 +39,6 @@ class R8(_Parallel):
 
 
 def half_edges(kin, place):
-    """The half edges of a domain, vectors."""
     d = kin.dimension
     return [vector(kin, place[d * e : d * e + d]) for e in range(1, d + 1)]
 
@@ -54,7 +51,6 @@ def reciprocals(kin, edges, factor):
 
 
 def signed(sign, a, b):
-    """a + b, or a - b."""
     return a + b if sign > 0 else a - b
 
 
@@ -98,8 +94,6 @@ def _extent_parallel(basis, kin, grid, place):
 
 
 class _Simplex(cpdi.CarriedDomain):
-    """Base of triangles and tetrahedra."""
-
     __slots__ = ()
 
 
@@ -132,7 +126,7 @@ class Tet4(_Simplex):
 
 
 def corners_and_edges(kin, place):
-    """The corners, vectors, and components of the edges from the first to the rest."""
+    """Corners, and components of the edges from the first corner."""
     d = kin.dimension
     corners = [vector(kin, place[d * c : d * c + d]) for c in range(1, d + 2)]
     edges = [corner - corners[0] for corner in corners[1:]]
@@ -236,9 +230,9 @@ def _cross(a, b):
 
 
 def _at_gauss(a, b, c, d):
-    """Interpolate values at (-,-), (+,-), (-,+), (+,+) to the Gauss points, bilinearly.
+    """Bilinear interpolation of values at (-,-), (+,-), (-,+), (+,+) to the Gauss points.
 
-    Since the weights are symmetric, also distributes values at the Gauss points to the corners.
+    By symmetry of the weights, also distributes values at the Gauss points to the corners.
     """
     e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
     g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
@@ -291,7 +285,7 @@ def _domain_h8(basis, kin, place):
 
 
 def _at(a: int, b: int) -> int:
-    """Return the index of one of the four in the order of `_at_gauss`."""
+    """Index of one of the four in the order of `_at_gauss`."""
     return (a > 0) + 2 * (b > 0)
 
 

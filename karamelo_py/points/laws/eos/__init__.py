@@ -1,9 +1,9 @@
-"""Equations of state of one point: pressure from volume.
+"""Equations of state: pressure of a point from its volume.
 
-An equation of state is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is the
-volume over the reference volume, `heat` the temperature (`Warm`), or () if the law has none. Its
-memory is a tuple, empty for most. It also has a `specific_volume`, like a law.
+An equation of state is a NamedTuple of parameters (its class is the tag) and a part of a composed
+law (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
+the volume over the reference volume, `heat` the temperature (`Warm`), or () if the law has none.
+The memory is a tuple, empty for most. It has a `specific_volume`, like a law.
 """
 
 from typing import Annotated, NamedTuple
@@ -14,15 +14,15 @@ from karamelo_py.language.signature import Positive
 
 @point_function(otherwise=True)
 def initial_energy(eos, like):
-    """The initial memory of a point, in the number type of `like`."""
+    """Initial memory of a point, in the number type of `like`."""
     return ()
 
 
 @point_function(otherwise=True)
 def compressed(eos, memory, before, j, heating):
-    """The memory after the volume ratio changed from `before` to j, with heating by work.
+    """Memory after the volume ratio changed from `before` to j.
 
-    `heating` is per reference volume: plastic and viscous work.
+    `heating` is the plastic and viscous work per reference volume.
     """
     return memory
 
@@ -35,7 +35,7 @@ def taken_heat(eos, memory, heat):
 
 @point_function(otherwise=True)
 def stored_heat(eos, loss):
-    """Return the dissipated energy that is in the memory and thus in `compression_energy`."""
+    """Dissipated energy that is in the memory and thus in `compression_energy`."""
     return loss - loss
 
 
@@ -56,7 +56,7 @@ def compression_energy(eos, j, memory):
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """The volume ratio at which the pressure is p, or nearest to it."""
+    """Volume ratio at which the pressure is p, or nearest to it."""
 
 
 @point_function(otherwise=True)
@@ -95,7 +95,6 @@ class LinearPressure(NamedTuple):
 
     @classmethod
     def given(cls, rho0: Annotated[float, Positive], K: Annotated[float, Positive]):
-        """Make the law from density and bulk modulus."""
         return cls(1 / rho0, K)
 
 

@@ -1,4 +1,4 @@
-"""eos fluid and ideal-gas: liquids by Tait's equation, gases with internal energy."""
+"""Eos fluid and ideal-gas: liquids by Tait's equation, gases with internal energy."""
 
 from math import inf, sqrt
 from typing import Annotated, Any, NamedTuple
@@ -75,7 +75,6 @@ class Tait(NamedTuple):
         *,
         tension: Annotated[float, NonNegative] = inf,
     ):
-        """Make the law from density, reference pressure and exponent."""
         if gamma > 100 > K:  # exponents of liquids are below 15
             raise ScriptError(
                 f"K = {K:g} and gamma = {gamma:g} are swapped: gamma is an exponent",
@@ -197,7 +196,6 @@ class IdealGas(NamedTuple):
         Q1: Annotated[float, NonNegative] = 0.0,
         Q2: Annotated[float, NonNegative] = 0.0,
     ):
-        """Make the gas and its artificial viscosity; the memory is its energy."""
         if not gamma > 1:
             raise ScriptError(
                 f"the ratio of specific heats {gamma:g} is impossible",

@@ -1,4 +1,4 @@
-"""eos shock: Mie-Grueneisen equation of state."""
+"""Eos shock: Mie-Grueneisen equation of state."""
 
 from math import inf, sqrt
 from typing import Annotated, NamedTuple
@@ -97,7 +97,6 @@ class Shock(NamedTuple):
         *,
         tension: Annotated[float, NonNegative] = inf,
     ):
-        """Make the equation of state and its artificial viscosity."""
         # K is unused because rho0 c0^2 replaces it; it could only replace c0.
         if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
             raise ScriptError(
@@ -124,7 +123,7 @@ known_failure(
 
 
 def tangent_from(eos, j):
-    """The compression 1 - J beyond which the pressure is linear."""
+    """Compression 1 - J beyond which the pressure is linear."""
     return where(_STEEPEST < eos.S, _STEEPEST / max(eos.S, _STEEPEST), _STEEPEST)
 
 
@@ -142,7 +141,7 @@ def cold_pressure(eos, j):
 
 
 def with_heat(heat, p, Tr, factor):
-    """p + factor (T - Tr) above the temperature Tr, p without a temperature."""
+    """p + factor (T - Tr) above the temperature Tr; p without a temperature."""
     return p + max(heat.T - Tr, 0) * factor if len(heat) else p
 
 

@@ -1,57 +1,72 @@
-"""Strength of one point: deviatoric stress from strain. One file each.
+"""Strengths: deviatoric stress of a point from its strain. One file each.
 
-A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory (plastic strain and the like) is a NamedTuple
-of as many numbers as needed, preferably none (`remembers`). `heat` is the temperature (`Warm`), or
-() if the law has none.
-
-Strengths that depend on pressure, and change the volume, define `pressure_response` instead of
-`shear_response` (`karamelo_py.points.laws.strengths.frictional`). The defaults are those of an
-elastic strength with a shear modulus ``G`` and no memory.
+A strength is a NamedTuple of parameters (its class is the tag) and a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). Its memory (plastic strain and the like) is declared by
+`remembers`. `heat` is the temperature (`Warm`), or () if the law has none. Strengths that depend on
+pressure and change the volume define `pressure_response` instead of `shear_response`. The defaults
+are for an elastic strength with a shear modulus ``G`` and no memory.
 """
 
 import sys
 from collections import namedtuple
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler.compile import point_function
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import column
 
 
-class Remembered(NamedTuple):
-    """Tag of a number in the memory of a strength, by its index."""
+class StrainStep(NamedTuple):
+    """A strain increment of a point."""
 
-    place: int
+    s: Any  # deviatoric stress before the step, rotated with the point
+    strain: Any  # increment, not deviatoric
+    j: Any  # volume ratio after the step
+    dt: Any
+    extra: Any  # pressure that forces have beyond the point's own (F-bar)
+
+
+class FrictionTrial(NamedTuple):
+    """Stress after a step that is assumed to be elastic."""
+
+    s: Any  # deviatoric stress
+    p: Any  # pressure
+    K: Any  # bulk modulus
+
+
+class Remembered(NamedTuple):
+    """Tag of a number in the memory of a strength."""
+
+    index: int
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare the memory of `strength`: the names of its numbers.
+    """Declare the memory of `strength`, a NamedTuple of numbers.
 
     Parameters
     ----------
     strength
         The class.
     **numbers
-        For each number the name of its column, and its initial value: a number, or the name of a
-        parameter. ``ep`` is the equivalent plastic strain; it comes first.
+        Name of each number, also its dump column, and its initial value: a number, or the name of a
+        parameter. ``ep``, the equivalent plastic strain, comes first.
     """
     name = f"{strength.__name__}Memory"
-    made = namedtuple(name, numbers, module=strength.__module__)
-    setattr(sys.modules[strength.__module__], name, made)  # cached kernels refer to it
+    memory_class = namedtuple(name, numbers, module=strength.__module__)
+    setattr(sys.modules[strength.__module__], name, memory_class)  # cached kernels refer to it
     starts = tuple(numbers.values())
     parameters = tuple(start if isinstance(start, str) else "" for start in starts)
 
     @initial_memory.on(strength)
     def _initial_memory_strength(strength, like):
         pairs = zip(parameters, starts, strict=True)
-        return made(*[getattr(strength, name) if name else start for name, start in pairs])
+        return memory_class(*[getattr(strength, name) if name else start for name, start in pairs])
 
-    for place, name in enumerate(numbers):
-        column(strength, name, Remembered(place))
+    for index, name in enumerate(numbers):
+        column(strength, name, Remembered(index))
     if "ep" in numbers:
-        initial_loss.on(strength)(lambda strength, like: (0.0,))
-        equivalent_plastic_strain.on(strength)(lambda strength, memory: memory.ep)
+        initial_loss.on(strength)(no_loss_yet)
+        equivalent_plastic_strain.on(strength)(stored_plastic_strain)
 
 
 @point_function(otherwise=True)
@@ -61,32 +76,30 @@ def initial_memory(strength, like):
 
 
 @point_function(otherwise=True)
-def respond(strength, law, kin, s, strain, j, memories, dt, beside):
-    """Deviatoric stress, memory, and work per volume that is not stored, after a step dt.
+def respond(strength, law, kin, step, memories):
+    """Deviatoric stress, memory, and work per volume that is not stored, after a `StrainStep`.
 
-    `s` is the old deviatoric stress, already rotated with the point; `strain`, the increment, is
-    not deviatoric; `memories` are the memories of all parts of the `law`. With F-bar, forces have
-    `beside` more pressure than the point.
+    `memories` are the memories of all parts of the `law`.
     """
-    return shear_response(strength, kin, s, strain, memories.strength, memories.heat, dt)
+    return shear_response(strength, kin, step, memories.strength, memories.heat)
 
 
 @point_function()
-def shear_response(strength, kin, s, strain, memory, heat, dt):
+def shear_response(strength, kin, step, memory, heat):
     """As `respond`, for strengths that need nothing from the other parts."""
 
 
 @point_function()
-def pressure_response(strength, kin, s, p, K, strain):
-    """Deviatoric stress and pressure on or inside the yield surface, from an elastic trial.
+def pressure_response(strength, kin, trial, strain):
+    """Deviatoric stress and pressure on or inside the yield surface, from a `FrictionTrial`.
 
-    `K` is the bulk modulus, `strain` the equivalent plastic strain.
+    `strain` is the equivalent plastic strain.
     """
 
 
 @point_function()
-def share_beside(strength, memory):
-    """The fraction of the averaged pressure that the yield surface uses, with F-bar.
+def fbar_fraction(strength, memory):
+    """Fraction of the averaged pressure that the yield surface uses, with F-bar.
 
     Undefined for strengths that do not depend on pressure.
     """
@@ -98,9 +111,13 @@ def initial_loss(strength, like):
     return ()
 
 
+def no_loss_yet(strength, like):
+    return (0.0,)
+
+
 @point_function(otherwise=True)
 def elastic_ratio(strength, memory, j):
-    """The elastic part of the volume ratio j, which determines pressure."""
+    """Elastic part of the volume ratio j, which determines pressure."""
     return j
 
 
@@ -112,13 +129,13 @@ def shear_modulus(strength):
 
 @point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
-    """The squared wave speed, increased by viscosity, which reduces the stable step."""
+    """Squared wave speed, increased by viscosity, which reduces the stable step."""
     return squared
 
 
 @point_function(otherwise=True)
 def shear_strain(strength, kin, s):
-    """Elastic part of the deviatoric strain, as a symmetric tensor."""
+    """Elastic part of the deviatoric strain, a symmetric tensor."""
     return 0.5 / strength.G * s
 
 
@@ -132,3 +149,7 @@ def shear_energy(strength, kin, s):
 def equivalent_plastic_strain(strength, memory):
     """Sum of sqrt(2/3 d:d) of the plastic strain increments d."""
     return 0
+
+
+def stored_plastic_strain(strength, memory):
+    return memory.ep

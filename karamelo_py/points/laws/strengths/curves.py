@@ -56,7 +56,6 @@ class Tabulated(NamedTuple):
 
     @classmethod
     def given(cls, G: Annotated[float, Positive], *curve: float | TableFile):
-        """Make the law from the points of its curve."""
         points = _points(curve)
         _check_curve(points, G)
         strain, stress = map(tuple, points.T.tolist())
@@ -108,8 +107,8 @@ shear_response.on(Tabulated)(radial_return)
 
 
 @flow_stress.on(Tabulated)
-def _flow_stress_tabulated(strength, memory, known, increment, heat, dt):
-    x = memory.ep + increment
+def _flow_stress_tabulated(strength, before, increment, dt):
+    x = before.memory.ep + increment
     last = int(strength.count) - 1
     for k in range(last):
         above = strength.strain[k + 1]
@@ -127,14 +126,13 @@ DEPTH = 8  # of the stack, a tuple
 class FlowFormula:
     """For signatures: a formula of plastic strain, its rate and temperature, as numbers.
 
-    Two per instruction: the operation, and the constant or the index of the input.
+    Two numbers per instruction: the operation, and a constant or the index of an input.
     """
 
     script_kind: ClassVar[str] = "a formula of ep, epdot and T"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Numbers:
-        """Compile `argument` to instructions."""
         value = argument.value_with(SEEDS)
         if isinstance(value, str):
             raise ScriptError(f"'{value}' is text", place=argument.place)
@@ -200,14 +198,13 @@ class FlowStress(NamedTuple):
         *,
         T: Annotated[float, NonNegative] = 293.0,
     ):
-        """Make the law from its formula."""
         law = cls(G, Y, len(Y) // 2, T)
         _check_formula(law)
         return law
 
 
 def _check_formula(law: FlowStress) -> None:
-    """Refuse a formula without a value at the onset of plastic flow, or further on."""
+    """Refuse a formula without a value at the onset of plastic flow or later."""
     for ep in (0.0, 1e-3, 0.1, 1.0):
         for epdot in (0.0, 1.0, 1e4):
             Y = value(law, ep, epdot, law.initial_temperature)
@@ -248,11 +245,11 @@ shear_response.on(FlowStress)(radial_return)
 
 
 @flow_stress.on(FlowStress)
-def _flow_stress_flow_stress(strength, memory, known, increment, heat, dt):
-    T = temperature_or(heat, strength.initial_temperature)
+def _flow_stress_flow_stress(strength, before, increment, dt):
+    T = temperature_or(before.heat, strength.initial_temperature)
     near = 1e-6 * (increment + 1e-4)
     # In double precision: the difference of the two is small.
-    here = real(memory.ep, 1.0) + increment
+    here = real(before.memory.ep, 1.0) + increment
     there = max(value(strength, here, increment / dt, T), 0.0)
     beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)
     flow = max(real(there, increment), 0)

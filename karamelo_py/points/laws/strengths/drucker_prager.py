@@ -8,6 +8,7 @@ from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
+    Soil,
     frictional,
     lowest_pressure,
     peak_and_residual,
@@ -66,8 +67,8 @@ class DruckerPrager(NamedTuple):
     and eta = sin(phi)/b, where b = sqrt(1 - d^2/3) + d sin(phi)/3 and d = 3 tan(psi)/sqrt(9 + 12
     tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so the limit in plane strain equals
     mohr-coulomb's for any psi. The dilatancy coefficient is d, and for the other fits eta of psi.
-    Tension beyond -p = tension, or the apex, is cut off. The plastic volume change is stored, and
-    pressure follows from the elastic part of J. A step uses the strength at its beginning. With
+    Tension beyond -p = tension, or the apex, is cut off. Pressure follows from the elastic part of
+    J. A step uses the strength at its beginning. With
     softening, results depend on the cell size.
 
     See Also
@@ -102,10 +103,10 @@ class DruckerPrager(NamedTuple):
         residual_phi: Annotated[float, NonNegative] | None = None,
         softening: Annotated[float, Positive] | None = None,
     ):
-        """Make the cone from cohesion and angles: sqrt(s:s / 2) <= cohesion + friction p."""
-        of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
-        peak, left = peak_and_residual(lambda c, phi: cone(fit, c, phi, radians(psi)), *of_soil)
-        return cls(G, *peak, inf if tension is None else tension, *left)
+        """The cone sqrt(s:s / 2) <= cohesion + friction p."""
+        soil = Soil(cohesion, phi, psi, residual_cohesion, residual_phi, softening)
+        numbers = peak_and_residual(soil, lambda c, phi: cone(fit, c, phi, radians(psi)))
+        return cls(G, *numbers[:3], inf if tension is None else tension, *numbers[3:])
 
 
 frictional(DruckerPrager)
@@ -120,17 +121,18 @@ def _tension_bound_drucker_prager(strength, lowest):
 def _sines_drucker_prager(strength, friction, dilation):
     # In plastic flow of plane strain s_zz = -2/3 dilation sqrt(J2), so half the difference of the
     # in-plane principal stresses is sqrt(J2) times:
-    share = sqrt(max(1 - dilation * dilation / 3, 1e-6))
-    return friction * share / max(1 - friction * dilation / 3, 1e-6), dilation / share
+    in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
+    return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
 
 @pressure_response.on(DruckerPrager)
-def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
+def _pressure_response_drucker_prager(strength, kin, trial, strain):
+    s, p, K = trial
     cohesion, friction, dilation = surface(strength, strain)
-    trial = sqrt(0.5 * inner(s, s))
+    trial_root = sqrt(0.5 * inner(s, s))
     lowest = lowest_pressure(strength, strain)
-    f = trial - cohesion - friction * p
-    root = trial
+    f = trial_root - cohesion - friction * p
+    root = trial_root
     if f > 0:
         x = f / (strength.G + K * friction * dilation)
         p += K * dilation * x
@@ -140,7 +142,7 @@ def _pressure_response_drucker_prager(strength, kin, s, p, K, strain):
             p -= K * dilation * x
     if p < lowest:
         p = lowest
-        root = min(trial, cohesion + friction * lowest)
-    if root < trial:
-        return max(root, 0) / trial * s, p
+        root = min(trial_root, cohesion + friction * lowest)
+    if root < trial_root:
+        return max(root, 0) / trial_root * s, p
     return s, p

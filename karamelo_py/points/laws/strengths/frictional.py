@@ -1,16 +1,17 @@
 """Base of pressure-dependent strengths: cohesion and friction, optional softening; memory.
 
 The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and the volume ratio Js
-of separation.
-
-Beyond the largest sustainable tension, points separate: the volume that they gain is not bulk, and
-is closed before they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and
-simulation of granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon
-et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4),
-section 4.3.4). The volume gained by plastic shear (dilatancy) remains.
+of separation. Beyond the largest sustainable tension, points separate: the volume gained is not
+bulk, and is closed before they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum
+modelling and simulation of granular flows through their many phases", J. Fluid Mech. 779, section
+3.3; Tampubolon et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM
+Trans. Graph. 36(4), section 4.3.4). The volume gained by plastic shear (dilatancy) remains.
 """
 
+from collections.abc import Callable
+from functools import partial
 from math import asin, ceil, degrees, inf, log, radians, sqrt
+from typing import NamedTuple
 
 from karamelo_py.compiler.compile import point_function, where
 from karamelo_py.language.rules import known_failure
@@ -18,11 +19,12 @@ from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import parameter
 from karamelo_py.points.laws.eos import bulk_modulus, initial_energy, pressure, ratio_at_pressure
 from karamelo_py.points.laws.strengths import (
+    FrictionTrial,
     elastic_ratio,
+    fbar_fraction,
     pressure_response,
     remembers,
     respond,
-    share_beside,
 )
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
@@ -34,35 +36,33 @@ def surface(strength, strain):
 
     They change linearly from the peak to the residual; a step uses the values at its beginning.
     """
-    share = min(strain * strength.softening, 1)
-    kept = 1 - share
-    cohesion = kept * strength.cohesion + share * strength.residual_cohesion
-    friction = kept * strength.friction + share * strength.residual_friction
+    weakened = min(strain * strength.softening, 1)
+    intact = 1 - weakened
+    cohesion = intact * strength.cohesion + weakened * strength.residual_cohesion
+    friction = intact * strength.friction + weakened * strength.residual_friction
     return cohesion, friction, min(strength.dilation, friction)
 
 
 def lowest_pressure(strength, strain):
-    """The pressure below which nothing is sustained, -cohesion / friction or a given bound."""
+    """The largest sustainable tension, as a pressure: -cohesion / friction or a given bound."""
     cohesion, friction, _ = surface(strength, strain)
     return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
 
 @point_function(otherwise=True)
 def tension_bound(strength, lowest):
-    """The lowest pressure, for a strength whose yield surface ends at `lowest`."""
+    """The lowest pressure, for a yield surface that ends at `lowest`."""
     return lowest
 
 
-def share_of_average(strength, memory):
-    """Return the fraction b of the averaged pressure that the yield surface uses, with F-bar.
+def fraction_by_dilatancy(strength, memory):
+    """The fraction b of the averaged pressure that the yield surface uses, with F-bar.
 
-    Averaging multiplies waves by the factor a (1 for long waves, 0.1 to 0.5 for waves of two or
-    three cells). Their stiffness in plastic flow is
-
-        (a - f (1 - b + b a)) (a - d) times a positive number,
-
-    with f and d the sines of friction and dilatancy. Without b it is negative for a between d and
-    f: pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a square.
+    Averaging multiplies waves by a factor a (1 for long waves, 0.1 to 0.5 for waves of two or three
+    cells). Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive
+    number, with the sines f of friction and d of dilatancy. With b = 0 it is negative for a between
+    d and f: pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a
+    square.
     """
     f, d = sines_after(strength, memory.ep)
     # The sine of a steep cone in plane strain may be above 1.
@@ -70,42 +70,39 @@ def share_of_average(strength, memory):
 
 
 def sines_after(strength, strain):
-    """Return the sines of friction and dilatancy in plane strain after a plastic strain."""
+    """`sines` after a plastic strain."""
     _, friction, dilation = surface(strength, strain)
     return sines(strength, friction, dilation)
 
 
 @point_function(otherwise=True)
 def sines(strength, friction, dilation):
-    """Return the sines of friction and dilatancy in plane strain of a yield surface."""
+    """Sines of friction and dilatancy in plane strain of a yield surface."""
     return friction, dilation
 
 
 def elastic_part(strength, memory, j):
-    """Return the elastic part of the volume ratio j."""
     return j / (memory.Jp * memory.Js)
 
 
-def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
+def respond_by_friction(strength, law, kin, step, memories):
     """Return an elastic trial to the yield surface, and store the plastic volume change."""
     memory, heat = memories.strength, memories.heat
-    trial = elastic_trial(strength.G, s, strain)
-    elastic = elastic_part(strength, memory, j)
+    trial = elastic_trial(strength.G, step.s, step.strain)
+    elastic = elastic_part(strength, memory, step.j)
     warm = sum(thermal_pressure(law.temperature, heat))
-    p = pressure(law.eos, elastic, memories.energy, heat) + warm
-    beside = share_beside(strength, memory) * beside
-    if memory.Js > 1 and p + beside > 0:
+    own = pressure(law.eos, elastic, memories.energy, heat) + warm
+    extra = fbar_fraction(strength, memory) * step.extra
+    if memory.Js > 1 and own + extra > 0:
         # Separation closes before the point sustains pressure.
-        closed = ratio_at_pressure(law.eos, -warm - beside, heat)
-        apart = max(1, j / (memory.Jp * closed))
-        memory = memory._replace(Js=apart)
-        elastic = elastic_part(strength, memory, j)
-        p = pressure(law.eos, elastic, memories.energy, heat) + warm
+        closed = ratio_at_pressure(law.eos, -warm - extra, heat)
+        memory = memory._replace(Js=max(1, step.j / (memory.Jp * closed)))
+        elastic = elastic_part(strength, memory, step.j)
+        own = pressure(law.eos, elastic, memories.energy, heat) + warm
     K = bulk_modulus(law.eos, elastic, memories.energy, heat)
     lowest = lowest_pressure(strength, memory.ep)
-    own = p
-    p += beside
-    new, reached = pressure_response(strength, kin, trial, p, K, memory.ep)
+    p = own + extra
+    new, reached = pressure_response(strength, kin, FrictionTrial(trial, p, K), memory.ep)
     plastic = 0.5 / strength.G * (trial - new)
     memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
     work = inner(new, plastic)
@@ -113,9 +110,9 @@ def respond_by_friction(strength, law, kin, s, strain, j, memories, dt, beside):
         # The volume that carries the new pressure is elastic; the rest is plastic.
         after = ratio_at_pressure(law.eos, own + (reached - p) - warm, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
-            memory = memory._replace(Js=j / (memory.Jp * after))
+            memory = memory._replace(Js=step.j / (memory.Jp * after))
         else:
-            memory = memory._replace(Jp=j / (after * memory.Js))
+            memory = memory._replace(Jp=step.j / (after * memory.Js))
         work -= reached * log(elastic / after)
     return new, memory, work
 
@@ -125,21 +122,18 @@ def frictional(strength: type) -> None:
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
     respond.on(strength)(respond_by_friction)
-    share_beside.on(strength)(share_of_average)
-    known_failure(
-        strength,
+    fbar_fraction.on(strength)(fraction_by_dilatancy)
+    warn = partial(known_failure, strength)
+    warn(
         "locking",
-        when=lambda strength, scene: (
-            scene.locks and not scene.even and {"place": scene.method.place}
-        ),
+        when=_locks,
         reason="plastic flow of soil prescribes volume changes, which the basis {scene.basis_name} "
         "without F-bar cannot follow: limit loads are 10 to 33 % too high, and slopes stay up that "
         "should slide (the run-out of flowing heaps is right)",
         cure="quadratic-spline; or anti_volumetric_locking(true), with method tlmpm if dilating "
         "soil does not mix, as below a footing: points that cross cells cost 10 % of such loads",
     )
-    known_failure(
-        strength,
+    warn(
         "soil that vibrates",
         when=_vibrates,
         reason="with Poisson's ratio {nu:.2g} and little dilatancy, yielding soil amplifies "
@@ -148,8 +142,7 @@ def frictional(strength: type) -> None:
         "steps",
         cure="psi={psi:.2g} (0.333), or Poisson's ratio {most:.2f} or less",
     )
-    known_failure(
-        strength,
+    warn(
         "F-bar in load steps",
         when=_averages_in_load_steps,
         reason="in load steps with F-bar, soil of little dilatancy loses strength: "
@@ -158,8 +151,7 @@ def frictional(strength: type) -> None:
         cure="anti_volumetric_locking(false) (0.333 and 3.04), or psi={psi:.2g} with a linear "
         "basis",
     )
-    known_failure(
-        strength,
+    warn(
         "F-bar with splines",
         when=_averages_splines,
         reason="in dilating soil the basis {scene.basis_name} needs no F-bar, which makes limit "
@@ -175,14 +167,18 @@ ENOUGH = 1 / 3  # dilatancy over friction, as sines, from which neither occurred
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
 
 
+def _locks(strength, scene):
+    return scene.locks and not scene.even and {"place": scene.method.place}
+
+
 def _little_dilatancy(strength):
-    """Return the sine of friction in plane strain, or 0 if there is enough dilatancy."""
+    """The sine of friction in plane strain, or 0 if there is enough dilatancy."""
     f, d = sines_after(strength, 0.0)
     return f if d < ENOUGH * f * (1 - 1e-9) else 0.0
 
 
 def _vibrates(strength, scene):
-    """Return True if a strain cycle of a point at its limit releases more work than it takes.
+    """Check whether a strain cycle of a point at its limit releases more work than it takes.
 
     Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
@@ -195,10 +191,10 @@ def _vibrates(strength, scene):
     for solid in scene.hub.solids.values():
         law = solid.material.law
         if parameter(law, "strength") is strength:
-            share = bulk_modulus(law.eos, 1.0, initial_energy(law.eos, 1.0), ()) / strength.G
+            K_over_G = bulk_modulus(law.eos, 1.0, initial_energy(law.eos, 1.0), ()) / strength.G
             most = 1 / least - 1 / 3 if least > 0 else inf
-            if share > most:
-                return {"nu": _poisson(share), "most": _poisson(most), "psi": _angle(f)}
+            if K_over_G > most:
+                return {"nu": _poisson(K_over_G), "most": _poisson(most), "psi": _angle(f)}
     return None
 
 
@@ -216,21 +212,32 @@ def _averages_splines(strength, scene):
 
 
 def _angle(f):
-    """Return a sufficient angle of dilatancy, in degrees, rounded up."""
+    """A sufficient angle of dilatancy, in degrees, rounded up."""
     return ceil(degrees(asin(min(ENOUGH * f, 1))))
 
 
-def _poisson(share):
-    """Return Poisson's ratio from K / G."""
-    return (3 * share - 2) / (2 * (3 * share + 1))
+def _poisson(K_over_G):
+    return (3 * K_over_G - 2) / (2 * (3 * K_over_G + 1))
 
 
-def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over):
-    """Cohesion, friction and dilation at the peak; residual cohesion and friction; softening.
+class Soil(NamedTuple):
+    """Constants of a soil, as scripts give them: angles in degrees, None without softening."""
 
-    `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the angle
-    of friction (in radians) of a soil. None leaves a value unchanged.
+    cohesion: float
+    phi: float
+    psi: float
+    residual_cohesion: float | None
+    residual_phi: float | None
+    softening: float | None
+
+
+def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
+    """Cohesion, friction, dilation at the peak; residual cohesion and friction; softening.
+
+    `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the
+    friction angle (in radians) of a soil.
     """
+    cohesion, phi, psi, residual_cohesion, residual_phi, softening = soil
     if not 0 <= phi < 90:
         raise ScriptError(
             f"the friction angle phi = {phi:g} is impossible",
@@ -249,27 +256,31 @@ def peak_and_residual(surface_of, cohesion, phi, psi, to_cohesion, to_phi, over)
             argument="cohesion",
             expected="a cohesion or a friction angle above 0, or strength(ID, fluid, 0)",
         )
-    softens = to_cohesion is not None or to_phi is not None
-    if over is not None and not softens:
+    softens = residual_cohesion is not None or residual_phi is not None
+    if softening is not None and not softens:
         raise ScriptError(
             "softening needs a residual strength",
             argument="softening",
             expected="residual_cohesion=... or residual_phi=..., or both",
         )
-    if softens and over is None:
+    if softens and softening is None:
         raise ScriptError(
             "softening needs the plastic strain at which the residual strength is reached",
-            argument="residual_cohesion" if to_cohesion is not None else "residual_phi",
+            argument="residual_cohesion" if residual_cohesion is not None else "residual_phi",
             expected="softening=plastic strain",
         )
-    for name, peak, value in (("cohesion", cohesion, to_cohesion), ("phi", phi, to_phi)):
-        if value is not None and value > peak:
+    for name, most, value in (
+        ("cohesion", cohesion, residual_cohesion),
+        ("phi", phi, residual_phi),
+    ):
+        if value is not None and value > most:
             raise ScriptError(
-                f"the residual {name} {value:g} is above its peak, {peak:g}",
+                f"the residual {name} {value:g} is above its peak, {most:g}",
                 argument=f"residual_{name}",
-                expected=f"a number from 0 to {peak:g}",
+                expected=f"a number from 0 to {most:g}",
             )
-    left = cohesion if to_cohesion is None else to_cohesion
-    end = surface_of(left, radians(phi if to_phi is None else to_phi))
+    left = cohesion if residual_cohesion is None else residual_cohesion
+    residual = surface_of(left, radians(phi if residual_phi is None else residual_phi))
     dilation = surface_of(cohesion, radians(psi))[1]
-    return (*surface_of(cohesion, radians(phi)), dilation), (*end, 1 / over if softens else 0.0)
+    peak = *surface_of(cohesion, radians(phi)), dilation
+    return *peak, *residual, 1 / softening if softening else 0.0

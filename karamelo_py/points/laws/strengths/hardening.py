@@ -1,7 +1,7 @@
 """strength plastic, and the base of von Mises strengths with any hardening."""
 
 from math import sqrt
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from karamelo_py.compiler.compile import (
     any_lane,
@@ -20,7 +20,7 @@ from karamelo_py.points.laws.strengths import remembers, shear_response
 
 def elastic_trial(G, s, strain):
     """Deviatoric stress after a strain increment that is assumed to be elastic."""
-    # The deviator of the sum: otherwise s would collect a trace from rounding over many steps.
+    # The deviator of the sum: rounding over many steps would give s a trace.
     return dev(s + 2 * G * strain)
 
 
@@ -60,7 +60,6 @@ class LinearHardening(NamedTuple):
     H: Annotated[float, NonNegative] = 0.0
 
     def checked(self):
-        """Return the law, or the one without hardening if H is 0."""
         return self if self.H > 0 else Plastic(self.G, self.yield_stress)
 
 
@@ -81,8 +80,8 @@ remembers(LinearHardening, ep=0.0)
 
 @shear_response.on(Plastic)
 @shear_response.on(LinearHardening)
-def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt):
-    trial = elastic_trial(strength.G, s, strain)
+def _shear_response_linear_hardening(strength, kin, step, memory, heat):
+    trial = elastic_trial(strength.G, step.s, step.strain)
     q = von_mises(trial)
     flow = strength.yield_stress + strength.H * memory.ep
     x = max(q - flow, 0) / (3 * strength.G + strength.H)
@@ -90,94 +89,105 @@ def _shear_response_linear_hardening(strength, kin, s, strain, memory, heat, dt)
     return onto_yield_surface(trial, q, flow, x), memory._replace(ep=memory.ep + x), flow * x
 
 
-@point_function()
-def flow_stress(strength, memory, known, increment, heat, dt):
-    """Return flow stress and slope for `increment`, the part of the plastic strain of a step dt.
+class FlowState(NamedTuple):
+    """State of a point before plastic flow."""
 
-    `memory` is the memory before the step, `known` the result of `precompute` for it.
+    memory: Any  # of the strength
+    heat: Any  # `Warm` or ()
+    known: Any  # result of `precompute`
+
+
+def before_flow(strength, memory, heat):
+    return FlowState(memory, heat, precompute(strength, memory, heat))
+
+
+@point_function()
+def flow_stress(strength, before, increment, dt):
+    """Flow stress, and its slope, after a plastic strain `increment` in a step dt.
+
+    `before` is the `FlowState` at the beginning of the step.
     """
 
 
 @point_function(otherwise=True)
 def precompute(strength, memory, heat):
-    """Return the part of the flow stress that does not depend on the increment of a step."""
+    """The part of the flow stress that does not depend on the increment of a step."""
     return ()
 
 
 @point_function(otherwise=True)
-def first_guess(strength, memory, known, q, slope):
-    """Guess the plastic strain, 0 for q below the flow stress; and the decay of Newton's changes.
+def first_guess(strength, before, q, slope):
+    """First guess of the plastic strain, 0 for q below the flow stress, and a bound k.
 
-    `slope` is 3 G. A change c is followed by about k c^2, or less the further the flow stress has
-    hardened: k is the second number.
+    `slope` is 3 G. In Newton's method a change c is followed by about k c^2, or less the further
+    the flow stress has hardened.
     """
     return real(0, q), real(0, q)
 
 
 @point_function(otherwise=True)
 def updated_memory(strength, memory, increment, dt):
-    """Return the memory after a step, which may have no plastic strain."""
+    """The memory after a step; the increment of plastic strain may be 0."""
     return memory._replace(ep=memory.ep + increment)
 
 
 def onto_yield_surface(trial, q, flow, x):
-    """Reduce the deviatoric stress `trial` from q to `flow` if the plastic strain `x` grows."""
+    """Reduce the deviatoric stress `trial` from q to `flow` if the plastic strain x grows."""
     yields = x > 0
     return where(yields, flow / where(yields, q, 1), 1) * trial
 
 
-def radial_return(strength, kin, s, strain, memory, heat, dt):
+def radial_return(strength, kin, step, memory, heat):
     """Radial return: scale the trial deviatoric stress by flow/q (Wilkins 1964).
 
     The `shear_response` of strengths with a field ``G``, a `flow_stress` and the plastic strain
     ``ep`` in the memory; q is the von Mises stress of the elastic trial.
     """
-    trial = elastic_trial(strength.G, s, strain)
+    trial = elastic_trial(strength.G, step.s, step.strain)
     q = von_mises(trial)
-    x = plastic_increment(strength, q, memory, heat, dt)
+    x = plastic_increment(strength, q, memory, heat, step.dt)
     flow = q - 3 * strength.G * x
-    after = updated_memory(strength, memory, x, dt)
+    after = updated_memory(strength, memory, x, step.dt)
     return onto_yield_surface(trial, q, flow, x), after, flow * x
 
 
-# Newton's method takes one to three; bisection, if it has to step in, one per bit.
+# Newton's method takes one to three; bisection one per bit.
 _MOST_ITERATIONS = 80
 
 
 @shared
 def plastic_increment(strength, q, memory, heat, dt):
-    """Return the plastic strain x of a step that solves q - 3 G x = flow stress; 0 for smaller q.
+    """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x and the flow stress does not: there is one solution, whatever the
-    step size. Newton's method from a first guess, kept within bounds by bisection.
+    The left side falls with x and the flow stress does not: the solution is unique for any step
+    size. Newton's method from a first guess, with bisection as safeguard.
     """
     slope = 3 * strength.G
     enough = 4 * round_off(q) * q  # rounding of the three terms
     small = sqrt(round_off(q)) * q
     low, high = 0.0, q / slope
     active = q > 0
-    known = precompute(strength, memory, heat)
-    x, curved = first_guess(strength, memory, known, q, slope)
+    before = before_flow(strength, memory, heat)
+    x, curved = first_guess(strength, before, q, slope)
     last = x
     for _ in range(_MOST_ITERATIONS):
-        flow, hardening = flow_stress(strength, memory, known, x, heat, dt)
+        flow, hardening = flow_stress(strength, before, x, dt)
         excess = q - slope * x - flow
         active = active & ((x > 0) | (excess > 0))
         low = where(excess > 0, x, low)
         high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
-        # Quadratic convergence, c_(n+1) = (c_n / c_(n-1))^2 c_n: is the next change round-off?
-        # Not next to a kink of the curve: there the excess has to be small, too.
+        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. Next to a kink of the
+        # curve it is larger, so the excess has to be small, too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
         middle = 0.5 * (low + high)
-        # Rounding may give less than 0: plastic strain only grows.
+        # Not below 0 by rounding: plastic strain only grows.
         x = where(active, max(where(done | within, new, middle), 0), x)
         last = change
-        # Finished lanes wait for the rest.
         active = active & (not (done | (middle <= low) | (middle >= high)))
         if not any_lane(active):
             break
@@ -188,8 +198,7 @@ def plastic_increment(strength, q, memory, heat, dt):
 def _plastic_increment_slopes(strength, q, memory, heat, dt):
     # The excess e(x, q, ...) vanishes: x' = -e' / (de/dx), with e' at fixed x.
     x = plastic_increment(strength, value_of(q), value_of(memory), value_of(heat), dt)
-    known = precompute(strength, memory, heat)
-    flow, hardening = flow_stress(strength, memory, known, x, heat, dt)
+    flow, hardening = flow_stress(strength, before_flow(strength, memory, heat), x, dt)
     excess = q - 3 * strength.G * x - flow
     rise = 1 / (3 * strength.G + value_of(hardening))
     return excess.chain(x, where(x > 0, rise, 0))

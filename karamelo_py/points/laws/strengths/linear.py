@@ -40,8 +40,8 @@ class Elastic(NamedTuple):
 
 
 @strengths.shear_response.on(Elastic)
-def _shear_response_elastic(strength, kin, s, strain, memory, heat, dt):
-    return elastic_trial(strength.G, s, strain), memory, 0
+def _shear_response_elastic(strength, kin, step, memory, heat):
+    return elastic_trial(strength.G, step.s, step.strain), memory, 0
 
 
 class Viscous(NamedTuple):
@@ -75,25 +75,24 @@ class Viscous(NamedTuple):
 
     @classmethod
     def given(cls, mu: Annotated[float, NonNegative]):
-        """Make the law from the viscosity."""
         return cls(mu, 0.0)
 
 
-COUNTS = 0.05  # of the viscosity of the fluid
+SIGNIFICANT = 0.05  # of the viscosity of the fluid
 
 
 def _viscosity(strength, scene):
-    """Find the kinematic viscosity, 0 where it reaches no further than a cell in the run."""
+    """The kinematic viscosity; 0 if shear spreads over less than a cell in the run."""
     laws = [solid.material.whole for solid in scene.hub.solids.values()]
-    own = [law for law in laws if parameter(law, "strength") is strength]
-    nu = max((float(strength.mu * specific_volume(law)) for law in own), default=0.0)
-    seen = scene.d > 1 and sqrt(nu * scene.duration) > scene.hub.domain.h
-    return nu if seen and scene.moves and not scene.simulation.implicit else 0.0
+    viscous = [law for law in laws if parameter(law, "strength") is strength]
+    nu = max((float(strength.mu * specific_volume(law)) for law in viscous), default=0.0)
+    spreads = scene.d > 1 and sqrt(nu * scene.duration) > scene.hub.domain.h
+    return nu if spreads and scene.moves and not scene.simulation.implicit else 0.0
 
 
 def _slows(strength, scene):
     nu, added = _viscosity(strength, scene), scene.grid_viscosity
-    if not 0 < COUNTS * nu < added:
+    if not 0 < SIGNIFICANT * nu < added:
         return None
     return {
         "place": scene.method.place, "pic": 1 - scene.kept, "added": added, "nu": nu,
@@ -124,16 +123,28 @@ known_failure(
     "0.75 of a cell into it: between plates the force is 18 % too large with 10 cells, 8 % with 20",
     cure=FOR_FLUIDS,
 )
-strengths.initial_loss.on(Viscous)(lambda strength, like: (0.0,))
-strengths.shear_modulus.on(Viscous)(lambda strength: 0)
-strengths.shear_strain.on(Viscous)(lambda strength, kin, s: nothing(kin))
-strengths.shear_energy.on(Viscous)(lambda strength, kin, s: 0)
+strengths.initial_loss.on(Viscous)(strengths.no_loss_yet)
+
+
+@strengths.shear_modulus.on(Viscous)
+def _shear_modulus_viscous(strength):
+    return 0
+
+
+@strengths.shear_strain.on(Viscous)
+def _shear_strain_viscous(strength, kin, s):
+    return nothing(kin)
+
+
+@strengths.shear_energy.on(Viscous)
+def _shear_energy_viscous(strength, kin, s):
+    return 0
 
 
 @strengths.shear_response.on(Viscous)
-def _shear_response_viscous(strength, kin, s, strain, memory, heat, dt):
-    new = 2 * strength.mu / dt * dev(strain)
-    return new, memory, inner(new, strain)
+def _shear_response_viscous(strength, kin, step, memory, heat):
+    new = 2 * strength.mu / step.dt * dev(step.strain)
+    return new, memory, inner(new, step.strain)
 
 
 @strengths.damped_speed_squared.on(Viscous)

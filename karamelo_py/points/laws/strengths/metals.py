@@ -79,7 +79,7 @@ class JohnsonCook(NamedTuple):
         Tr: float,
         Tm: float,
     ):
-        """Make the law without the factors that are 1, which would cost a logarithm or a power."""
+        """Leave out factors that are 1: they would cost a logarithm or a power."""
         check_temperatures(Tr, Tm)
         epsdot0 = reference_rate(epsdot0, C, "C")
         rate = RateFactor(epsdot0, C) if C > 0 else Absent()
@@ -128,9 +128,9 @@ def power_of_strain(factor, exponent, strain):
 
 
 def power_law(factor, exponent, strain, value, increment):
-    """factor (strain + increment)^exponent and its slope, which is omitted at zero strain.
+    """factor (strain + increment)^exponent and its slope, which is 0 at zero strain.
 
-    `value` is the power without the increment, times (1 + x)^n as a short series for small x.
+    `value` is the power without the increment; times (1 + x)^n as a short series for small x.
     """
     near = max(exponent, 1) * increment <= _NEAR * strain
     x = increment / where(strain > 0, strain, 1)
@@ -145,9 +145,9 @@ def power_law(factor, exponent, strain, value, increment):
 
 
 def power_law_guess(exponent, strain, hard, excess, slope):
-    """A `first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
+    """`first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
 
-    `excess` is the stress minus the flow stress; it falls by `slope` with the strain.
+    `excess`, stress minus flow stress, falls by `slope` with the strain.
     """
     some = strain > round_off(strain)
     inverse = where(some, 1 / where(some, strain, 1), 0)
@@ -167,18 +167,18 @@ def _precompute_johnson_cook(strength, memory, heat):
 
 
 @first_guess.on(JohnsonCook)
-def _first_guess_johnson_cook(strength, memory, known, q, slope):
+def _first_guess_johnson_cook(strength, before, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # `known` is without the rate
-    hard, soft = known
+        return real(0, q), real(0, q)  # the precomputed part is without the rate
+    hard, soft = before.known
     excess = q - (strength.A + hard) * soft
-    return power_law_guess(strength.n, memory.ep, hard * soft, excess, slope)
+    return power_law_guess(strength.n, before.memory.ep, hard * soft, excess, slope)
 
 
 @flow_stress.on(JohnsonCook)
-def _flow_stress_johnson_cook(strength, memory, known, increment, heat, dt):
-    before, soft = known
-    hard, slope = power_law(strength.B, strength.n, memory.ep, before, increment)
+def _flow_stress_johnson_cook(strength, before, increment, dt):
+    hard, soft = before.known
+    hard, slope = power_law(strength.B, strength.n, before.memory.ep, hard, increment)
     flow, slope = (strength.A + hard) * soft, slope * soft
     if isinstance(strength.rate, Absent):
         return flow, slope
@@ -237,14 +237,16 @@ def _precompute_swift(strength, memory, heat):
 
 
 @first_guess.on(Swift)
-def _first_guess_swift(strength, memory, hard, q, slope):
+def _first_guess_swift(strength, before, q, slope):
+    hard = before.known
     excess = q - strength.A - hard
-    return power_law_guess(strength.n, memory.ep - strength.C, hard, excess, slope)
+    return power_law_guess(strength.n, before.memory.ep - strength.C, hard, excess, slope)
 
 
 @flow_stress.on(Swift)
-def _flow_stress_swift(strength, memory, before, increment, heat, dt):
-    hard, slope = power_law(strength.B, strength.n, memory.ep - strength.C, before, increment)
+def _flow_stress_swift(strength, before, increment, dt):
+    strain = before.memory.ep - strength.C
+    hard, slope = power_law(strength.B, strength.n, strain, before.known, increment)
     return strength.A + hard, slope
 
 
@@ -317,7 +319,6 @@ class ZerilliArmstrong(NamedTuple):
         epsdot0: Annotated[float, Positive] = 1.0,
         T: Annotated[float, NonNegative] = 293.0,
     ):
-        """Make the law from its constants."""
         return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
 
 
@@ -333,12 +334,13 @@ def _precompute_zerilli_armstrong(strength, memory, heat):
 
 
 @flow_stress.on(ZerilliArmstrong)
-def _flow_stress_zerilli_armstrong(strength, memory, known, increment, heat, dt):
-    athermal, root, thermal = known
-    athermal, slope = power_law(strength.C5, strength.n, memory.ep, athermal, increment)
-    root, root_slope = power_law(strength.C2, 0.5, memory.ep, root, increment)
+def _flow_stress_zerilli_armstrong(strength, before, increment, dt):
+    athermal, root, thermal = before.known
+    ep = before.memory.ep
+    athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)
+    root, root_slope = power_law(strength.C2, 0.5, ep, root, increment)
     # exp(C4 T ln(rate)) is the rate to a power.
-    exponent = strength.C4 * temperature_or(heat, strength.initial_temperature)
+    exponent = strength.C4 * temperature_or(before.heat, strength.initial_temperature)
     rate = increment / (dt * strength.epsdot0)
     at_rate = power_of_strain(1, exponent, rate)
     rate, rate_slope = power_law(1, exponent, rate, at_rate, 0)

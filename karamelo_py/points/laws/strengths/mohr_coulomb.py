@@ -8,7 +8,12 @@ from karamelo_py.points.kinematics import inner
 from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.strengths import pressure_response
-from karamelo_py.points.laws.strengths.frictional import frictional, peak_and_residual, surface
+from karamelo_py.points.laws.strengths.frictional import (
+    Soil,
+    frictional,
+    peak_and_residual,
+    surface,
+)
 
 
 class MohrCoulomb(NamedTuple):
@@ -38,12 +43,11 @@ class MohrCoulomb(NamedTuple):
     Notes
     -----
     s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
-    stress (tension positive). A stress beyond the surface returns in principal stresses: to a
-    plane, an edge (two equal principal stresses) or, in tension, the apex p = -c cot(phi) (Simpson
-    2017, Practical Finite Element Modeling in Earth Science using Matlab, section 11.4; de Souza
-    Neto et al. 2008, section 8.2). The plastic volume change is stored, and pressure follows from
-    the elastic part of J. A step uses the strength at its beginning. With softening, results depend
-    on the cell size.
+    stress (tension positive). Beyond the surface, principal stresses return to a plane, an edge
+    (two are equal) or, in tension, the apex p = -c cot(phi) (Simpson 2017, Practical Finite Element
+    Modeling in Earth Science using Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2).
+    Pressure follows from the elastic part of J. A step uses the strength at its beginning. With
+    softening, results depend on the cell size.
 
     See Also
     --------
@@ -74,21 +78,21 @@ class MohrCoulomb(NamedTuple):
         residual_phi: Annotated[float, NonNegative] | None = None,
         softening: Annotated[float, Positive] | None = None,
     ):
-        """Make the yield surface from cohesion and angles."""
-        of_soil = cohesion, phi, psi, residual_cohesion, residual_phi, softening
-        peak, left = peak_and_residual(lambda c, angle: (c * cos(angle), sin(angle)), *of_soil)
-        return cls(G, *peak, *left)
+        soil = Soil(cohesion, phi, psi, residual_cohesion, residual_phi, softening)
+        return cls(G, *peak_and_residual(soil, lambda c, angle: (c * cos(angle), sin(angle))))
 
 
 frictional(MohrCoulomb)
 
 
-def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
-    """Principal stresses s1 >= s2 >= s3 on the surface, from those of an elastic trial above it.
+def returned_to_plane(s, yield_surface, G, K):
+    """Return principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    To a plane of the surface; if that changes their order, to an edge of two planes; if it still
-    does, to the apex (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4).
+    To a plane; if that changes their order, to an edge of two planes; if it still does, to the apex
+    (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
+    sin(phi), sin(psi).
     """
+    k, sin_phi, sin_psi = yield_surface
     lam = K - 2 / 3 * G
     # n and m, normals of yield function and plastic potential, are (1 + sin, 0, sin - 1).
     mean = 4 * lam * sin_phi * sin_psi
@@ -131,15 +135,16 @@ def returned_to_plane(s, k, sin_phi, sin_psi, G, K):
 
 
 @pressure_response.on(MohrCoulomb)
-def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
-    k, sin_phi, sin_psi = surface(strength, strain)
-    # Only above this bound of the yield function are principal stresses needed.
+def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
+    s, p, K = trial
+    k, sin_phi, _ = yield_surface = surface(strength, strain)
+    # Principal stresses are needed only above this bound of the yield function.
     root = sqrt(0.5 * inner(s, s))
     bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:
         return s, p
     (a, b, c), directions = principal(s)
-    # Ranks from the largest; equal values retain their order.
+    # Ranks from the largest; equal values stay in order.
     at_a = (1 if b > a else 0) + (1 if c > a else 0)
     at_b = (1 if a >= b else 0) + (1 if c > b else 0)
     at_c = (1 if a >= c else 0) + (1 if b >= c else 0)
@@ -150,12 +155,11 @@ def _pressure_response_mohr_coulomb(strength, kin, s, p, K, strain):
     f = largest - smallest + (ordered[0] + ordered[2]) * sin_phi - 2 * k
     if f <= 0:
         return s, p
-    new = returned_to_plane(ordered, k, sin_phi, sin_psi, strength.G, K)
+    new = returned_to_plane(ordered, yield_surface, strength.G, K)
     mean = (new[0] + new[1] + new[2]) / 3
     shear = tuple([of_three(new, place) - mean for place in (at_a, at_b, at_c)])
     return from_principal(s, shear, directions), -mean
 
 
 def of_three(values, k):
-    """Take values[k] of a tuple that the compiler keeps in registers."""
     return values[0] if k == 0 else values[1] if k == 1 else values[2]

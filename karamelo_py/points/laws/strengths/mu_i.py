@@ -9,7 +9,7 @@ from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import LawTraits, parameter, specific_volume
 from karamelo_py.points.laws.eos import pressure
-from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond, share_beside
+from karamelo_py.points.laws.strengths import elastic_ratio, fbar_fraction, remembers, respond
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -64,7 +64,7 @@ class MuI(NamedTuple):
     rho_s: Annotated[float, Positive]
 
     def checked(self):
-        """Return the law, unless friction decreases with the rate: such flow is unstable."""
+        """Refuse friction that decreases with the rate: such flow is unstable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below the friction of slow flow",
@@ -97,7 +97,7 @@ SLOW = 0.05  # of the viscosity of the grains, above which a warning is given
 def _slows(strength, scene):
     """Compare the viscosity of the PIC fraction with the grain viscosity, mu p/(rho gamma').
 
-    The pressure is at half the height of a body, the inertial number is half of I0.
+    For p at half the height of a body, and half of I0.
     """
     added = scene.grid_viscosity
     for solid in scene.hub.solids.values():
@@ -108,12 +108,8 @@ def _slows(strength, scene):
         p = 0.5 * rho * scene.sag * scene.waves**2
         grains = strength.mu_s * strength.d * sqrt(p * strength.rho_s) / (0.5 * strength.I0 * rho)
         if added > SLOW * grains:
-            return {
-                "place": scene.method.place,
-                "pic": 1 - scene.kept,
-                "added": added,
-                "grains": grains,
-            }
+            pic = 1 - scene.kept
+            return {"place": scene.method.place, "pic": pic, "added": added, "grains": grains}
     return None
 
 
@@ -135,20 +131,20 @@ def _elastic_ratio_mu_i(strength, memory, j):
     return min(j, 1)  # separated grains are not stretched
 
 
-@share_beside.on(MuI)
-def _share_beside_mu_i(strength, memory):
+@fbar_fraction.on(MuI)
+def _fbar_fraction_mu_i(strength, memory):
     return 1  # flow conserves the volume
 
 
 @respond.on(MuI)
-def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt, beside):
-    memory = memories.strength
-    elastic = elastic_ratio(strength, memory, j)
+def _respond_mu_i(strength, law, kin, step, memories):
+    memory, dt = memories.strength, step.dt
+    elastic = elastic_ratio(strength, memory, step.j)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
     p += sum(thermal_pressure(law.temperature, memories.heat))
-    p += share_beside(strength, memory) * beside
+    p += fbar_fraction(strength, memory) * step.extra
     together = p > 0
-    trial = elastic_trial(strength.G, s, strain)
+    trial = elastic_trial(strength.G, step.s, step.strain)
     shear = sqrt(0.5 * inner(trial, trial))
     flows = together & (shear > strength.mu_s * p)
     p = where(together, p, 1)
@@ -160,6 +156,6 @@ def _respond_mu_i(strength, law, kin, s, strain, j, memories, dt, beside):
     c = fast * shear + slow * viscous
     tau = 2 * c / (b + sqrt(b * b - 4 * c))
     slip = where(flows, (shear - tau) / strength.G, 0)
-    share = where(together, where(flows, tau / where(flows, shear, 1), 1), 0)
+    scale = where(together, where(flows, tau / where(flows, shear, 1), 1), 0)
     ep = memory.ep + slip * sqrt(1 / 3)
-    return share * trial, memory._replace(ep=ep, inertial=slip / dt * grain), tau * slip
+    return scale * trial, memory._replace(ep=ep, inertial=slip / dt * grain), tau * slip

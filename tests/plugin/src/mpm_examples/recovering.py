@@ -50,8 +50,8 @@ def hardening(strength, R, increment, dt):
 
 
 @flow_stress.on(Recovering)
-def _flow_stress_recovering(strength, memory, known, increment, heat, dt):
-    R, left = hardening(strength, memory.R, increment, dt)
+def _flow_stress_recovering(strength, before, increment, dt):
+    R, left = hardening(strength, before.memory.R, increment, dt)
     return strength.A + R, strength.H * left
 
 

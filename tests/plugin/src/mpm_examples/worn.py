@@ -32,8 +32,8 @@ def _initial_damage_worn(damage, like):
 
 
 @damage_after.on(Worn)
-def _damage_after_worn(damage, memory, strain, triaxiality, heat, dt):
-    return (min(memory[0] + strain / damage.limit, 1),)
+def _damage_after_worn(damage, memory, step):
+    return (min(memory[0] + step.strain / damage.limit, 1),)
 
 
 @integrity.on(Worn)
