@@ -5,16 +5,16 @@ import math
 import pytest
 
 from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.scene import hub as scene
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import CAPACITY, Values
 
 
-class Hub:
+class Hub(scene.Hub):
     def __init__(self):
-        self.values = Values()
-        self.place = None
-        self.rehearsing = False
+        super().__init__(Console(quiet=True))
         self.warnings = []
 
     def warn(self, message, place=None, hint=None):

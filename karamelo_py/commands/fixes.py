@@ -121,7 +121,7 @@ def _define(
         )
     own.add(ID, new, replace=replaces)
     hub.values.publish_vector(ID, new.published)
-    group = getattr(new, "group", None)
+    group = new.group
     if group is not None and not group.all and len(group) == 0:
         hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")
     return new
@@ -153,7 +153,7 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 expected="an ID that means nothing else",
                 hint=f"choose another ID, such as {ID}_1",
             )
-        if name in (getattr(hub.interpreter, "variables", None) or {}):
+        if name in hub.interpreter.variables:
             hub.warn(
                 f"{kind} '{ID}' publishes its value as '{name}', which is a variable, too: "
                 "formulas will use the variable",

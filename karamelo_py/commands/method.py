@@ -1,13 +1,13 @@
 """Commands for the method: method, scheme, precision, anti_volumetric_locking."""
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Sequence
 from contextlib import suppress
 from itertools import groupby
 from typing import Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.signature import Argument, Parameter
+from karamelo_py.language.signature import Argument, Parameter, variants_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_part
 from karamelo_py.schemes.quasi_static import PUBLISHED
@@ -150,12 +150,12 @@ def scheme(
     update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
     for name in PUBLISHED:
         # Values of earlier steps do not apply to an explicit scheme.
-        if name in hub.values or name in getattr(chosen, "published", ()):
+        if name in hub.values or chosen.traits.implicit:
             hub.values.publish(name)
 
 
 # A resumed run may use another solver.
-scheme.may_vary = "tolerance", "iterations", "solver", "limit"  # type: ignore[attr-defined]
+scheme.may_differ = "tolerance", "iterations", "solver", "limit"  # type: ignore[attr-defined]
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
@@ -227,8 +227,8 @@ class _Call:
         self.dimension = domain.dimension if domain is not None else hub.announced_dimension
         self.styles = self._found()
         # The shape of domains chooses the class of the basis.
-        self.shapes = _variants(self.styles["method"])
-        self.variants = {"method": {}, "transfer": _variants(self.styles["transfer"])}
+        self.shapes = variants_of(self.styles["method"])
+        self.variants = {"method": {}, "transfer": variants_of(self.styles["transfer"])}
         self.fit = [n for n, s in self.shapes.items() if self.dimension in (None, s.dimension)]
         if basis in self.shapes:
             shape = basis if basis in self.fit or not self.fit else self.fit[0]
@@ -239,7 +239,7 @@ class _Call:
                 expected=f"linear, and the shape at the end: {instead}",
             )
         self.styles["basis"] = registry.find("basis", basis)
-        self.variants["basis"] = self.shapes or _variants(self.styles["basis"])
+        self.variants["basis"] = self.shapes or variants_of(self.styles["basis"])
 
     def _found(self) -> dict[str, type]:
         styles: dict[str, type] = {}
@@ -332,7 +332,7 @@ class _Call:
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
             raise _chosen_twice(*words[:2])
-        default = getattr(self.styles[family], "default_variant", None)
+        default = signature.default_variant(self.styles[family])
         if word := _word(words[0], variants) if words else default:
             style = variants[word]
             self.styles[family] = registry.find(family, style) if isinstance(style, str) else style
@@ -388,7 +388,7 @@ class _Call:
         for family in FAMILIES:
             for name in registry.names(family):
                 with suppress(ScriptError):  # not the place to report a broken plug-in
-                    if word in _variants(registry.find(family, name)):
+                    if word in variants_of(registry.find(family, name)):
                         return ScriptError(
                             f"{word} goes with {name}, not with {self.names[family]}",
                             place=argument.place,
@@ -401,10 +401,6 @@ class _Call:
             expected="nothing more, or one of " + ", ".join(known),
             hint=meant(word, known),
         )
-
-
-def _variants(style: type) -> Mapping[str, Any]:
-    return getattr(style, "variants", {})
 
 
 def _word(argument: Argument, known: Container[str]) -> str | None:

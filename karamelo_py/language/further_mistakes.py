@@ -57,14 +57,8 @@ class Dependents:
         self.lacks_columns |= name in _COLUMNS
         if name.startswith("delete_"):
             self.undeleted.add(name.removeprefix("delete_"))
-        if name in _SCENE:
+        if name in _SCENE or name == "scheme":
             self.names |= _RUNS
-        if name == "scheme":
-            self.names |= _RUNS | {
-                value
-                for style in registry.names("scheme")
-                for value in getattr(registry.find("scheme", style), "published", ())
-            }
         if name in _SCENE | _NAMED and statement.arguments:
             self.names.update(re.findall(r"\w+", statement.arguments[0].code))
         return True

@@ -37,7 +37,8 @@ def describe(target: Callable, name: str) -> Help:
     descriptions = {"ID": f"Name of the {noun}.", "arguments": "See the page of the style."}
     # Descriptions in a base class hold for derived styles.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
-        for doc in (getattr(vars(owner).get("__init__"), "__doc__", None), owner.__doc__):
+        init = owner.__init__.__doc__ if "__init__" in vars(owner) else None
+        for doc in (init, owner.__doc__):
             inner = sections_of(doc or "")[1]
             descriptions |= _descriptions(inner.pop("Parameters", ""))
             if owner is target:

@@ -1,5 +1,6 @@
 """Executes statements: variables, commands, and places of errors."""
 
+import inspect
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -101,7 +102,7 @@ class Interpreter:
     def included(self, name: str, folder: Path) -> Path:
         """Return the file meant by ``include(name)`` in a script in `folder`."""
         path = folder / name
-        elsewhere = self._working_folder / name
+        elsewhere = self.hub.folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
@@ -134,16 +135,12 @@ class Interpreter:
     def folder(self) -> Path:
         """Folder of the script in progress."""
         paths = (frame.path.parent for frame in reversed(self.frames) if frame.path)
-        return next(paths, self._working_folder)
+        return next(paths, self.hub.folder)
 
     @property
     def folders(self) -> list[Path]:
         """Folders in which files to read are looked for: of the output, current, of the script."""
-        return [self._working_folder, Path(), self.folder]
-
-    @property
-    def _working_folder(self) -> Path:
-        return getattr(self.hub, "folder", None) or Path.cwd()
+        return [self.hub.folder, Path(), self.folder]
 
     def _run(self, text: str, name: str, path: Path | None = None) -> None:
         try:
@@ -170,7 +167,7 @@ class Interpreter:
             self.hub.answered = True
         except ScriptError as error:
             # At a run, the rest of the script has been rehearsed.
-            if not getattr(self.hub, "rehearsed", True):
+            if not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
             raise
@@ -234,9 +231,11 @@ class Interpreter:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
         known = registry.knows("command", name)
         command = registry.find("command", name) if known else None
-        if getattr(command, "may_differ", False):
+        # True, or the keywords that may differ when a run resumes.
+        differs = getattr(command, "may_differ", ())
+        if differs is True:
             return self._execute(statement)
-        text, replay = spelled(statement, getattr(command, "may_vary", ())), self.replay
+        text, replay = spelled(statement, differs), self.replay
         self.record.statements.append(text)
         if replay is None:
             return self._execute(statement)
@@ -361,7 +360,7 @@ class Interpreter:
             raise unknown.unknown_call(self, name, place, statement=False)
         target = registry.find("command", name)
         # A command without a value must not be executed here, least of all a run.
-        if getattr(target, "__annotations__", {}).get("return", "") in (None, "None"):
+        if inspect.get_annotations(target).get("return", "") in (None, "None"):
             raise unknown.no_value(name, place)
         arguments = [
             signature.Argument(syntax.Raw(raw.source, raw.start + o.start, raw.start + o.end), self)

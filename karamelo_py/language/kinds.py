@@ -107,7 +107,7 @@ class OutputFile:
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
         """Read the path of the file."""
         name = _file_name(argument)
-        path = getattr(hub, "folder", Path()) / name
+        path = hub.folder / name
         encoding = sys.getfilesystemencoding()
         try:
             os.fsencode(name)
@@ -118,7 +118,7 @@ class OutputFile:
                 hint="the environment variable PYTHONUTF8=1, or another name",
             ) from None
         # A run makes the folder of -out, which `check` may find missing.
-        made = getattr(hub, "checking", False) and path.parent == hub.folder
+        made = hub.checking and path.parent == hub.folder
         if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
             message, hint = f"the folder {folder} does not exist", f"mkdir {folder}"
@@ -188,7 +188,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
         number = value.strip()
         hint = f"write numbers without quotes: {number}" if NUMBER.fullmatch(number) else None
         raise Unfit(_shown(value), hint=hint)
-    if math.isnan(value) and not getattr(hub, "rehearsing", False):
+    if math.isnan(value) and not hub.rehearsing:
         raise Unfit("NaN, which is not a number")
     return value
 
@@ -309,9 +309,12 @@ def kind_of(annotation: Any) -> Kind:
     if isinstance(annotation, Hashable) and annotation in _SIMPLE:
         return _SIMPLE[annotation]
     if hasattr(annotation, "from_script"):
-        words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", getattr(annotation, "__name__", "")).lower()
-        text = getattr(annotation, "script_kind", f"the ID of a {words}")
-        return Kind(text, annotation.from_script, family=getattr(annotation, "family", None))
+        text = getattr(annotation, "script_kind", "")
+        if not text:
+            words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", annotation.__name__).lower()
+            text = f"the ID of a {words}"
+        family = annotation.family if isinstance(annotation, StyleOf) else None
+        return Kind(text, annotation.from_script, family=family)
     raise TypeError(f"a signature cannot have the annotation {annotation!r}")
 
 

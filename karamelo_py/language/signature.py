@@ -13,7 +13,7 @@ adds constraints. ``*args`` take any number; keyword-only parameters are given a
 """
 
 import inspect
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from itertools import chain, repeat
@@ -197,13 +197,12 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
     """Call a command or make a style with values; report faults as its author's."""
-    place = getattr(hub, "place", None)
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
             return target(hub, *values, **named)
-        with as_script_error(name, "it", target, place):
+        with as_script_error(name, "it", target, hub.place):
             return target(hub, *values, **named)
-    with as_script_error(name, "__init__", target, place):
+    with as_script_error(name, "__init__", target, hub.place):
         if not is_record(target):
             return target(hub, *values, **named)
         made = getattr(target, "given", target)(*values, **named)
@@ -299,14 +298,23 @@ def syntax(target: Callable, name: str) -> str:
     return f"{command}({', '.join(before)}{own})"
 
 
+def variants_of(style: Any) -> Mapping[str, Any]:
+    """Return the words that choose another class (or style, by its name) instead of a style."""
+    return getattr(style, "variants", {})
+
+
+def default_variant(style: Any) -> str | None:
+    """Return the variant without any of these words."""
+    return getattr(style, "default_variant", None)
+
+
 def documented(target: Callable) -> list[Parameter]:
     """List parameters for help, including the word that selects a variant of a style."""
-    variants = getattr(target, "variants", None)
+    variants = variants_of(target)
     if not variants:
         return parameters(target)
     # For a method it selects the shape of domains, which must have one.
     needed = not is_record(target)
-    default = getattr(target, "default_variant", None)
     kind = kind_of(Literal[tuple(variants)])
-    variant = Parameter("variant", kind, optional=not needed, default=default)
+    variant = Parameter("variant", kind, optional=not needed, default=default_variant(target))
     return [variant, *parameters(target)] if needed else [*parameters(target), variant]

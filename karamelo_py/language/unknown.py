@@ -135,9 +135,9 @@ def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None
 
 def _publishing(script: Any) -> Iterator[tuple[str, str, Any]]:
     """Yield the fixes and computes of a scene: kind, ID and object."""
-    for kind, items in (("fix", "fixes"), ("compute", "computes")):
-        for ID, item in getattr(script.hub, items, {}).items():
-            yield kind, ID, item
+    for catalogue in (script.hub.fixes, script.hub.computes):
+        for ID, item in catalogue.items():
+            yield catalogue.kind, ID, item
 
 
 def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
@@ -158,7 +158,7 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
 
     Starts with the innermost script, `back` statements before its next one.
     """
-    for frame in reversed(getattr(script, "frames", ())):
+    for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:
             line = statement.place.line
             if isinstance(statement, Assignment):

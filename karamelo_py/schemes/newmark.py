@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.language.signature import In, NonNegative, Positive
-from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, PUBLISHED, Tolerance
+from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, Tolerance
 from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import ScriptError
 
@@ -65,7 +65,6 @@ class Newmark(NamedTuple):
     hold = HOLD
     close = CLOSE
     rows = (*BEGIN, *HOLD, *CLOSE)
-    published = PUBLISHED
 
     beta: float
     gamma: float

@@ -78,7 +78,6 @@ class QuasiStatic(NamedTuple):
     hold = HOLD
     close = CLOSE
     rows = (*BEGIN, *HOLD, *CLOSE)
-    published = PUBLISHED
 
     tolerance: float
     iterations: int

@@ -98,6 +98,11 @@ _STARTS = ("NUMBER", "NAME", "STRING", "LPAR")
 _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
 
 
+def _type(part: Any) -> str:
+    """Return the type of a token; trees and characters have none."""
+    return getattr(part, "type", "")
+
+
 class _Stop(NamedTuple):
     """Position where the parser stopped: tokens before and at it, and the parser's stack.
 
@@ -122,17 +127,17 @@ class _Stop(NamedTuple):
     @property
     def kind(self) -> str:
         """The type of the token at this position."""
-        return getattr(self.here, "type", "")
+        return _type(self.here)
 
     @property
     def opened(self) -> list[int]:
         """Positions of open parentheses."""
-        return [t.start_pos for t in self.stack if getattr(t, "type", "") == "LPAR"]
+        return [t.start_pos for t in self.stack if _type(t) == "LPAR"]
 
     @property
     def after_call(self) -> bool:
         """Tell if everything before is one call."""
-        types = [getattr(part, "type", "") for part in self.stack]
+        types = [_type(part) for part in self.stack]
         return types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR" and types.count("LPAR") == 1
 
     def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:

@@ -38,7 +38,7 @@ def read_script(path: Path) -> str:
             hint=f"did you mean {parent / close[0]}?" if close else None,
         ) from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
+        reason = error.strerror if isinstance(error, OSError) else error
         raise ScriptError(
             f"{path} cannot be read: {reason}",
             expected="a script, which is a text file",

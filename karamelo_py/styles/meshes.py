@@ -106,9 +106,8 @@ class MeshRegion(Enclosed):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D. Of elements of higher order, only the corners are used. Faces belong to
-    elements. Non-planar faces with four corners are two triangles. In 2D the mesh lies in the plane
-    z = 0.
+    pyramids in 3D; of those of higher order, only the corners are used. Faces belong to elements.
+    Non-planar faces with four corners are two triangles. In 2D the mesh lies in the plane z = 0.
 
     See Also
     --------
@@ -207,9 +206,8 @@ class MeshSolid(Solid):
     Parameters
     ----------
     file
-        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and any other
-        format that meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes. It is
-        searched for in the current folder, then next to the script.
+        Name of a mesh file or of a geometry, as in region mesh. It is searched for in the current
+        folder, then next to the script.
     group
         Name or number of a physical group (a set of elements, a part or an instance in other
         formats). Default: the whole mesh.
@@ -221,10 +219,10 @@ class MeshSolid(Solid):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; elements of lower dimension are ignored. Elements of higher order have the
-    volume within their curved edges. The cpdi methods take elements of one shape, by their corners.
-    In 2D the mesh lies in the plane z = 0. Elements whose centroid lies outside the domain are
-    ignored, with a warning.
+    pyramids in 3D; those of lower dimension are ignored, and those whose centroid lies outside the
+    domain too, with a warning. Elements of higher order have the volume within their curved edges.
+    The cpdi methods take elements of one shape, by their corners. In 2D the mesh lies in the plane
+    z = 0.
 
     See Also
     --------

@@ -42,10 +42,10 @@ class RegionSolid(Solid):
     points
         ``regular``: equally spaced. ``gauss``: at the Gauss points of the cell, with their weights
         as volumes. ``cut``: equally spaced, with boxes cut by the edge of the region. Default:
-        equally spaced, with three exceptions. With ``ppc`` 3, points are at the Gauss points with
-        equal volumes, as in Karamelo, unless the basis has domains (ugimp, cpgimp, cpdi). Regions
-        from files (mesh, stl) are cut, unless the basis has domains. In ulmpm/contacts, regions
-        with curved or inclined faces are cut.
+        regular, with three exceptions. With ``ppc`` 3, points are at the Gauss points with equal
+        volumes, as in Karamelo, unless the basis has domains (ugimp, cpgimp, cpdi). Regions from
+        files (mesh, stl) are cut, unless the basis has domains. In ulmpm/contacts, regions with
+        curved or inclined faces are cut.
 
     Example
     -------
@@ -55,7 +55,7 @@ class RegionSolid(Solid):
 
     Notes
     -----
-    Cells start at the lower corner of the domain. Methods with a grid for each solid start at the
+    Cells start at the lower corner of the domain; in methods with a grid for each solid, at the
     lower corner of the box around the region, whose open sides end at the domain.
 
     A cut point lies at the centroid of the rest of its box and has the volume of this rest. A rest

@@ -143,7 +143,7 @@ class EnergyBalance(Compute):
     Publishes ID, the sum, and ID_total, the energies without the work. ID_drift is the change of ID
     since the first output, divided by the largest kinetic, stored or dissipated energy or work so
     far. Velocities lag positions by half a step, which gives a drift of the order of dt (33 % in a
-    body of a few cells). The end of a run prints the change between energies at equal times. The
+    body of a few cells); the end of a run prints the change between energies at equal times. The
     energy that affine transfers store within points is not included.
 
     See Also
@@ -203,7 +203,6 @@ class LinearMomentum(Momentum):
     """
 
     def terms(self, points: PointTable) -> np.ndarray:
-        """Momenta of points, and their magnitudes."""
         mass, v = points.mass.astype(float), points.velocity.astype(float)
         return mass * np.vstack([v.T, np.linalg.norm(v, axis=1)])
 
@@ -224,10 +223,8 @@ class AngularMomentum(Momentum):
     Notes
     -----
     Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
-    the largest sum m |x - c| |v| so far.
-
-    Affine transfers (APIC) also store angular momentum in the affine velocity of points. The sum
-    contains it, and the transfer conserves this sum.
+    the largest sum m |x - c| |v| so far. The sum contains the angular momentum in the affine
+    velocity of points (APIC), which that transfer conserves with it.
 
     See Also
     --------
@@ -241,7 +238,6 @@ class AngularMomentum(Momentum):
         self.centre = np.array([cx, cy, cz])
 
     def terms(self, points: PointTable) -> np.ndarray:
-        """Angular momenta of points, and their magnitudes."""
         d = self.hub.domain.dimension
         arm, v = np.zeros((2, points.count, 3))
         arm[:, :d], v[:, :d] = points.position, points.velocity

@@ -173,12 +173,12 @@ class Error(Compared, Compute):
     -----
     With e the magnitude of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and V0 the
     initial volume of the point: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max
-    e. ``relative`` divides by the same norm of the exact values. While they vanish it divides by
-    the largest norm so far; before the first it gives inf.
+    e. ``relative`` divides by the same norm of the exact values; while they vanish, by the largest
+    norm so far; before the first it gives inf.
 
     Publishes ID, the present error; ID_max, the largest output so far; and ID_history, the norm
-    over points and all time so far. With ``relative`` both norms cover the whole history, so exact
-    values may vanish at times. Each output is weighted by the time since the previous one.
+    over points and all time so far, in which each output is weighted by the time since the previous
+    one. With ``relative`` both norms cover the whole history, so exact values may vanish at times.
 
     See Also
     --------
@@ -248,7 +248,7 @@ class Reference(Compared, Compute):
     file
         Columns of numbers, separated by commas, semicolons or blanks. The first row has their
         names; without it they are named 1, 2, ... Lines that begin with # are comments. The first
-        column is the time. For points it is the coordinate of that name: x, y, z, x0, y0, z0 or any
+        column is the time, or for points the coordinate of that name: x, y, z, x0, y0, z0 or any
         other column of points.
     column
         The column of the file to compare with; for points also the column of the points, such as
@@ -268,9 +268,9 @@ class Reference(Compared, Compute):
     -----
     The curve is linear between its rows. Values beyond its ends are not compared.
 
-    For a value, ID is the norm of its difference over the time so far. Each output is weighted by
-    the time since the previous one. ID_now is the present difference, ID_curve the present value of
-    the curve. For points, ID and ID_now are the present norm over the points, weighted by initial
+    For a value, ID is the norm of its difference over the time so far, each output weighted by the
+    time since the previous one. ID_now is the present difference, ID_curve the present value of the
+    curve. For points, ID and ID_now are the present norm over the points, weighted by initial
     volumes. ID_curve is the mean of the curve at the points.
 
     See Also

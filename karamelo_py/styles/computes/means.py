@@ -127,7 +127,7 @@ class MaxPlasticStrain(Compute):
 
 
 class CenterOfMass(Mean):
-    """Measure the centre of mass, published as ID_x, ID_y, ID_z.
+    """Measure the centre of mass, published as ID_x, ID_y, ID_z; 0 for a group without mass.
 
     Parameters
     ----------
@@ -138,10 +138,6 @@ class CenterOfMass(Mean):
     -------
     compute(middle, center_of_mass, ball)
     log_modify(custom, time, middle_x, middle_y)
-
-    Notes
-    -----
-    0 for a group without mass.
 
     See Also
     --------
@@ -210,8 +206,9 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z. Unlike the largest position, a front measured like this does not
-    jump when a few points fly ahead.
+    Published as ID_x, ID_y, ID_z: the first coordinate at which the mass of the points up to there
+    reaches the fraction. Unlike the largest position, such a front does not jump when a few points
+    fly ahead.
 
     Parameters
     ----------
@@ -222,10 +219,6 @@ class PositionQuantile(Compute):
     -------
     compute(front, position_quantile, all, 0.99)
     log_modify(custom, time, front_x)
-
-    Notes
-    -----
-    The first coordinate at which the mass of the points up to there reaches the fraction.
 
     See Also
     --------
@@ -277,7 +270,6 @@ def _bits(numbers: np.ndarray) -> np.ndarray:
 
 
 def _numbers(bits: np.ndarray) -> np.ndarray:
-    """Floating-point numbers with these bits."""
     return np.where(bits >> np.uint64(63) > 0, bits ^ SIGN, ~bits).view(float)
 
 

@@ -43,17 +43,14 @@ class Dump(Rhythmic):
 
     @property
     def one_file_per_step(self) -> bool:
-        """Return True if the name has a ``*``."""
         return "*" in str(self.file)
 
     def path(self) -> Path:
-        """Return the file of the present state."""
         folder, file = folder_of_discarded(), self.file
         folder, file = (self.hub.folder, file) if folder is None else (folder, file.name)
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def write(self) -> None:
-        """Write the present state."""
         raise NotImplementedError
 
     def take_part(self) -> None:
@@ -125,7 +122,6 @@ class TableDump(Dump):
         self.warn_of_absent(columns, self.absent, self.rows_are)
 
     def take_part(self) -> None:
-        """Send the rows of this process to the first process, or do the same as the first."""
         if not self.to_first:
             super().take_part()
             return
@@ -146,9 +142,9 @@ class OfPoints:
     Parameters
     ----------
     columns
-        Columns for each point: x y z (position), x0 y0 z0 (initial position), vx vy vz (velocity),
-        s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises stress), p
-        (pressure), rho (density), volume, mass and so on. ``x, y, z`` by default.
+        Columns for each point: x y z (position, the default), x0 y0 z0 (initial position), vx vy vz
+        (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
+        stress), p (pressure), rho (density), volume, mass and so on.
     """
 
     rows_are = "points"
@@ -178,9 +174,8 @@ class OfNodes:
     Parameters
     ----------
     columns
-        Columns for each node: x y z (position), vx vy vz (velocity), vx_update ... (velocity after
-        the momentum update), fx fy fz (total force), mass, T if heat flows. ``x, y, z`` by
-        default.
+        Columns for each node: x y z (position, the default), vx vy vz (velocity), vx_update ...
+        (velocity after the momentum update), fx fy fz (total force), mass, T if heat flows.
     occupied
         true: omit nodes without mass, for small files from a large and sparsely filled domain.
     """

@@ -49,7 +49,6 @@ class Hdf5Dump(TableDump):
         self._snapshots += 1
 
     def _add(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
-        """Write snapshot `k`: to a separate file, or after the previous ones."""
         import h5py
 
         if k == 0 or self.one_file_per_step:
@@ -66,7 +65,6 @@ class Hdf5Dump(TableDump):
         self._go_on(path, k, snapshot)
 
     def _go_on(self, path: Path, k: int, snapshot: SnapshotRows) -> None:
-        """Append snapshot `k` to a file."""
         self._reserve(path, snapshot.last)
         try:
             with _opened_to_append(path) as root:
@@ -122,8 +120,6 @@ class Hdf5Dump(TableDump):
             self._snapshots = 0
 
     def _past(self, old: Any, k: int) -> SnapshotRows:
-        """Read snapshot `k` of a file; rows with only NaN did not exist."""
-
         def tables(begins: Iterable[int]) -> Iterator[TableRows]:
             for begin in begins:
                 own = slice(begin, begin + PIECE)
@@ -143,7 +139,6 @@ class Hdf5Dump(TableDump):
         return int(self.rows_are == "points")
 
     def _prepare(self, root: Any, last: int) -> None:
-        """Create the empty arrays, with axis names for xarray."""
         root.attrs["title"] = f"{self.rows_are} of a scene of karamelo-py"
         root.attrs["domain"] = np.array([self.hub.domain.lo, self.hub.domain.hi])
         rows = max(last, 1)

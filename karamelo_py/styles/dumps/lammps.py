@@ -52,7 +52,6 @@ class LammpsDump(TableDump):
     opened: Any = staticmethod(partial(open, mode="rb"))
 
     def write(self) -> None:
-        """Write one snapshot: to a separate file, or after the previous ones."""
         if self.one_file_per_step:
             encoder = self.encoder()
             with whole(self.path()) as file:
@@ -76,7 +75,6 @@ class LammpsDump(TableDump):
         self._end, self._length, self._encoder = end, length, encoder
 
     def resumed(self) -> None:
-        """Continue the file of an earlier run after its last snapshot then."""
         if self._end == 0:
             return
         path = self.path()
@@ -91,7 +89,6 @@ class LammpsDump(TableDump):
                 self._encoder.compress(file.read(min(PIECE, self._length - begin)))
 
     def _snapshot(self) -> Iterator[bytes]:
-        """Write the text of the present state, piece by piece."""
         update, units = self.hub.update, self.hub.output.units
         lines = [
             *(["ITEM: UNITS", str(units)] if units else []),
@@ -128,8 +125,7 @@ class Gzipped:
     Parameters
     ----------
     file
-        File name, best with the ending ``.gz``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots are written to one file, one after another.
+        File name, best with the ending ``.gz``; ``*`` as in dump particle.
     """
 
     def encoder(self) -> Any:
@@ -145,8 +141,7 @@ class BinaryRows:
     Parameters
     ----------
     file
-        File name, best with the ending ``.bin``. The first ``*`` becomes the step number; without
-        ``*`` all snapshots are written to one file, one after another.
+        File name, best with the ending ``.bin``; ``*`` as in dump particle.
     """
 
     def _snapshot(self) -> Iterator[bytes]:
@@ -182,10 +177,9 @@ class GridDump(OfNodes, LammpsDump):
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
     number of its grid (``type``, from 1). Positions are always written.
 
-    The nodes of all grids are written one after another, with consecutive ids. ulmpm and ulcpdi
-    have one grid. tlmpm and tlcpdi have one for each solid, over its reference shape.
-    ulmpm/contacts has the grid of the domain once for each velocity field, so several rows have the
-    same position.
+    Grids follow one another, with consecutive ids. ulmpm and ulcpdi have one grid. tlmpm and tlcpdi
+    have one for each solid, over its reference shape. ulmpm/contacts has the grid of the domain
+    once for each velocity field, so several rows have the same position.
 
     Example
     -------
@@ -194,9 +188,9 @@ class GridDump(OfNodes, LammpsDump):
 
 
 class ParticleGz(Gzipped, Particle):
-    """Write the material points in LAMMPS text format, gzipped.
+    """Write the material points in LAMMPS text format, gzipped, which OVITO opens directly.
 
-    A file has less than half the size, and OVITO opens it directly. Otherwise like dump particle.
+    A file has less than half the size. Otherwise like dump particle.
 
     Example
     -------

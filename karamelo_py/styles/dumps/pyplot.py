@@ -44,8 +44,8 @@ class PyPlot(Dump):
     Parameters
     ----------
     every
-        Steps between two pictures, or ``time(T)``. The first and the last state of a run are
-        always drawn.
+        Steps between two pictures, or ``time(T)``. The first and the last state of a run are always
+        drawn.
     file
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
         ``*`` each picture replaces the previous one.
@@ -65,14 +65,14 @@ class PyPlot(Dump):
     axes
         false: without axes and numbers.
     title
-        Text above, before step and time. A name or formula in braces becomes its present number,
-        as in "force {press_y} N". Two braces make one, and dollars enclose mathematics, as in
+        Text above, before step and time. A name or formula in braces becomes its present number, as
+        in "force {press_y} N". Two braces make one, and dollars enclose mathematics, as in
         "$v_{max}$".
     label
         Label of the colour bar, such as "stress (MPa)"; default: the column.
     only
-        A condition of columns as in `field`: other points are omitted. Use it to slice a body or
-        omit groups and solids, as in ``not tool && y > 0``.
+        A condition of columns as in `field`: other points are omitted, to slice a body or omit
+        groups and solids, as in ``not tool && y > 0``.
     xmin, xmax, ymin, ymax, zmin, zmax
         Limits of the view; default: the domain.
     scale
@@ -85,7 +85,7 @@ class PyPlot(Dump):
     fontsize
         Font size in points.
     pointsize
-        Size of the drawn points, relative to the size of the material points; 1.4 fills all gaps.
+        Size of the drawn points, relative to the material points; 1.4 fills all gaps.
     outlines
         true: a line around each solid, and around the regions, walls and rigid tools of fixes, such
         as contact/surface. In 3D tools are drawn by their edges and sections; hidden lines are
@@ -175,7 +175,6 @@ class PyPlot(Dump):
         self.save(self.path())
 
     def save(self, path: Path) -> None:
-        """Draw the present state to a file, in the format of its name."""
         with unwarned():
             if picture_format(path) == "png":
                 with whole(path) as file:
@@ -185,7 +184,6 @@ class PyPlot(Dump):
                 savefig(self._picture.figure, path)
 
     def draw(self, file: BinaryIO) -> None:
-        """Draw the present state as PNG into an open file."""
         with unwarned():
             self._draw()
             self._picture.save_png(file, PNG_COMPRESSION)
@@ -221,7 +219,6 @@ class PyPlot(Dump):
         return made
 
     def snapshot(self) -> Snapshot:
-        """Collect the data of a picture from all points, part by part."""
         label, domain, update = self._label(), self.hub.domain, self.hub.update
         names = dict.fromkeys(["id", "type", "x", "y", "z", "volume", label])
         pieces = [self._chosen(table, names) for table in self.hub.fields.pieces(to_first=True)]
@@ -241,7 +238,6 @@ class PyPlot(Dump):
             pass
 
     def side(self, snapshot: Snapshot) -> float:
-        """Return the side length of a typical point."""
         columns, domain = snapshot.columns, self.hub.domain
         volume = columns["volume"]
         if domain.axisymmetric:

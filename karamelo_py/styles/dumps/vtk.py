@@ -52,7 +52,6 @@ class VtkDump(TableDump):
         return self.hub.folder / f"{stem}.pvd"
 
     def write(self) -> None:
-        """Write one snapshot, then the list of all."""
         path = self.path()
         with whole(path) as file:
             names = [name for name in self.columns if name not in POSITIONS]
@@ -105,8 +104,8 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 class GridVtk(OfNodes, VtkDump):
     """Write the background grids, with values at their nodes, as a series of VTU files.
 
-    Open the file of the same name with the ending ``.pvd`` in ParaView. It lists all snapshots with
-    their times.
+    Open the file of the same name with the ending ``.pvd`` in ParaView, which lists all snapshots
+    with their times.
 
     Parameters
     ----------
@@ -128,7 +127,6 @@ class GridVtk(OfNodes, VtkDump):
             kept.append(ids)
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
-        """Add lines, squares or cubes between the nodes that are written."""
         there = np.concatenate(kept) if kept else np.empty(0, np.int64)
         d = self.hub.domain.dimension
         for lattice in self.hub.lattices:

@@ -22,7 +22,6 @@ LOADS = ("ContactForce", "ContactTorque")
 
 
 def publish_loads(hub: Hub, solid: Solid) -> None:
-    """Reserve published values for the force and torque on a solid."""
     for load in LOADS:
         hub.values.publish_vector(f"{load}_{solid.id}", ("x", "y", "z"))
 
@@ -105,7 +104,6 @@ class Method:
         """Register a new solid."""
 
     def lattices(self, hub: Hub) -> list[Lattice]:
-        """Return the grids of the scene, in the order of their nodes."""
         domain = hub.domain
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 

@@ -70,16 +70,16 @@ class ULMPMContacts(Method):
     points lies half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the
     material point method using multimaterial methods"). This is exact for plane surfaces along the
     grid. Solids with curved or inclined faces use cut points there (points=cut), unless the command
-    ``solid`` says otherwise. Whole squares (points=regular) make such a face stair-stepped: a block
-    on a slope of 20 degrees sticks. With bernstein-quadratic the gap is unknown, and contact begins
-    as soon as two solids have mass at one node.
+    ``solid`` says otherwise: whole squares (points=regular) make such a face stair-stepped, and a
+    block on a slope of 20 degrees sticks. With bernstein-quadratic the gap is unknown, and contact
+    begins as soon as two solids have mass at one node.
 
     A node at a surface loses its velocity of approach. Colliding bars of 4, 8 and 16 cells lose 15,
     11 and 4 % of the kinetic energy.
 
-    For a fixed base, use a rigid solid or fix velocity_nodes. The fix must give all components, and
-    its group must contain all corners of the cells of the base. With splines a base should be three
-    cells thick: the surface of a thinner one appears higher by up to a quarter of a cell.
+    For a fixed base, use a rigid solid or fix velocity_nodes with all components, on a group with
+    all corners of the cells of the base. With splines a base should be three cells thick: the
+    surface of a thinner one appears higher by up to a quarter of a cell.
 
     Walls of one cell contain liquids and granular materials, also in corners. Water at rest in a
     rigid box still sinks slowly into its floor: 33 % of a cell in 2 s (linear, FLIP 0.99).
@@ -92,9 +92,9 @@ class ULMPMContacts(Method):
     contact.
 
     At a node of more than two solids, every approaching pair computes its impulse from the same
-    velocities. The impulse is smaller for solids in several pairs. The rest is removed in up to 16
+    velocities. The impulse is smaller for solids in several pairs; the rest is removed in up to 16
     passes. The order of the solids in the script has no effect. Contact does not move nodes held by
-    fix velocity_nodes. Their impulse is added to the reaction of that fix.
+    fix velocity_nodes: their impulse is added to the reaction of that fix.
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
     for the material point method and application to stress propagation in granular material".
@@ -238,7 +238,6 @@ class ULMPMContacts(Method):
 
     @staticmethod
     def _rubbing(hub: Hub) -> Iterator[tuple[tuple[int, int], Fix]]:
-        """Fixes for friction between two solids, each with the two fields."""
         of = fields(hub)
         for fix in hub.fixes.values():
             if fix.friction is not None:
