@@ -32,7 +32,7 @@ def method(
     basis
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
-        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), then those of
+        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), then those for
         the basis and the method. Words in any order. ``thermo-mechanical``: heat flows between
         points (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the
         velocity gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp.
@@ -150,7 +150,7 @@ def scheme(
     update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
     for name in PUBLISHED:
         # Values of earlier steps do not apply to an explicit scheme.
-        if name in hub.values or chosen.traits.implicit:
+        if name in hub.values or name in chosen.traits.published:
             hub.values.publish(name)
 
 

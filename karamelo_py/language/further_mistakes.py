@@ -59,6 +59,9 @@ class Dependents:
             self.undeleted.add(name.removeprefix("delete_"))
         if name in _SCENE or name == "scheme":
             self.names |= _RUNS
+        if name == "scheme":
+            for style in registry.names("scheme"):
+                self.names.update(registry.find("scheme", style).traits.published)
         if name in _SCENE | _NAMED and statement.arguments:
             self.names.update(re.findall(r"\w+", statement.arguments[0].code))
         return True

@@ -106,7 +106,7 @@ class MeshRegion(Enclosed):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; of those of higher order, only the corners are used. Faces belong to elements.
+    pyramids in 3D; elements of higher order count by their corners. Faces belong to elements.
     Non-planar faces with four corners are two triangles. In 2D the mesh lies in the plane z = 0.
 
     See Also
@@ -219,7 +219,7 @@ class MeshSolid(Solid):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; those of lower dimension are ignored, and those whose centroid lies outside the
+    pyramids in 3D; lower dimensions are ignored, and elements whose centroid lies outside the
     domain too, with a warning. Elements of higher order have the volume within their curved edges.
     The cpdi methods take elements of one shape, by their corners. In 2D the mesh lies in the plane
     z = 0.
