@@ -485,7 +485,7 @@ QUESTIONS = {
     "Karamelo script fails": "howto/from-karamelo",
     "cite": "versions",
     "pore pressure": "limits",
-    "retaining wall force": "howto/boundary",
+    "retaining wall force": "tutorials/slope",
     "free rigid body": "limits",
     "JWL": "limits",
     "Mooney-Rivlin": "reference/generated/material/mooney-rivlin",

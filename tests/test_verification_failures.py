@@ -43,7 +43,7 @@ def test_every_row_has_a_script_and_a_part_of_the_page():
     assert f"each of {len(SCRIPTS)} failures" in verification
     for name in SCRIPTS:
         text = (FAILURES / f"in.{name}").read_text(encoding="utf-8")
-        for word in ("# Failure", "# Cure", "# Reference", "\ncure "):
+        for word in ("# Failure", "# Fix", "# Reference", "\ncure "):
             assert word in text, (name, word)
         assert f"`in.{name}`" in page, name
 

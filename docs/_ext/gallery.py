@@ -124,7 +124,7 @@ def _page(name: str, title: str, text: str, told: dict | None, static: Path) -> 
     parts.append(f"{{download}}`Download the script <../../../inputs/in.{name}>`")
     if chart := chart_of(name, static):
         image = f"/_static/{chart.relative_to(static)}"
-        parts.append("## Beside the reference")
+        parts.append("## Comparison with the reference")
         parts.append(f"```{{image}} {image}\n:alt: {title}\n:width: 600px\n```")
     parts += ["## Script"]
     parts += [f"```text\n{text}\n```"] if text else []
