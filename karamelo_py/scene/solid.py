@@ -25,10 +25,16 @@ COLD, WARM = 60.0, 200.0  # temperatures below COLD, WARM below others, are prob
 class Solid(Named):
     """Base of solid styles, which `put` their points.
 
-    Parameters ---------- material Material of the points. h Cell size. With a grid shared by all
-    solids (ulmpm) it must be the domain's. T0 Initial temperature; by default the material's.
-    GlueToSolid An earlier solid whose velocity field this one shares, in methods with a field per
-    solid.
+    Parameters
+    ----------
+    material
+        Material of the points.
+    h
+        Cell size. With a grid common to all solids (ulmpm) it must be the domain's.
+    T0
+        Initial temperature; default: the material's.
+    GlueToSolid
+        Earlier solid whose velocity field this one uses, in methods with a field per solid.
     """
 
     catalogue = "solids"
