@@ -127,7 +127,7 @@ def _texts(script):
 
     script = re.sub(r"^run\(.*\)$", "", script, flags=re.M)
     hub, simulation = begun(script)
-    arguments = hub.update.scheme, simulation.visits, simulation.mode, simulation.setup
+    arguments = simulation.step_kind, simulation.setup
     hooks = simulation._acting
     files = loops.cache
     found = []
@@ -161,11 +161,11 @@ def _texts(script):
             gpu.text_of = text_of
             card = gpu.Emulator()
             card.loaded = lambda code: None
-            card.made = lambda text: b""
+            card.made = lambda text: b"-"
             own = (simulation.hooks, simulation.python.functions)
             try:
-                steps = StepsOnCard(card, simulation.setup, hub.update.scheme,
-                                    type(simulation.visits), *own)  # fmt: skip
+                steps = StepsOnCard(card, simulation.setup,
+                                    (hub.update.scheme, type(simulation.visits)), own)  # fmt: skip
                 assert steps.step
             except (TypeError, AttributeError) as why:
                 found.append(("no card", str(why)[:200]))

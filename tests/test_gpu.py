@@ -68,7 +68,7 @@ def test_same_as_processor(method, scheme, precision):
     """Sums have another order: some round-off errors of the largest number."""
     script = DISKS.format(method=method, scheme=scheme, precision=precision)
     (hub, one), (_, other) = begun(script), begun(script)
-    steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits))
+    steps = StepsOnCard(Emulator(), one.setup, (hub.update.scheme, type(one.visits)))
     steps.send()
     assert steps.advance(30) == other.advance(30) == 0
     steps.fetch()
@@ -119,7 +119,7 @@ def test_fixes(monkeypatch, own_cache, method):
     hooks = one.hooks, one.python.functions
     forget()
     monkeypatch.setenv("KARAMELO_PY_CACHE", own_cache)
-    steps = StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
+    steps = StepsOnCard(Emulator(), one.setup, ((hub.update.scheme, type(one.visits))), hooks)
     steps.send()
     assert steps.advance(43) == other.advance(43) == 0
     steps.fetch()
@@ -149,7 +149,7 @@ def test_order_in_memory_changes_nothing():
                 for _, array in arrays_of(block.points):
                     array[...] = array[..., order]
         steps = StepsOnCard(
-            Emulator(), simulation.setup, hub.update.scheme, type(simulation.visits)
+            Emulator(), simulation.setup, (hub.update.scheme, type(simulation.visits))
         )
         steps.send()
         assert steps.advance(20) == 0
@@ -173,4 +173,4 @@ def test_code_is_kept(monkeypatch, own_cache):
             monkeypatch.setattr(Emulator, "_compiled", made_again)
         hub, one = begun(WATER)
         hooks = one.hooks, one.python.functions
-        StepsOnCard(Emulator(), one.setup, hub.update.scheme, type(one.visits), *hooks)
+        StepsOnCard(Emulator(), one.setup, ((hub.update.scheme, type(one.visits))), hooks)

@@ -24,6 +24,7 @@ from karamelo_py.compiler.trace import PointFunction, forget, outdate_kernels
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
+from karamelo_py.kernels.table import take
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.implicit.load_steps import LoadSteps
@@ -156,7 +157,8 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     words, find = set(), PointFunction.find
 
     def noted(self, classes):
-        words.update(one.__name__ for one in classes if one)
+        if self is not take:
+            words.update(one.__name__ for one in classes if one)
         return find(self, classes)
 
     monkeypatch.setattr(PointFunction, "find", noted)

@@ -378,6 +378,91 @@ def test_totals_whose_names_do_not_lie_in_a_row_are_refused(tmp_path):
     assert "published = ('x', 'a', 'b', 'c') has to be a part of x, y, z, s" in done.stderr
 
 
+# Schemes with rows of a kind that is new: nodes lose half of v*.
+BRAKES = """
+from typing import NamedTuple
+
+from karamelo_py.compiler.gpu import Card
+from karamelo_py.kernels import gpu
+from karamelo_py.kernels.clock import kick
+from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.sweep import sweep_nodes
+from karamelo_py.kernels.table import NodeTask, Processor, take
+from karamelo_py.schemes.usl import USL
+
+
+@node_task
+class Halve(NamedTuple):
+    goes_through = ("update", "update")
+
+    def at_node(task, kin, nodes, n, dt):
+        for k in range(kin.dimension):
+            nodes.update[n, k] *= 0.5
+
+
+class Brake(NamedTuple): ...
+
+
+class OnProcessors(NamedTuple): ...
+
+
+@take.on(OnProcessors, Processor)
+@take.on(Brake, Processor)
+def _brake(row, s, step):
+    sweep_nodes(step.mode, Halve(), s, kick(s))
+    return True
+
+
+@take.on(Brake, Card)
+def _brake_on_card(row, steps):
+    yield steps.launch(gpu.of_nodes(NodeTask(Halve())), steps.nodes, steps.s, steps.use)
+
+
+def rows_with(brake):
+    k = next(k for k, row in enumerate(USL.rows) if type(row) is NodeTask and callable(row.task))
+    return (*USL.rows[:k], brake, *USL.rows[k:])
+
+
+class Braked(NamedTuple):
+    traits = USL.traits
+    rows = rows_with(Brake())
+
+
+class Half(NamedTuple):
+    traits = USL.traits
+    rows = rows_with(OnProcessors())
+"""
+STOPPING = """
+method(ulmpm, PIC, linear)
+scheme({scheme})
+dimension(2, 0, 1, 0, 1, 0.25)
+region(box, block, 0.25, 0.5, 0.25, 0.5)
+material(m, linear, 1, 1e-6, 0)
+solid(body, region, box, 2, m, 0.25)
+fix(v, initial_velocity_particles, all, 1e-3, 0)
+compute(Ek, kinetic_energy, all)
+log_modify(custom, step, Ek)
+set_dt(1)
+run(2)
+"""
+
+
+def test_a_row_of_a_plug_in_is_taken_on_both_back_ends_or_refused(tmp_path):
+    """Half of the velocity is left after each step; a card without a way to take a row says so."""
+    (tmp_path / "mpm_brakes.py").write_text(BRAKES)
+    styles = {"braked": "mpm_brakes:Braked", "half": "mpm_brakes:Half"}
+    site = offer(tmp_path, "mpm-brakes", "1", {"karamelo_py.scheme": styles})
+    for scheme, how in (("braked", ()), ("braked", ("--gpu",)), ("half", ())):
+        (tmp_path / "in.brakes").write_text(STOPPING.format(scheme=scheme))
+        done = karamelo_py(site, tmp_path, "in.brakes", *how, compiled=False)
+        assert done.returncode == 0, done.stderr
+        assert read_log(tmp_path)[1] == pytest.approx(0.03125e-6 * np.array([1, 1 / 4, 1 / 16]))
+    done = karamelo_py(site, tmp_path, "in.brakes", "--gpu", compiled=False)
+    assert done.returncode == 1
+    assert "a GPU does not take the row OnProcessors of scheme half" in done.stderr
+    assert "scheme(half)" in done.stderr
+
+
 # Dust that feels no stress is blown up by its charge.
 DUST = """
 method(ulmpm, FLIP, linear, 1)

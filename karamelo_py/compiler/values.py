@@ -355,6 +355,10 @@ class Emitted:
         """Tell whether a point function has an implementation for these classes."""
         return self.seen.defined(*classes)
 
+    def find(self, classes: tuple) -> Callable:
+        """Return the implementation of a point function for these classes, for kernels."""
+        return now().seen(self.seen.find(classes))
+
 
 OF_WHOLE = {min, max, abs, int, bool}
 # Functions whose literals adapt to the other operands; more are added by name.

@@ -1,8 +1,8 @@
 """The arrays of a run, as NamedTuples for kernels.
 
-n is the number of points of a block, d the dimension, N the number of nodes, T the number of tiles.
-Arrays of points have the shape (components, n), arrays of nodes (N, components). Optional fields
-are declared by their owners (:mod:`karamelo_py.compiler.fields`).
+n points in a block, d dimensions, N nodes, T tiles. Arrays of points are (components, n), arrays of
+nodes (N, components). Optional fields are declared by their owners
+(:mod:`karamelo_py.compiler.fields`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,18 +17,18 @@ from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import vector
 
-# A NamedTuple, often empty, whose class selects the implementation of point functions.
+# A NamedTuple, often empty, whose class selects implementations of point functions.
 Tag: TypeAlias = Any
 # A double or single, lanes of these, or a number with slopes.
 Number: TypeAlias = Any
-# A number of a point or node, or of several in lanes.
+# Index of a point or node, or of several in lanes.
 Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
     """Fields of the nodes of all grids, dense in node number; untouched pages cost no memory.
 
-    Components are named by the functions below: ``nodes.sums[n, of_force(kin) + k]``.
+    Components: ``nodes.sums[n, of_force(kin) + k]``.
     """
 
     sums: np.ndarray  # mass, momentum, force, as scattered by the points
@@ -42,22 +42,22 @@ MASS = 0  # of Nodes.sums
 
 
 def of_momentum(kin):
-    """Return the first component of the momentum in `Nodes.sums`."""
+    """Return the first component of momentum in `Nodes.sums`."""
     return 1
 
 
 def of_force(kin):
-    """Return the first component of the force in `Nodes.sums`."""
+    """Return the first component of force in `Nodes.sums`."""
     return 2 if kin.dimension == 1 else 4
 
 
 def of_change(kin):
-    """Return the first component of v* - v in `Nodes.update`; v* begins at 0."""
+    """Return the first component of v* - v in `Nodes.update`; v* is first."""
     return 4 if kin.dimension == 3 else kin.dimension
 
 
 def vector_at(kin, records, i, first, like):
-    """Return the components of a node's record from `first`, as a vector."""
+    """Load a vector from a node's record, starting at component `first`."""
     return vector(kin, row(records, i, first, (*like,)))
 
 
@@ -68,28 +68,24 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
-    """Arrays of the points of one constitutive law, in the order of the tiles.
+    """Points of one constitutive law, in the order of the tiles.
 
-    A place is a position (d numbers), followed by the stored shape of a point's domain if weights
-    follow the motion.
+    A place (w numbers) is a position, then the stored shape of the domain if weights follow motion.
     """
 
-    x: np.ndarray  # (2, w, n): places now and after the move; Clock.now says which
-    home: np.ndarray | None  # (w, n) reference places, where weights belong to them (total frame)
+    x: np.ndarray  # (2, w, n): places now and after the move; `clock.now` is the index
+    home: np.ndarray | None  # (w, n) reference places (total frame)
     v: np.ndarray  # (d, n) velocity
     mass: np.ndarray  # (n,)
     state: np.ndarray  # (s, n) state of the law
     material: np.ndarray  # (n,) int32, row in the table of laws
     grid: np.ndarray  # (n,) int32, the grid of each point
-    id: np.ndarray  # (n,) int64, 0-based number of each point in the scene
+    id: np.ndarray  # (n,) int64, 0-based
     fields: tuple  # declared fields, (components, n)
 
 
 def known_to_laws(points):
-    """Return the points with only the fields that every scene has.
-
-    Kernels of laws are then compiled once, and not again for every method.
-    """
+    """Return the points without optional fields, so that kernels of laws serve all methods."""
     return Points(
         points.x, None, points.v, points.mass, points.state, points.material, points.grid,
         points.id, (),
@@ -97,7 +93,7 @@ def known_to_laws(points):
 
 
 def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the arrays of the points with their names; points come last in the shapes."""
+    """Yield the arrays of the points with their names; points are the last axis."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
@@ -106,7 +102,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
-    """Make points of the kind of `points` from the results of `arrays_of`."""
+    """Rebuild `points` from the arrays of `arrays_of`."""
     arrays = iter(found)
     own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
     return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
@@ -118,11 +114,11 @@ class Tiling(NamedTuple):
     count: np.ndarray  # (3,) int64: number of occupied tiles, of parts of the points, and of
     #                    parts that other processes wait for
     share: np.ndarray  # (S + 1,) int64: tiles of the k-th part: order[share[k]:share[k + 1]]
-    order: np.ndarray  # (T + 1,) int64: in which the occupied tiles are visited
+    order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: the grid of the k-th occupied tile
     number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile among all
-    box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may reach
+    box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may see
     rows: np.ndarray  # (T + 1, r, 2) int16: of each row of the box, in 3D number i ny + j, the
     #                   first and last node, counted from its beginning; the last before the first
     #                   if the row is empty, and after the last row. No rows (r = 0) if boxes are
@@ -139,16 +135,14 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 
 
 class Buffers(NamedTuple):
-    """Sums of the tiles of points: a dense box of nodes for each, one after another.
+    """Sums of the tiles of points: dense boxes of nodes, one after another.
 
-    A tile of nodes sums the boxes that reach it, in one order, and leaves zeros in them. Its parts
-    are ranges of nodes in up to three directions: its overlap with each box; before them all its
-    nodes to be cleared, if the first box does not cover the rest. Columns of a part: numbers of its
-    first node in the grid and in the box; lengths; strides in the grid and in the box, along the
-    first two directions; the action.
+    A tile of nodes sums the boxes that reach it, in one order, and zeros them. Its parts are ranges
+    of nodes: overlaps with boxes, after a part that clears the rest if the first box does not cover
+    all. Columns of a part: first node in the grid and in the box; lengths; strides in the grid and
+    in the box along the first two directions; the action.
 
-    In scenes of few points the buffers are the nodes themselves: these are cleared before a visit,
-    and the tiles add to them one by one.
+    In scenes of few points, the nodes are the only buffer: tiles add to them one by one.
     """
 
     nodes: Nodes  # the fields that points scatter to
@@ -159,15 +153,15 @@ class Buffers(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Places of the points of a block during a sweep: arrays (w, n)."""
+    """Places of points during a sweep: arrays (w, n)."""
 
-    where: np.ndarray  # for the weights of the gather
+    where: np.ndarray  # for weights
     x: np.ndarray  # before
     y: np.ndarray  # after
 
 
 class Block(NamedTuple):
-    """Points of one law, its parameters per material, and the points of each tile."""
+    """Points of one law, its parameters per material, and its tiles."""
 
     points: Points
     laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
@@ -175,16 +169,16 @@ class Block(NamedTuple):
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """Return the block with the points of these rows, in this order; they must be sorted again."""
+    """Return the block with the points of `rows`, in this order; they must be sorted again."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
 
 class NoHooks(NamedTuple):
-    """No fix acts in the compiled loop."""
+    """No hooks in the compiled loop."""
 
 
-# One compiled hook of a fix, and the formula of one of its components.
+# A compiled hook of a fix; the formula of one of its components.
 HOOK = np.dtype(
     [
         ("address", np.int64),
@@ -212,7 +206,7 @@ HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the 
 
 
 class Apart(NamedTuple):
-    """Arrays for each of A threads for hooks on nodes."""
+    """Private arrays of A threads for hooks."""
 
     chosen: np.ndarray  # (A, BLOCK): see Hooks
     scratch: np.ndarray  # (A, 9 + depth, BLOCK)
@@ -222,20 +216,20 @@ class Apart(NamedTuple):
 
 
 class Hooks(NamedTuple):
-    """Compiled hooks of the fixes, called by address at their stage (see kernels.hooks)."""
+    """Compiled hooks of the fixes, called by address at their stage (`kernels.hooks`)."""
 
     evaluate: int  # address of the evaluator of formulas
     table: np.ndarray  # (k,) HOOK
     programs: np.ndarray  # (k, 4) PROGRAM, for each component, and friction at a wall
-    members: np.ndarray  # int64: node numbers, or 64 bits for points, 1 for members
-    code: np.ndarray  # (c, 2) int64: the programs of the formulas, one after another
+    members: np.ndarray  # int64: node numbers; of points, bits that mark members
+    code: np.ndarray  # (c, 2) int64: programs of formulas
     constants: np.ndarray  # (m,) float64
     x0: np.ndarray  # (n, d) reference positions of the points, by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
     held: np.ndarray  # (N, d) HELD, if several hooks hold the same nodes; else (0, d)
     loads: np.ndarray  # (N, d) of this step, if hooks apply forces; else (0, d)
-    told: np.ndarray  # (F,) bool: fields of rigid solids, of F with N/F nodes each; or (0,)
+    told: np.ndarray  # (F,) bool: whether a field of N/F nodes is of a rigid solid; or (0,)
     mode: Tag  # one thread, or several
     apart: Apart
     whole: tuple  # tags of the hooks on whole points, made by `vector_hook`
@@ -348,7 +342,7 @@ LAST = 2**62  # above any id of a point
 
 
 class Control(NamedTuple):
-    """Clock, published values and totals: the arrays of the compiled loop besides the fields."""
+    """Clock, published values and totals."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
@@ -362,7 +356,7 @@ class Control(NamedTuple):
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """Make a control with these published values and a zero clock, for solids in `d` dimensions."""
+    """Make a control with a zero clock; `firsts` are the first points of the solids."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
     clock[0].weight = clock[0].stride = 1.0
     more = (1 + d) * (len(firsts) + 1)
@@ -373,7 +367,7 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 
 
 class Setup(NamedTuple):
-    """All arguments of a step; its type decides what is compiled."""
+    """All arguments of a step; its type determines the code."""
 
     frame: Tag  # whether weights belong to present or reference positions
     kin: Tag  # kinematics tag
@@ -393,14 +387,14 @@ class Setup(NamedTuple):
 
 
 def with_items(of, /, **items):
-    """Replace items of a NamedTuple, which may be held, by their names."""
+    """Replace items of a NamedTuple, also of a held one."""
     pairs = zip(of._fields, of, strict=True)
     return type(of)(*[items.get(name, item) for name, item in pairs])
 
 
 @noinline
 def first_from(ascending, begin, end, x):
-    """Find the first number that is not below `x`; NumPy's search takes 0.4 s to compile."""
+    """Return the first index whose number is not below `x`; NumPy's search compiles for 0.4 s."""
     while begin < end:
         middle = (begin + end) // 2
         if ascending[middle] < x:

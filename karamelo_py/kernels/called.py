@@ -1,7 +1,7 @@
-"""Python hooks called from compiled steps, without leaving the loop.
+"""Python hooks called from compiled steps.
 
-A step calls a Python function by its address before it maps the points to the nodes. That function
-applies forces to points in the arrays of the step.
+A step calls a Python function by address before it maps points to nodes. The function applies
+forces to points in the arrays of the step.
 """
 
 from typing import NamedTuple
@@ -21,16 +21,16 @@ _call = caller_of(CALL)
 
 
 class CalledHooks(NamedTuple):
-    """The compiled hooks of a scene, and the Python function called at the start of each step."""
+    """The compiled hooks of a scene, and a Python function called at the start of each step."""
 
     compiled: NamedTuple
-    address: int  # of the function ``(stage) -> 1``, or 0 if it has failed
+    address: int  # of ``(stage) -> 1``, or 0 if it failed
 
 
 @kernel
 def _act(address, stage):
     if _call(address, stage) == 0:
-        raise RuntimeError("a hook has failed")  # what it raised itself comes before this
+        raise RuntimeError("a hook has failed")  # its own exception precedes this
 
 
 @at_points.on(CalledHooks)

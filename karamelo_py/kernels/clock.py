@@ -1,4 +1,4 @@
-"""Step size, and the end of a step."""
+"""Step size, reports of sweeps, and the end of a step."""
 
 from math import inf
 from typing import Any
@@ -23,8 +23,8 @@ def step_size(s: Setup) -> Number:
 def last_step_size(s: Setup) -> Number:
     """Return dt of the previous step, for the velocity at the start of this one.
 
-    Before the first step, and after load steps, there is none: the state already includes its
-    strain. A very small value is used, since strain rates are needed.
+    Before the first step and after load steps, whose strain the state includes, it is next to 0 but
+    not 0: laws divide by it.
     """
     last = s.control.clock[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
@@ -35,44 +35,43 @@ def kick(s: Setup) -> Number:
     """Return the time for which forces act in this step.
 
     Positions belong to the ends of steps, velocities to their middles: forces act from the middle
-    of one step to the middle of the next. In the first step they also act for a whole step: initial
+    of one step to the middle of the next. In the first step they act for a whole step, as initial
     velocities belong to half a step earlier, unless a script requests half.
     """
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
 def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
-    """Return the reference velocity for speeds, in the number type of `like`."""
+    """Return the reference velocity (d,) for speeds, in the number type of `like`."""
     return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: error of a million additions
 
-# Contact is as stiff as a step allows. If steps drop suddenly, as by set_dt, the step for its
+# Contact is as stiff as a step allows. If dt drops suddenly, as by set_dt, the step for its
 # stiffness drops by this fraction of the time: loaded springs stiffen over several periods.
 FOLLOWING = 0.01
 
-# Points that cross cells add energy to a body, this much per cell, and more with a longer step.
-# Until they have moved this far, in cells, a scene takes the steps of bodies at rest.
+# Points that cross cells add energy to a body, more with a longer step. Until they have moved this
+# far, in cells, the stable step is the one of bodies at rest.
 STILL = 0.25
-# Where a common drift is discounted in the step, no point may move by more cells than this.
+# Cells that a point may move in a step, if the step ignores a common drift.
 STRIDE = 0.65
 
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """Choose dt of the next step, from the rate of the fastest point or fixed; less at the end.
+    """Choose dt of the next step: from the fastest point, or fixed; less at the end.
 
-    The last two steps are shortened equally. If velocities are mapped or prescribed, impulses do
-    not vanish with the step: in a very short last step, forces (impulses over dt) would be many
-    times larger than before. Contact with a stiffness of m/dt^2 uses a whole step: loaded springs
-    that suddenly became stiffer would throw bodies back. Load steps have no such springs, and no
-    velocities between steps: the first step after them begins anew, as in a new scene.
+    The last two steps are equally shortened: prescribed or mapped velocities give impulses that do
+    not vanish with dt, and their forces would be huge in a very short step. Contact with a
+    stiffness of m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back. The
+    first step after load steps begins as in a new scene.
     """
     clock = control.clock[0]
     if clock.weight > 1:
-        # The common drift may have rotated since it was measured, so limit it by the speeds.
+        # The common drift may have rotated since it was measured: limit it by the speeds.
         clock.rate = max(clock.rate, clock.wave + clock.speed * clock.spacing)
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
@@ -84,8 +83,7 @@ def choose_dt(control: Control) -> None:
     clock.limit = limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
     remaining = clock.end_time - control.values[TIME]
-    # The tolerance covers the rounding of many additions of dt, so there is no final step of 1e-16
-    # and no extra step.
+    # The tolerance covers the rounding of many additions of dt: no final step of 1e-16.
     if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
@@ -105,14 +103,14 @@ def choose_dt(control: Control) -> None:
 
 @kernel
 def finish(control: Control) -> None:
-    """End a step: points take their new positions, time advances, the next dt is chosen."""
+    """End a step: new positions become present, time advances, the next dt is chosen."""
     clock = control.clock[0]
     clock.now = 1 - clock.now
     dt = control.values[DT]
     clock.last_dt = dt
     clock.last_contact_dt = clock.contact_dt
     time = control.values[TIME] + dt
-    # Exactly the end, if this step was shortened to reach it.
+    # Exactly the end time, if the step was shortened to it.
     control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
     control.values[TIMESTEP] += 1
     clock.drift += clock.move
@@ -140,7 +138,7 @@ def _read_reports(tiling, control):
 
 
 def read_reports(s: Setup) -> None:
-    """Collect the reports of all tiles in the clock: largest rate and move, and any wrong point."""
+    """Collect the largest rate and move of all tiles in the clock, and whether a point failed."""
     clock = s.control.clock[0]
     clock.new_rate = 0.0
     clock.new_move = 0.0
@@ -151,14 +149,14 @@ def read_reports(s: Setup) -> None:
 
 def take_reports(clock: Any) -> None:
     """Accept the reports of a sweep."""
-    # Points move in one sweep of a step, and their domains may grow in another.
+    # Points move in one sweep of a step, domains may grow in another.
     clock.move += clock.new_move
     if clock.new_rate > 0:
         clock.rate = clock.new_rate
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Accept the reports of a sweep; return True if no point went wrong."""
+    """Accept the reports of a sweep; return whether no point failed."""
     clock = s.control.clock[0]
     read_reports(s)
     take(clock)
@@ -176,7 +174,7 @@ def checked_move(frame, kin, grids, points, now, stride, p):
 
 @by_threads
 def _check_points(frame, kin, grids, points, tiling, now, stride, k):
-    """Report the largest move of the points of the k-th part, and the first point with an error."""
+    """Report the largest move of the points of a part, and a failed one."""
     grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]

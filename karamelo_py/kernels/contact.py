@@ -1,27 +1,27 @@
 """Contact on the grid between solids with separate velocity fields.
 
 Where two fields have mass at a node, an impulse removes the part of their relative velocity with
-which they approach each other along their common normal, after Bardenhagen et al. 2001 ("An
-improved contact algorithm for the material point method and application to stress propagation in
-granular material", CMES 2(4)). Friction adds a tangential impulse, at most mu times as large
-(Coulomb). The impulses on both fields are opposite: momentum is conserved to round-off.
+which they approach along their common normal, after Bardenhagen et al. 2001 ("An improved contact
+algorithm for the material point method and application to stress propagation in granular material",
+CMES 2(4)). Coulomb friction adds a tangential impulse, at most mu times as large. The impulses on
+both fields are opposite: momentum is conserved to round-off.
 
-Where more than two fields meet, all pairs compute their impulses from the same velocities, so the
-order of the solids does not matter. Each pair takes the fraction 1 / k of its impulse, where k is
-the larger of its two bodies' numbers of pairs: then no body is more than stopped, and energy does
-not grow. The remainder is removed in the same way again.
+Where more than two fields meet, all pairs compute impulses from the same velocities, so the order
+of the solids does not matter. Each pair takes 1 / k of its impulse, where k is the larger of its
+two bodies' numbers of pairs: no body is more than stopped, and energy does not grow. The remainder
+is removed in further iterations.
 
 Fields meet at nodes up to two cells before the bodies do (the reach of the basis functions).
 Therefore the gap between the surfaces is measured, from the mean positions of the points of each
 body around a node (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed
 at the end of the step. Convex bodies are apart if they are apart along one direction: the grid axes
-are tried too, since normals are tilted where faces end.
+are tried too, since normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or of granular material: each time that it
-seems to leave a gap, points would sink a little into a wall, permanently. So where contact with a
-body of prescribed velocity acted in the last step, others may separate but not approach. Such a
-wall may be one cell thick and have corners that other bodies fill: only its faces towards the other
-body count, and in a hollow corner none of them may be entered.
+The mean position is not the lowest point of a liquid or of granular material: each time it seemed
+to leave a gap, points would sink a little into a wall, permanently. So where contact with a body of
+prescribed velocity acted in the last step, bodies may separate but not approach. Such a wall may be
+one cell thick and have corners that other bodies fill: only its faces towards the other body count,
+and in a hollow corner none of them may be entered.
 """
 
 from math import sqrt
@@ -43,16 +43,16 @@ from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
 
 # Squared sines of angles about the mean direction out of a body:
 SCATTER = 0.003  # accuracy of the direction of a plane face
-EDGE = 0.03  # beyond which a face ends, or is round
-FACING = 0.3  # cosine of an angle, from which two faces face each other
-REPEATS = 16  # at most, if more than two fields meet; each halves the remainder or better
+EDGE = 0.03  # above it, a face ends or is round
+FACING = 0.3  # cosine of the angle at which two faces face each other
+REPEATS = 16  # iterations if more than two fields meet; each at least halves the remainder
 
 
 class SeparateFields(NamedTuple):
-    """Contact where fields meet. F fields on equal grids, S solids."""
+    """Contact where fields meet: F fields on equal grids, S solids."""
 
     node_fields = (Normal, Centre)
-    looks_beyond = 1  # cells beyond the nodes of points, whose sums are read
+    looks_beyond = 1  # cells beyond the nodes of points whose sums are read
 
     stride: int  # from a node to the same position in the next field
     beside: np.ndarray  # (d, 2) stride to the next node along each axis, number of nodes
@@ -101,16 +101,15 @@ class NodePair(NamedTuple):
     per_n: float  # 1 / mass
     per_m: float
     outward: tuple  # common normal, not normalised, from the first body to the second
-    scatter: float  # the smaller one of the two outward directions
+    scatter: float  # the smaller of both outward directions
     yielding: tuple  # change of the relative velocity per impulse along each direction
     relative: tuple  # velocity of the first body relative to the second
-    wall: bool  # whether exactly one of them has a prescribed velocity
-    hollow: bool  # and it has a corner there that the other one fills
+    wall: bool  # whether exactly one has a prescribed velocity
+    hollow: bool  # and it has a corner that the other fills
 
 
 @noinline
 def _immovable(contact, n, k):
-    """Return True if contact cannot move a node in direction k."""
     return contact.prescribed[n, k] != 0 or contact.rigid[n // contact.stride]
 
 
@@ -129,7 +128,7 @@ def _led(contact, kin, n):
 
 @noinline
 def _place(contact, n, k):
-    """Return the number of a node along direction k."""
+    """Return the index of a node along direction k."""
     return n % contact.stride // contact.beside[k, 0] % contact.beside[k, 1]
 
 
@@ -141,7 +140,7 @@ def _kept(contact, n, k):
 
 @noinline
 def _beside(contact, kin, n, which):
-    """Return one of the 3^d nodes around `n`, and whether there is one."""
+    """Return one of the 3^d nodes around `n`, and whether it is on the grid."""
     beside, inside = n, True
     for k in range(kin.dimension):
         way = which // 3**k % 3 - 1
@@ -158,7 +157,7 @@ def _face(contact, kin, nodes, n):
 
 
 def _cosine_above(a, b, least):
-    """Return True if the angle between two vectors has a cosine of more than `least`."""
+    """Return True if the cosine of the angle between two vectors is above `least`."""
     return dot(a, b) > least * sqrt(dot(a, a) * dot(b, b))
 
 
@@ -166,16 +165,16 @@ def _cosine_above(a, b, least):
 def _normal(contact, kin, nodes, n, other):
     """Return the outward direction of a body, and the squared sine of its scatter angle.
 
-    It is the mean of the sums of m grad N, which point outwards, over the nodes around `n`. The sum
-    of one node rotates by tens of degrees as points in rows inclined to the grid pass it. With the
-    weights 1/4, 1/2, 1/4 along each axis, a plane face is accurate to two degrees. Nodes are
-    omitted if they point the same way as `other`, the outward direction of the other body: both
-    faces of a thin wall are near, and only one of them faces that body.
+    It is the mean of the sums of m grad N over the nodes around `n`. The sum of one node rotates by
+    tens of degrees as points in rows inclined to the grid pass it. With weights 1/4, 1/2, 1/4 along
+    each axis, a plane face is accurate to two degrees. Nodes that point the same way as `other`,
+    the outward direction of the other body, are omitted: both faces of a thin wall are near, and
+    only one faces that body.
 
     The length is its weight relative to the other body's direction. It grows with the surface
-    around the nodes, and falls where their directions differ, as at edges and corners. (Lemiale,
-    Nairn & Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of the
-    same density both are equal, and the block's direction is tilted by 15 degrees.)
+    around the nodes, and falls where their directions differ, as at edges. (Lemiale, Nairn &
+    Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of the same
+    density both are equal, and the block's direction is tilted by 15 degrees.)
     """
     total, lengths = zero_vector(kin, 0.0), 0.0
     for which in range(3**kin.dimension):
@@ -200,7 +199,7 @@ def _normal(contact, kin, nodes, n, other):
 def _is_hollow(contact, kin, nodes, n, normal, other):
     """Return True if, of the faces towards another body around a node, two face each other.
 
-    They do if, along the surface, their normals rotate towards the connecting vector.
+    Then, along the surface, their normals rotate towards the connecting vector.
     """
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
@@ -214,10 +213,7 @@ def _is_hollow(contact, kin, nodes, n, normal, other):
 
 @noinline
 def _entering(contact, kin, nodes, n, other, velocity):
-    """Return the largest part of a velocity that enters a face around a node.
-
-    Only faces towards the `other` body count.
-    """
+    """Return the largest part of a velocity that enters a face towards the `other` body."""
     most, part = 0.0, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
@@ -240,7 +236,7 @@ def _entering_corner(contact, kin, nodes, n, other, velocity):
 
 @noinline
 def _normal_of_led(contact, kin, nodes, n, other, velocity, known):
-    """Return the normal of a led body at node `n`, its scatter, and whether its corner is hollow.
+    """Return normal, scatter, and whether the corner is hollow, of a led body at node `n`.
 
     `other` is the normal of the free body, which has the `velocity` relative to it.
     """
@@ -256,7 +252,7 @@ def _normal_of_led(contact, kin, nodes, n, other, velocity, known):
 def _pair_of(contact, kin, nodes, records, n, m, known):
     """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`.
 
-    Only if they are `known`, they limit which faces are entered.
+    Only `known` velocities limit which faces are entered.
     """
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     like = zero_vector(kin, 0.0)
@@ -321,8 +317,8 @@ def _directions(contact, kin, nodes, pair):
     """Return further directions along which bodies may be apart; zeros for none.
 
     Basis functions are products along the grid axes: there the gap does not depend on where faces
-    end. Where the faces of both bodies end, the vector between the mean positions of their points
-    leads across the gap. Next to a plane face it does not.
+    end. Where faces of both bodies end, the vector between the mean positions leads across the gap;
+    next to a plane face it does not.
     """
     centre, like = field(nodes.fields, Centre), zero_vector(kin, 0.0)
     between = pair.per_m * vector_at(kin, centre, pair.m, 0, like)
@@ -352,7 +348,7 @@ def _excess_of(contact, kin, nodes, pair, where):
             if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
                 return 0.0
     last = abs(contact.touched[pair.n, pair.m // contact.stride])
-    # Where three bodies meet, a pair is looked at again in the step that has touched already.
+    # Where three bodies meet, a pair may already have touched in this step.
     if pair.wall and last > 0 and last >= where.step - 1:
         return approach / size
     gap = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
@@ -375,9 +371,9 @@ def _friction_of(pair, friction, push, slide, share):
 
 @noinline
 def _meet(contact, nodes, n):
-    """Write the fields with mass at the position of node `n` to `meeting`; return their number.
+    """List the fields with mass at the position of node `n` in `meeting`; return their number.
 
-    It is 0 if an earlier field than the one of `n` is among them: a position is visited once.
+    It is 0 if an earlier field is among them: each position is visited once.
     """
     if not nodes.sums[n, MASS] > 0:
         return 0
@@ -395,15 +391,15 @@ def _meet(contact, nodes, n):
 
 @noinline
 def _node(contact, place, i):
-    """Return the node at a position of the `i`-th of the fields that meet there."""
+    """Return the node of the `i`-th field that meets at a position."""
     return place + contact.meeting[i] * contact.stride
 
 
 @noinline
 def _count_partners(which, contact, kin, nodes, place, count):
-    """Count the pairs of each field that meets; return whether there are any.
+    """Count the pairs of each field; return whether there are any.
 
-    Pairs count that approach faster than allowed, or that have `Touched`.
+    Pairs that approach faster than allowed, or that have `Touched`.
     """
     found = False
     contact.partners[:count] = 0
@@ -441,7 +437,7 @@ def _take(contact, control, a, i, n, k, impulse, per_mass, x):
         return
     force = impulse / control.clock[0].kick
     add_to(control.totals, contact.slot[a] + k, force)
-    # A force along k has a torque about the two other axes.
+    # Torque about the two other axes.
     add_to(control.totals, contact.torque[a] + (k + 1) % 3, x[(k + 2) % 3] * force)
     add_to(control.totals, contact.torque[a] + (k + 2) % 3, -x[(k + 1) % 3] * force)
     if slot:
@@ -466,10 +462,10 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     normal = pair.outward._make([outward / size for outward in pair.outward])
     compliance = dot(normal, normal, pair.yielding)
     if not compliance > 0:
-        return  # both are moved by fixes
+        return  # both are prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction does not act on the remaining approach: separate bodies come together freely.
+    # Friction does not act on the remaining approach: separate bodies may still come together.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
@@ -477,8 +473,8 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # The energy dissipated by friction: impulse times the mean of the sliding speeds at the
-        # beginning and the end of the step. Forces within the bodies undo their change in between.
+        # Dissipated energy: impulse times the mean of the sliding speeds at both ends of the step.
+        # Forces within the bodies undo their change in between.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
@@ -505,7 +501,6 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
 
 @noinline
 def _touch_place(contact, kin, nodes, control, place, count, where):
-    """Resolve contact where `count` fields meet."""
     contact.partners[:count] = 1  # a single pair checks its approach itself
     for _ in range(REPEATS if count > 2 else 1):
         if count > 2 and not _count_partners(where, contact, kin, nodes, place, count):
@@ -524,7 +519,7 @@ def _touch_place(contact, kin, nodes, control, place, count, where):
 
 @noinline
 def touch_node(contact, kin, grids, nodes, control, n):
-    """Resolve contact at the position of node `n`, if its field is the first one there."""
+    """Resolve contact at the position of node `n`, if its field is the first there."""
     count = _meet(contact, nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
@@ -535,7 +530,7 @@ def touch_node(contact, kin, grids, nodes, control, n):
 
 @noinline
 def _keep_rigid(contact, kin, nodes, n):
-    """Restore the velocity of rigid bodies, whatever acts on the nodes."""
+    """Restore the velocity of rigid bodies."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
             v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
@@ -576,8 +571,8 @@ SeparateFields.rows = (  # type: ignore[attr-defined]
 def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
     """List the pairs of nodes where two fields meet; return their number.
 
-    For each pair, `pairs` (n, 2) gets the nodes, `normals` (n, d) the unit normal from the first to
-    the second body, and `gaps` the remaining distance.
+    `pairs` (n, 2) gets the nodes, `normals` (n, d) unit normals from the first to the second body,
+    `gaps` the remaining distances.
     """
     found = 0
     for s in range(1, 1 + spans[0, 0]):
@@ -666,10 +661,10 @@ def stay_node(contact, kin, nodes, step, n):
 def _stay(steps):
     """Prevent the deforming velocity from opening or closing active contacts.
 
-    If that velocity is mapped separately from v*, the surfaces seem to move although they are
-    pressed together, and stress does spurious work: a collision of bars then quadruples their
-    energy, or doubles it if only approach is removed. `steps` is 1 if v* of this step is known, and
-    0 before: then the contacts of the last step count.
+    If it is mapped separately from v*, the surfaces seem to move although they are pressed
+    together, and stress does spurious work: a collision of bars then quadruples their energy, or
+    doubles it if only approach is removed. `steps` is 1 if v* of this step is known, else 0: then
+    the contacts of the last step count.
     """
 
     def stay(s, n):

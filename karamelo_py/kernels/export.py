@@ -1,4 +1,4 @@
-"""Output quantities from the state of the points: stress, strain, volume, stored energy."""
+"""Output quantities from the state of points: stress, strain, volume, stored energy."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy 
 
 @kernel
 def export_state(kin, points, laws, out):
-    """Fill ``out`` (n, EXPORTED) in the order of the points."""
+    """Fill ``out`` (n, EXPORTED)."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
@@ -31,9 +31,9 @@ def export_state(kin, points, laws, out):
 
 @kernel
 def export(what, times_volume, kin, points, laws, out):
-    """Fill ``out`` (n,) with a column of `columns_of` for each point.
+    """Fill ``out`` (n,) with a column of `columns_of`.
 
-    ``times_volume`` multiplies it by the reference volume: energies from their densities.
+    ``times_volume`` multiplies by reference volume: energies from densities.
     """
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
@@ -46,10 +46,7 @@ def export(what, times_volume, kin, points, laws, out):
 
 @kernel
 def impose_stress(kin, points, laws, chosen, given, stress):
-    """Set the components ``given`` (6,) of the Cauchy stress of the chosen points.
-
-    ``stress`` (n, 6) is in the order of the points and of the components of `kin`.
-    """
+    """Set components ``given`` (6,) of the Cauchy stress of chosen points to ``stress`` (n, 6)."""
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.mass.size):
         if not chosen[p]:
@@ -76,8 +73,8 @@ def impose_temperature(kin, points, laws, rows, temperature):
 def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
     """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
 
-    The first column takes whole units, the second the remainder in units 2^36 times smaller: sums
-    of both are exact for up to 2^17 points at a node, in any order of the points.
+    The first column takes whole units, the second remainders in units 2^36 times smaller: both are
+    exact for up to 2^17 points at a node, in any order.
     """
     grids = at_hand(grids)
     whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit
@@ -94,9 +91,9 @@ def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
 
 @kernel
 def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
-    """Fill ``out`` (d d, n) with the moments sum N v (X - x) of velocities with these gradients.
+    """Fill ``out`` (d d, n) with moments sum N v (X - x) of velocities with these gradients.
 
-    ``where`` (w, n) are the places for the weights, on the grids ``grid_of`` (n,).
+    ``where`` (w, n) are places for the weights, on grids ``grid_of`` (n,).
     """
     grids = at_hand(grids)
     flat = planar(kin)
@@ -115,10 +112,7 @@ def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
 
 @kernel
 def move_moments(frame, kin, points, laws, moments):
-    """Convert moments (d d, n) of velocity from reference to present positions.
-
-    An arm becomes F times its initial value, so a moment M becomes M F^T.
-    """
+    """Convert moments (d d, n) of velocity from reference to present positions: M F^T."""
     points, laws = at_hand(points), at_hand(laws)
     flat = planar(kin)
     for p in range(points.mass.size):

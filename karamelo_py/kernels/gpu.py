@@ -1,12 +1,12 @@
-"""A step on a GPU: what one thread does for a point, a cell, a node, or the clock.
+"""A step on a GPU: functions of one thread for a point, a cell, a node, or the clock.
 
-Points belong to cells, numbered by the first node a point sees, and all points of a cell see the
-same nodes. They are listed cell by cell before each scatter, within a cell in the order of their
-ids. A thread sums what the points of a cell give to each node that they see; another sums at a node
-what cells have given. No real number is added by two threads at once: results are the same in
-each run, and do not depend on how points lie in memory.
+Points belong to cells, numbered by the first node that a point sees; all points of a cell see the
+same nodes. Before each scatter points are sorted by cell (counting sort), then by id. One thread
+sums what a cell's points give to each of its nodes, another sums at a node over cells. No two
+threads add to one real number: results are reproducible, and independent of the order of points
+in memory.
 
-`fate` holds errors and extremes (doubles); threads of steps after the last one do nothing.
+`fate` (5,) has errors and extremes; after the last step, threads do nothing.
 """
 
 import functools
@@ -34,14 +34,14 @@ from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
-MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; 0: continue, else 1 + a status of steps
-BEHIND = 2.0**53  # all numbers of points
-CHUNK = 64  # items that one thread adds up
-WARP = 32  # threads that read memory at once
-OCCUPIED = 1 << 40  # in `CellLists.sums`: flag of a cell with points, plus their number
+MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; STATUS: 0, or 1 + a status of steps
+BEHIND = 2.0**53  # above all numbers of points
+CHUNK = 64  # items that one thread sums
+WARP = 32  # threads that read memory together
+OCCUPIED = 1 << 40  # in `CellLists.sums`: added per cell with points
 
 
-# The stages of a step that functions of threads belong to, as `karamelo-py bench` names them.
+# Stages of a step in `karamelo-py bench`, by function.
 STAGES = {
     "gather_point": "gather from the nodes, update of points",
     "load_point": "loads of points",
@@ -61,25 +61,25 @@ OTHERS = "clock, reports, totals"
 
 
 class CellLists(NamedTuple):
-    """The points of a block by cell; with N nodes and n points.
+    """The n points of a block by cell; N nodes.
 
-    Of domains each corner is listed, in its own cell: corner c of point p as c n + p.
+    Each corner of a domain is listed in its cell: corner c of point p as c n + p.
     """
 
-    count: np.ndarray  # (N,) int32 of points in each cell that are not listed yet
+    count: np.ndarray  # (N,) int32: points of each cell that are not yet listed
     number: np.ndarray  # (n,) int32: the cell of each point
     first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
     box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; then the count
     cell: np.ndarray  # (boxes,) int32: the cell of a box
     order: np.ndarray  # (n,) int32: the points
-    sums: np.ndarray  # (m,) int64: of count and OCCUPIED, by chunks of chunks
-    before: np.ndarray  # (m,) int64: the sum of those before
-    loads: np.ndarray  # (numbers, n): what each point gives, before it is weighted
-    boxes: np.ndarray  # (columns, boxes): what cells give to some of the nodes their points see
+    sums: np.ndarray  # (m,) int64: counts plus OCCUPIED, summed by chunks, level by level
+    before: np.ndarray  # (m,) int64: prefix sums of these
+    loads: np.ndarray  # (numbers, n): loads of points, before weighting
+    boxes: np.ndarray  # (columns, boxes): sums of cells for some of their nodes
 
 
 def nodes_in_cell(basis: Any, kin: Any) -> int:
-    """Count the nodes that all points of a cell, or corners in it, see."""
+    """Count the nodes of a cell."""
     return basis.line_nodes**kin.dimension
 
 
@@ -100,12 +100,12 @@ def while_steps_go_on(function: Callable) -> Callable:
 
 
 def goes_wrong(fate, number):
-    """Note the number of a point that goes wrong: the lowest stays."""
+    """Note the number of a failed point: the lowest remains."""
     raise_to(fate, WRONG, BEHIND - float(number))
 
 
 def _report(fate, number, moved, rate, stride):
-    """Note how a point fared; so written, NaN counts as wrong."""
+    """Note the report of a point; in this form, NaN counts as failed."""
     if (moved <= stride) & (rate < 1e300):
         raise_to(fate, MOVED, float(moved))
         raise_to(fate, RATE, float(rate))
@@ -114,30 +114,30 @@ def _report(fate, number, moved, rate, stride):
 
 
 def is_last(s):
-    """Check that the present step reaches the end of the run: nothing is summed for a next one."""
+    """Return True in the last step of the run: nothing is summed for a next one."""
     values = s.control.values
     return values[TIME] + values[DT] >= s.control.clock[0].end_time
 
 
 class Stage:
-    """A visit of the points in a step, as functions of threads: `row` is one of its scheme's.
+    """A visit of the points as thread functions.
 
-    `columns` are the columns of the nodes that it fills, (array, column, whether it adds), in the
-    arrays that are `present`. The nodes that the points of a cell see are summed in `parts`.
+    `columns` are the columns of nodes that it sums: (array, column, whether it adds), of the arrays
+    `present`. The nodes of a cell are summed in `parts`.
     """
 
     def __init__(self, row: Any, s: Any, present: list):
         basis, kin, quantities = s.basis, s.kin, row.visit.quantities
         self.row, self.parts, self.at = row, 1, row.at or (lambda s: s)
-        self.lists = isinstance(row.visit.weights, sweep.PresentWeights)  # points by cells, anew
+        self.lists = isinstance(row.visit.weights, sweep.PresentWeights)  # sorts points by cell
         self.columns = columns_in_turn(quantities, kin, present)
         self.support = nodes_in_cell(basis, kin)
-        self.corners = int(support(basis, kin)) // self.support  # that are listed of a point
+        self.corners = int(support(basis, kin)) // self.support  # listed per point
         self.scatters = bool((row.scatters or row.only_if_more) and quantities)
         self._point_functions()
 
     def _point_functions(self) -> None:
-        """Make what a point does: gather and update, find its load, be counted."""
+        """Make the functions of a point: gather and update, load, count."""
         row, at, lists, corners, count = self.row, self.at, self.lists, self.corners, self.support
         tasks, quantities, keeps = row.visit.tasks, row.visit.quantities, self.scatters
 
@@ -173,7 +173,7 @@ class Stage:
             pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
             x = sweep.position_of(pt.w, pt.p)
             totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
-            # From zero: what others have found by now would depend on which thread comes first.
+            # From zero: the largest so far would depend on the order of threads.
             moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
             _report(fate, block.points.id[pt.p], moved, rate, c.stride)
             keep(pt, cells)
@@ -198,7 +198,7 @@ class Stage:
         self.gather, self.count = gather_point, count_point
 
     def scatter(self, part: int) -> Callable:
-        """Make what a cell does: it sums what its points give to a part of the nodes they see."""
+        """Make the function of a cell: sum its points' contributions to a part of its nodes."""
         point, place, quantities = self._point, self._place, self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
@@ -228,13 +228,13 @@ class Stage:
             out = pt.w._replace(nodes=nodes_for(pt.w.nodes, rooms))
             like = load_all(quantities, pt)  # for its shape alone
             for q in range(first, last):
-                behind = cells.order[min(q + 1, last - 1)]  # asked for ahead
+                behind = cells.order[min(q + 1, last - 1)]  # read ahead
                 here = pt._replace(p=p)
                 stencil = locate(out.basis, out.kin, out.grid, place(here))
                 seen = stencil if corners == 1 else of_corner(stencil, corner)
                 numbers = tuple([cells.loads[k, p] for k in range(len(flat(like)))])
                 for k in range(begin, end):
-                    node = node_of(out, seen, k)._replace(i=index(k))  # numbered in the cell
+                    node = node_of(out, seen, k)._replace(i=index(k))  # numbered within the cell
                     scattered_all(quantities, nested_as(like, numbers), node)
                 p, corner = _point_and_corner(corners, size, behind)
             for j, (name, column, _) in enumerate(columns):
@@ -250,22 +250,23 @@ class Stage:
         return len(self.columns) * -(-self.support // self.parts)
 
     def nodes_of(self, part: int) -> tuple[int, int]:
-        """Return the nodes of a stencil that are summed in a part: from and to before."""
+        """Return the range of the stencil that is summed in a part."""
         count = self.support
         return count * part // self.parts, count * (part + 1) // self.parts
 
     def sum(self, part: int, anew: bool) -> Callable:
-        """Make what a node does: it sums what cells have given to it; `anew` from zero."""
+        """Make the function of a node: sum over cells, `anew` from zero."""
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(part)
 
-        def sum_node(i, fate, s, block, cells, use):
+        def sum_node(i, fate, s, cells, use):
             if use[i] == 0 or (only_if_more and is_last(s)):
                 return
             grid = _grid_of(s.grids, i)
             totals = (real(0, s.nodes.sums[0, 0]),) * len(columns)
             for k in range(begin, end):
-                totals = _with_cell(s, cells, grid, i, k, (begin, end), totals)
+                cell = i - _steps_to(s, grid, k)
+                totals = _with_cell(totals, cells, cell, k - begin, end - begin)
             for (name, column, add), value in zip(columns, totals, strict=True):
                 array = found(at(s).nodes, name)
                 if add or not anew:
@@ -276,7 +277,7 @@ class Stage:
         return sum_node
 
     def age(self) -> Callable:
-        """Make what a node does before cells mark it: it is used (2), to be cleared (1), or not."""
+        """Make the function of a node before marking: 2 is used, 1 to be cleared, 0 unused."""
         only_if_more = self.row.only_if_more
 
         def age_node(i, fate, s, use):
@@ -286,7 +287,7 @@ class Stage:
         return age_node
 
     def mark(self) -> Callable:
-        """Make what a cell does: it marks the nodes that its points see as used."""
+        """Make the function of a cell that marks its nodes as used."""
         count, only_if_more = self.support, self.row.only_if_more
 
         def mark_nodes(i, fate, s, cells, use):
@@ -301,7 +302,6 @@ class Stage:
 
 
 def _grid_of(grids, n):
-    """Find the grid that node `n` belongs to."""
     g = 0
     for k in range(1, grids.first.size):
         if grids.first[k] <= n:
@@ -310,19 +310,18 @@ def _grid_of(grids, n):
 
 
 def _steps_to(s, grid, k):
-    """Count the nodes from the first that a point sees to the k-th, by their numbers."""
+    """Return the distance in node numbers from the first node of a cell to its k-th."""
     return node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
 
 
-def _with_cell(s, cells, grid, n, k, part, totals):
-    """Add to `totals` what a cell gives to node `n`, which its points see as their k-th node."""
-    (begin, end), c = part, n - _steps_to(s, grid, k)
-    box = cells.box[index(max(c, 0))]
-    there = (box >= 0) & (c >= 0)
+def _with_cell(totals, cells, cell, first, step):
+    """Add the sums of a cell, in the rows `first`, `first` + `step`, ... of its box."""
+    box = cells.box[index(max(cell, 0))]
+    occupied = (box >= 0) & (cell >= 0)
     at = index(max(box, 0))
     return tuple(
         [
-            value + where(there, cells.boxes[j * (end - begin) + k - begin, at], value - value)
+            value + where(occupied, cells.boxes[j * step + first, at], value - value)
             for j, value in enumerate(totals)
         ]
     )
@@ -332,20 +331,20 @@ def _with_cell(s, cells, grid, n, k, part, totals):
 
 
 def _weight(number):
-    """Return a count with a mark of cells that have points."""
     return int(number) + (OCCUPIED if number > 0 else 0)
 
 
 def sum_counts(i, fate, cells):
-    """Sum a chunk of counts, and occupied cells."""
+    """Sum a chunk of counts."""
     total = 0
     for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
         total += _weight(cells.count[c])
     cells.sums[i] = total
 
 
-def sum_sums(i, fate, cells, begin, count, above):
-    """Sum a chunk of sums: of those from `begin` on, into the level from `above` on."""
+def sum_sums(i, fate, cells, level):
+    """Sum a chunk of sums: `level` is where they begin, their count, and where the next begin."""
+    begin, count, above = level
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
         total += cells.sums[begin + k]
@@ -353,7 +352,7 @@ def sum_sums(i, fate, cells, begin, count, above):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Find the sum of all sums before one; `above` as in `sum_sums`, -1 where there is none."""
+    """Find the prefix sum of a chunk; `above` is the level above, -1 if there is none."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -362,7 +361,7 @@ def sum_before(i, fate, cells, begin, above):
 
 
 def place_list(i, fate, cells):
-    """Say where the points of a cell are listed, and the number of its box."""
+    """Set where the points of a cell are listed, and the number of its box."""
     chunk = i // CHUNK
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):
@@ -384,12 +383,11 @@ def list_point(i, fate, cells):
 
 
 def _point_and_corner(corners, count, listed):
-    """Return the listed point and the index of its corner."""
     return (index(listed), 0) if corners == 1 else (index(listed % count), listed // count)
 
 
 def sort_cell(corners: int) -> Callable:
-    """Make what sorts the points of a cell by id, and corners of domains."""
+    """Make the function that sorts the points of a cell by id (and their corners)."""
 
     def key(ids, listed):
         p, corner = _point_and_corner(corners, ids.size, listed)
@@ -414,12 +412,12 @@ def sort_cell(corners: int) -> Callable:
 
 # --- order in memory --------------------------------------------------------------------------
 #
-# Threads side by side go through the points of cells side by side: what they read at once should
-# lie side by side, the first points of a warp's cells, then the second ones.
+# The threads of a warp take adjacent cells: the first points of these cells should be adjacent in
+# memory, then their second points.
 
 
 def order_cell(i, fate, cells, come_from):
-    """Say where the points of a cell come to lie, and which come there."""
+    """Find the new places of a cell's points."""
     boxes = cells.box[cells.box.size - 1]
     if i >= boxes:
         return
@@ -440,14 +438,14 @@ def order_cell(i, fate, cells, come_from):
 
 
 def take_rows(i, fate, rows, come_from, room):
-    """Copy the numbers of the point that comes to place `i`."""
+    """Copy the numbers of the point that moves to place `i`."""
     p = index(come_from[i])
     for k in range(rows.shape[0]):
         room[k, i] = rows[k, p]
 
 
 def put_rows(i, fate, rows, room):
-    """Put numbers of a point where it comes to lie."""
+    """Copy the numbers of a point to its new place."""
     for k in range(rows.shape[0]):
         rows[k, i] = room[k, i]
 
@@ -456,7 +454,7 @@ def put_rows(i, fate, rows, room):
 
 
 def of_nodes(row: Any) -> Callable:
-    """Make what a node does for a row of a task."""
+    """Make the function of a node for a `NodeTask`."""
     task, at, length = row.task, row.at or (lambda s: s), row.length or kick
     made = task if callable(task) else lambda s: task
 
@@ -469,12 +467,11 @@ def of_nodes(row: Any) -> Callable:
 
 
 def clear(i, fate, array, first):
-    """Clear a number of an array."""
     array[first + i] = 0
 
 
 def take_reports(take: Callable) -> Callable:
-    """Make what takes over how the points fared in a visit, with a function of the clock."""
+    """Make the function that passes the reports of a visit to the clock."""
 
     def take_all_reports(i, fate, s):
         clock = s.control.clock[0]
@@ -490,13 +487,13 @@ def take_reports(take: Callable) -> Callable:
 
 
 def finish_step(i, fate, s):
-    """End a step: advance time, and choose the next step size."""
+    """End a step: advance time, choose dt."""
     fate[DRIFT] += s.control.clock[0].move
     finish(s.control)
 
 
 def end_step(i, fate, s):
-    """Tell whether steps continue."""
+    """Set the status if the run ends."""
     clock = s.control.clock[0]
     if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
         fate[STATUS] = 1.0 + ABOVE_LIMIT

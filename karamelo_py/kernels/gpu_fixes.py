@@ -1,8 +1,7 @@
-"""Hooks of fixes, their totals, and the watch over energy on a GPU: the work of one thread.
+"""Hooks of fixes, totals and the energy monitor on a GPU: functions of one thread.
 
-The functions of :mod:`karamelo_py.kernels.hook_loop` do the work, for one member at a time: each
-thread has the tables of the hooks with a private scratch. Totals are sums of integers, which
-threads may add to in any order: a few copies of them spread the traffic.
+Members are processed one by one by the functions of :mod:`karamelo_py.kernels.hook_loop`, with
+private scratch. Totals are sums of integers, in any order; several copies spread the traffic.
 """
 
 from collections.abc import Callable
@@ -20,13 +19,12 @@ from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, step_size
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
-from karamelo_py.kernels.gpu import MOVED, STATUS, goes_wrong, is_last
+from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
 
 
 def _hooks_with_room(hooks):
-    """Return the hooks with room for one member."""
     scratch = room_for(1, (0.0,) * (STACK + ROWS + 1))
     scratch[:6] = 0.0
     chosen = room_for(1, (0,))[0]
@@ -58,14 +56,14 @@ _CONTROL = _control(0)
 
 
 def clear_held(i, fate, held):
-    """Clear the record of what holds a node."""
     for c in range(held.shape[1]):
         held[i, c].slot = 0
 
 
 class Act(NamedTuple):
-    """Arguments of the members of a hook, besides setup and hooks."""
+    """The hook of a launch."""
 
+    hooks: NamedTuple
     h: int
     heavy: np.ndarray  # (hooks,) members with mass
     copies: np.ndarray  # of the totals
@@ -76,14 +74,13 @@ def _member(hooks, h, i):
     return i if begin < 0 else hooks.members[begin + i]
 
 
-def count_node(i, fate, s, hooks, about):
-    """Count a member with mass."""
-    if s.nodes.sums[_member(hooks, about.h, i), arrays.MASS] > 0:
+def count_node(i, fate, s, about):
+    if s.nodes.sums[_member(about.hooks, about.h, i), arrays.MASS] > 0:
         counted(about.heavy, about.h, 1)
 
 
 def hooked_nodes(target: int, of_heat: bool = False) -> Callable:
-    """Make the argument of hooks on components of nodes; for temperatures always as in FLIP."""
+    """Make the argument of hooks on node components; temperatures as in FLIP."""
     return lambda s: hook_loop.hooked_nodes(s, target, 1.0 if of_heat else s.control.clock[0].kept)
 
 
@@ -92,20 +89,21 @@ def whole_nodes(target: int, stage: int) -> Callable:
     return lambda s, tag: hook_loop.whole_nodes(s, tag, stage, target)
 
 
-def work_of_loads(i, fate, s, hooks, about):
+def work_of_loads(i, fate, s, about):
     """Sum the work of loads on a node, and clear them."""
     if s.nodes.sums[i, arrays.MASS] > 0:
-        own = _hooks_with_room(hooks)
+        own = _hooks_with_room(about.hooks)
         own.chosen[0] = i
         call = hook_loop.Call(own, _CONTROL(s, about.copies, i), float(kick(s)), 0, 1.0)
         hook_loop.act(hook_loop.hooked_nodes(s, hook_loop.LOADS, 0.0), hook_loop.ACT, call, 1)
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
-    """Make what a member of a hook on nodes does in time `length`; `task` is ACT or RUB."""
+    """Make the function of a member of a hook on nodes, ACT or RUB, acting for `length`."""
     control_of = _control(values)
 
-    def visit_member(i, fate, s, hooks, about, *tag):
+    def visit_member(i, fate, s, about, *tag):
+        hooks = about.hooks
         n = _member(hooks, about.h, i)
         if s.nodes.sums[n, arrays.MASS] > 0:
             own = _hooks_with_room(hooks)
@@ -138,11 +136,11 @@ def whole_points(heats: bool) -> Callable:
 
 
 def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
-    """Make a point's function for a hook on the result of `points_of`; `then`: 1 after the move."""
+    """Make the function of a point for a hook on ``points_of(s, block, then)``."""
     control_of = _control(values)
 
-    def visit_point(i, fate, s, block, hooks, about, *tag):
-        own, control = _hooks_with_room(hooks), control_of(s, about.copies, i)
+    def visit_point(i, fate, s, block, about, *tag):
+        own, control = _hooks_with_room(about.hooks), control_of(s, about.copies, i)
         what = points_of(s, block, then, *tag)
         call = hook_loop.Call(own, control, float(step_size(s)), about.h, 1.0)
         count, _ = hook_loop.choose_points(what, call, i, i + 1)
@@ -153,7 +151,7 @@ def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
 
 
 def check_point(i, fate, s, block):
-    """Check the new position of a point again, after hooks that may have changed it."""
+    """Check the new position of a point again."""
     points, clock = block.points, s.control.clock[0]
     cells, good = checked_move(s.frame, s.kin, s.grids, points, clock.now, clock.stride, i)
     if good:
@@ -173,7 +171,7 @@ def take_moves(i, fate, s):
 
 
 def _setup(s: arrays.Setup) -> Callable:
-    """Make the setup of a thread, with private copies of arrays that threads would overwrite."""
+    """Make the setup of a thread, with private copies of scratch."""
     fields, d = len(s.contact.slot) if isinstance(s.contact, SeparateFields) else 0, s.kin.dimension
 
     def contact_of(s):
@@ -190,7 +188,7 @@ def _setup(s: arrays.Setup) -> Callable:
 
 
 def each_node(function: Callable, s: arrays.Setup) -> Callable:
-    """Make what a node does for a row of a function."""
+    """Make the function of a node for an `EachNode`."""
     setup_of = _setup(s)
 
     def visit_each_node(i, fate, s, use, copies):
@@ -201,7 +199,7 @@ def each_node(function: Callable, s: arrays.Setup) -> Callable:
 
 
 def each_point(function: Callable, s: arrays.Setup) -> Callable:
-    """Make what a point does for a row of a function."""
+    """Make the function of a point for an `EachPoint`."""
     setup_of = _setup(s)
 
     def visit_each_point(i, fate, s, block, copies):
@@ -211,7 +209,7 @@ def each_point(function: Callable, s: arrays.Setup) -> Callable:
 
 
 def once(function: Callable) -> Callable:
-    """Make what is done once for a row of a function."""
+    """Make the function for a `Once`."""
 
     def do_once(i, fate, s):
         function(s)
@@ -223,19 +221,19 @@ def once(function: Callable) -> Callable:
 
 
 def clear_totals(i, fate, copies, first, count):
-    """Clear a number of the totals in rows from `first` on, `count` of them, in all copies."""
+    """Clear a number of `count` rows of totals, from `first` on, in all copies."""
     limbs = copies.shape[2]
     k, rest = i // (count * limbs), i % (count * limbs)
     copies[k, first + rest // limbs, rest % limbs] = 0
 
 
 def clear_rows(i, fate, sums, first):
-    """Clear a number of the totals from row `first` on."""
+    """Clear a number of the totals, from row `first` on."""
     sums[first + i // sums.shape[1], i % sums.shape[1]] = 0
 
 
 def collect_total(i, fate, copies, sums, first):
-    """Add up a number of the totals, in rows from `first` on, over the copies."""
+    """Sum a number of the totals over the copies."""
     row, limb = first + i // copies.shape[2], i % copies.shape[2]
     total = sums[row, limb]
     for k in range(copies.shape[0]):
@@ -244,19 +242,21 @@ def collect_total(i, fate, copies, sums, first):
     sums[row, limb] = total
 
 
-def publish(i, fate, s, hooks, numbers, always):
-    """Publish the totals of hooks with these `numbers`, from and to before, if they are read."""
+def publish(i, fate, s, hooks, which):
+    """Publish the totals of hooks: `which` is their range, and if not only at the end of a run."""
+    begin, end, always = which
     if always or is_last(s):
-        for h in range(*numbers):
+        for h in range(begin, end):
             hook_loop.publish_total(hooks, h, s.control)
 
 
 # --- the watch over energy --------------------------------------------------------------------
 
 
-def add_energies(i, fate, s, block, copies, threads):
-    """Sum the energies of some points, and mass and momentum of their solids."""
+def add_energies(i, fate, s, block, copies):
+    """Sum energies of every `CHUNK`-th point, and mass and momentum of their solids."""
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
+    threads = -(-points.mass.size // CHUNK)
     own = copies[index(i % len(copies))]
     firsts, first_row = s.control.firsts, s.control.values.size
     kinetic = stored = 0.0
@@ -296,14 +296,14 @@ def add_work(i, fate, s, block, copies):
 
 
 def look_before(i, fate, s):
-    """Store the energies of a step if the next one is checked."""
+    """Store the energies before a look at the next step."""
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)
     watch.note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))
 
 
 def look_behind(i, fate, s):
-    """Check the energy; the run ends at a spurious gain."""
+    """Check the energy; spurious gain ends the run."""
     clock = s.control.clock[0]
     if clock.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return

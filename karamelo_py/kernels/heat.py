@@ -1,8 +1,8 @@
-"""Heat flow between points through the nodes: its rows, and the fixes that act on it.
+"""Heat flow through the nodes: its rows, and the fixes that act on it.
 
-A temperature is to a heat capacity what a velocity is to a mass: the nodes of heat are `Nodes` with
-one component, and the loops over nodes and the fixes of velocities work on them, too. The equations
-are in :mod:`karamelo_py.kernels.equations.heat`.
+A temperature is to a heat capacity what a velocity is to a mass: nodes of heat are `Nodes` with one
+component, and loops over nodes and fixes of velocities serve them, too. Equations:
+:mod:`karamelo_py.kernels.equations.heat`.
 """
 
 from typing import NamedTuple
@@ -18,19 +18,19 @@ from karamelo_py.kernels.equations import heat as of_heat
 from karamelo_py.kernels.equations.fbar import TakeMean
 from karamelo_py.kernels.equations.node_updates import NodalUpdate, SumsToVelocity
 from karamelo_py.kernels.sweep import OldWeights, Visit
-from karamelo_py.kernels.table import ByFixes, NodeTask, Sweep
+from karamelo_py.kernels.table import NodeTask, Processor, Sweep, take
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.points.kinematics import Line
 
 
 @point_function(otherwise=True)
 def at_heat_nodes(hooks, stage, target, s):
-    """Let the fixes act on the nodes of heat."""
+    """Let fixes act on the nodes of heat."""
 
 
 @at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
-    # For temperatures always FLIP, whatever the transfer of velocity.
+    # Temperatures always as in FLIP.
     clock = s.control.clock[0]
     clock.set_low, clock.set_high = np.inf, -np.inf
     here = at_its_nodes(s)
@@ -50,13 +50,12 @@ def heated(s, block, then):
 
 
 def heat_of(points):
-    """Return supply and capacity of points."""
     return tuple([field(points.fields, kind) for kind in (of_heat.Supply, of_heat.Capacity)])
 
 
 @point_function(otherwise=True)
 def at_heated_points(hooks, s):
-    """Let the fixes supply heat to points, or set their temperature."""
+    """Let fixes supply heat to points, or set their temperature."""
 
 
 @at_heated_points.on(arrays.Hooks)
@@ -70,21 +69,43 @@ def _at_heated_points_hooks(hooks, s):
 
 
 def _of_heat(s):
-    """Return the setup with the nodes of heat."""
     return arrays.with_items(s, nodes=s.heat.nodes, buffers=s.heat.buffers)
 
 
 def at_its_nodes(s):
-    """Return the setup for tasks at nodes, which have one component."""
+    """Return the setup with the nodes of heat, which have one component."""
     return _of_heat(s)._replace(kin=Line())
 
 
 def _take_factor(clock):
-    # `Warming` reports as a rate the factor by which conduction has become faster.
+    # The rate reported by `Warming`: how much faster conduction has become.
     clock.heat_limit = clock.heat_reference / clock.new_rate
 
 
-# One loop for both ways.
+class AtHeatNodes(NamedTuple):
+    """Fixes act on the nodes of heat."""
+
+    stage: int
+    target: int
+
+
+class AtHeatedPoints(NamedTuple):
+    """Fixes supply heat to points, or set their temperature."""
+
+
+@take.on(AtHeatNodes, Processor)
+def _at_heat_nodes(row, s, step):
+    at_heat_nodes(step.hooks, row.stage, row.target, s)
+    return True
+
+
+@take.on(AtHeatedPoints, Processor)
+def _at_heated_points(row, s, step):
+    at_heated_points(step.hooks, s)
+    return True
+
+
+# One loop gathers and scatters.
 MAP = Visit((of_heat.Warming(),), (of_heat.HeatContent(),), OldWeights())
 FLOW = Visit((of_heat.TemperatureGradient(),), (of_heat.HeatFlow(),), OldWeights())
 
@@ -93,16 +114,16 @@ SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# And the heat flow from present gradients.
+# Also the heat flow from present gradients.
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),
-    ByFixes(at_heat_nodes, (arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY)),
-    ByFixes(at_heated_points),
+    AtHeatNodes(arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY),
+    AtHeatedPoints(),
     Sweep(FLOW, moves=False, at=_of_heat, reported=None),
 )
-# The fixes hold the new temperature of nodes.
-HOLD = ByFixes(at_heat_nodes, (arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE))
+# Fixes hold the new temperature of nodes.
+HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE)
 # Points take the change of the nodal temperature.
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 

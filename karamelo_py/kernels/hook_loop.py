@@ -1,8 +1,8 @@
-"""The loop of compiled hooks of fixes over the members of their groups, at nodes and at points.
+"""The loop of compiled hooks of fixes over members of groups, at nodes and at points.
 
-Hooks act on a tuple (`HookedNodes`, `MovingPoints`, `HeatedPoints`), whose class determines how the
-next members are chosen and a block of them is processed. The functions of the hooks are described
-in `karamelo_py.kernels.hooks`.
+Hooks act on a tuple (`HookedNodes`, `MovingPoints`, `HeatedPoints`), whose class determines how
+members are chosen and a block of them is processed. `karamelo_py.kernels.hooks` describes the
+functions of hooks.
 """
 
 from typing import NamedTuple
@@ -46,7 +46,7 @@ _call_heat_function = caller_of(kinds.HEAT_FUNCTION)
 
 
 class Call(NamedTuple):
-    """A call of a hook: number `h` of `hooks`; `share` is 1 / number of members with mass."""
+    """A call of hook `h`; `share` is 1 / number of members with mass."""
 
     hooks: NamedTuple
     control: NamedTuple
@@ -56,27 +56,27 @@ class Call(NamedTuple):
 
 
 class HookedNodes(NamedTuple):
-    """Nodes that node functions change, nodes of heat included."""
+    """Nodes that node functions change, also nodes of heat."""
 
-    target: int  # position in the arrays of nodes
+    target: int  # `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`, or `LOADS`
     kin: NamedTuple
     grids: np.ndarray
     nodes: NamedTuple
     ranges: np.ndarray
-    kept: float  # fraction of its velocity that a point retains, and changes by nodal increments
+    kept: float  # fraction of velocity that points retain (FLIP)
     tag: NamedTuple = ()  # type: ignore[assignment]
     before_update: bool = False
 
 
 class WholeNodes(HookedNodes):
-    """Nodes that functions of whole nodes change; `tag` as `kinds.vector_hook` makes it."""
+    """Nodes that functions of whole nodes change; `tag` of `kinds.vector_hook`."""
 
 
 class MovingPoints(NamedTuple):
     """Points whose velocity point functions change, with the places y that follow from x.
 
-    After the d coordinates of a point, `y` has `corners` corners of its domain. Moving rigid points
-    does no work on other points; they do work where they touch them.
+    After the d coordinates of a point, `y` has `corners` corners. Moving rigid points is no work;
+    they do work where they touch other points.
     """
 
     ids: np.ndarray
@@ -91,7 +91,7 @@ class MovingPoints(NamedTuple):
 class WholePoints(NamedTuple):
     """Points of one law that functions of whole points change."""
 
-    tag: NamedTuple  # the function, and what it reads and writes: see `kinds.vector_hook`
+    tag: NamedTuple  # of `kinds.vector_hook`
     ids: np.ndarray
     kin: NamedTuple
     points: NamedTuple
@@ -101,7 +101,7 @@ class WholePoints(NamedTuple):
 
 
 class HeatedPoints(NamedTuple):
-    """Points that get heat, which heat functions change."""
+    """Points that heat functions change."""
 
     ids: np.ndarray
     kin: NamedTuple
@@ -127,7 +127,6 @@ def _turns(what, k, parts):
 
 
 def _bounds(what, turn, parts):
-    """Return the range of members in a chunk."""
     if isinstance(what, HookedNodes):
         return what.ranges[turn, 0], what.ranges[turn, 1]
     return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
@@ -135,12 +134,12 @@ def _bounds(what, turn, parts):
 
 @point_function()
 def act(what, task, call, count):
-    """Do `task` with the chosen members and add to the totals; return how many count."""
+    """Do `task` with the chosen members and add to totals; return how many count."""
 
 
 @noinline
 def _act_on_part(what, task, call, k, parts):
-    """Do `task` with the members of a hook in the part of thread `k`; return how many count."""
+    """Do `task` with the members in the part of thread `k`; return how many count."""
     found = 0
     call.hooks.scratch[:6] = 0.0
     first, last, step = _turns(what, k, parts)
@@ -159,7 +158,7 @@ def _act_on_part(what, task, call, k, parts):
 
 @shared_out
 def _act_on_parts(what, task, call, k):
-    """Act in the part of thread `k`, with private scratch and totals: totals do not round."""
+    """Act in the part of thread `k`, with private scratch and totals, which do not round."""
     hooks, control, h = call.hooks, call.control, call.h
     own = record(hooks.apart, k)
     for i in range(control.values.size):
@@ -175,7 +174,7 @@ def _act_on_parts(what, task, call, k):
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(what, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(own.totals, control.totals, totals.WORK)
-    # If other hooks have held the nodes before, their totals change, too.
+    # Totals of other hooks that held the nodes change, too.
     several = hooks.held.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)
@@ -184,7 +183,6 @@ def _act_on_parts(what, task, call, k):
 
 
 def _act_on_all(what, task, call):
-    """Do `task` with all members of a hook."""
     hooks = call.hooks
     if not isinstance(hooks.mode, Threaded):
         _act_on_part(what, task, call, NONE, NONE + 1)
@@ -205,7 +203,7 @@ def _act_on_all(what, task, call):
 
 
 def directions(hooks):
-    """Return their number at run time, so that loops over them are not unrolled."""
+    """Return the dimension at run time, so that loops are not unrolled."""
     return hooks.x0.shape[1]
 
 
@@ -213,7 +211,7 @@ def directions(hooks):
 def evaluate(call, component, count, result, shift):
     """Evaluate the formula of a component for the chosen members, at the present time plus `shift`.
 
-    The results go to the row `result` of the scratch. A formula without code is a number.
+    Results go to row `result` of the scratch. A formula without code is a number.
     """
     hooks, control = call.hooks, call.control
     program = hooks.programs[call.h, component]
@@ -233,7 +231,7 @@ def evaluate(call, component, count, result, shift):
 
 @noinline
 def _evaluate_now_and_before(call, c, count):
-    """Evaluate the formula of direction `c`, and one step earlier if it is used."""
+    """Evaluate the formula of direction `c`, and one step earlier if used."""
     evaluate(call, c, count, VALUE, 0.0)
     if call.hooks.table[call.h].uses_before:
         # There is nothing before time 0.
@@ -244,7 +242,7 @@ def _evaluate_now_and_before(call, c, count):
 
 @noinline
 def _published(hooks, h):
-    """Return the first total of a hook, and its number of totals."""
+    """Return the first total of a hook, and how many it has."""
     slot = hooks.table[h].slot
     if hooks.table[h].address == arrays.WHOLE:
         return slot, hooks.table[h].totals
@@ -258,7 +256,6 @@ def _published(hooks, h):
 
 @noinline
 def _clear_total(hooks, h, control):
-    """Let the totals of a hook start from zero."""
     first, count = _published(hooks, h)
     for row in range(first, first + count):
         control.totals[row] = 0
@@ -266,7 +263,6 @@ def _clear_total(hooks, h, control):
 
 @noinline
 def publish_total(hooks, h, control):
-    """Publish the totals of a hook."""
     totals.carry(control.totals[totals.WORK])  # it accumulates over steps
     first, count = _published(hooks, h)
     if count > 0:
@@ -279,7 +275,7 @@ def publish_total(hooks, h, control):
 def _choose_nodes(what, call, row, end, member):
     """Choose up to a block of members in use, with mass; return their number and where to continue.
 
-    Members ascend like rows: a wall may have more members than are in use.
+    Members ascend like rows; a wall may have more members than are in use.
     """
     hooks, h, ranges, sums = call.hooks, call.h, what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
@@ -307,7 +303,6 @@ def _choose_nodes(what, call, row, end, member):
 
 @noinline
 def _node(hooks, h, m):
-    """Return the number of a member of the group."""
     return hooks.members[m] if m < hooks.table[h].end else END
 
 
@@ -333,7 +328,6 @@ def _act_at_nodes(what, task, call, count):
 
 @noinline
 def locate_nodes(grids, hooks, count):
-    """Find the positions of the chosen nodes."""
     where = hooks.scratch
     for q in range(count):
         n = hooks.chosen[q]
@@ -348,7 +342,6 @@ def locate_nodes(grids, hooks, count):
 
 @noinline
 def _clear_held(what, held):
-    """Clear the record of what holds nodes."""
     kin, ranges = what.kin, what.ranges
     if held.size > 0:
         for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
@@ -359,7 +352,7 @@ def _clear_held(what, held):
 
 @noinline
 def _take_over(call, n, c, force):
-    """Let a hook hold node `n` by `force`; return the force of the previous hooks on it."""
+    """Let a hook hold node `n` by `force`; return the force of previous hooks on it."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
     if hooks.held.size > 0 and hooks.table[h].holds:
         held = hooks.held[n, c]
@@ -374,19 +367,19 @@ def _take_over(call, n, c, force):
 
 @noinline
 def _moves_as_told(hooks, n):
-    """Return True if a node belongs to the field of a rigid solid: no work is done on it."""
+    """Return True for a node of a rigid solid's field: no work is done on it."""
     told = hooks.told
     return told.size > 0 and told[n // (hooks.loads.shape[0] // told.size)]
 
 
 def _is_taken(rigid, n):
-    """Return True if rigid points set the velocity of a node that other points also see."""
+    """Return True if rigid points set the velocity of a node."""
     return rigid is not None and rigid[n, arrays.MASS] > 0
 
 
 @noinline
 def _change_nodes(what, call, count):
-    """Act on the chosen nodes; add to the totals, and to the work."""
+    """Act on the chosen nodes; add to totals and work."""
     hooks, control, slot = call.hooks, call.control, call.hooks.table[call.h].slot
     for c in range(directions(hooks)):
         if hooks.programs[call.h, c].begin < 0:
@@ -399,7 +392,7 @@ def _change_nodes(what, call, count):
                 total, work, before = _change_update(what, call, c, q)
             else:
                 total, work, before = _change_velocity(what, call, c, q), 0.0, 0.0
-            # Formulas have been used: their rows hold the terms to be summed.
+            # The rows of the formulas now take the terms to sum.
             own = totals.counts(control.ranks, hooks.chosen[q])
             hooks.scratch[VALUE, q] = total if own else 0.0
             hooks.scratch[BEFORE, q] = work if own else 0.0
@@ -411,14 +404,14 @@ def _change_nodes(what, call, count):
 
 
 def _called(call, state, force, values):
-    """Call the function of a node: mass, v and v*, force, and values of formulas."""
+    """Call a node function: (mass, v, v*), force, and values of formulas."""
     hook = call.hooks.table[call.h]
     return _call_node_function(hook.address, *state, force, *values, call.dt, call.share)
 
 
 @noinline
 def _change_force(what, call, c, q):
-    """Change the force on a node; return the total. Its work is found later (`_work_at_nodes`)."""
+    """Change the force on a node; return the total. `_work_at_nodes` finds its work."""
     kin, sums, hooks, n = what.kin, what.nodes.sums, call.hooks, call.hooks.chosen[q]
     mass, values = sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
     v, old = sums[n, arrays.of_momentum(kin) + c] / mass, sums[n, arrays.of_force(kin) + c]
@@ -430,10 +423,10 @@ def _change_force(what, call, c, q):
 
 @noinline
 def _change_update(what, call, c, q):
-    """Change v* of a node; return the total, the work, and the force of hooks that held it before.
+    """Change v* of a node; return total, work, and force of hooks that held it before.
 
     Work is impulse times the mean of the velocities before and after it; or of the holding hook, as
-    a node stopped by a bound has not moved with the wall before.
+    a node stopped by a bound did not move with the wall before.
     """
     kin, nodes, hooks, n = what.kin, what.nodes, call.hooks, call.hooks.chosen[q]
     hook, dt, kept, work, before = hooks.table[call.h], call.dt, what.kept, 0.0, 0.0
@@ -442,14 +435,14 @@ def _change_update(what, call, c, q):
     old = old_star - nodes.update[n, change]
     force = nodes.sums[n, arrays.of_force(kin) + c]
     v, star, _, total = _called(call, (mass, old, old_star), force, values)
-    # Points that retain velocity take the change v* - v: another v is an impulse.
+    # Points take the change v* - v: changing v is an impulse, too.
     total += kept * mass * (old - v) / dt
     holds = star == values[0]
     if holds:
         before = _take_over(call, n, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may take the velocity of a free node, and a rigid body the velocity of any node.
+    # Contact may still change the velocity of a free node, and a rigid body of any node.
     late, rigid = hook.stage == arrays.POST_UPDATE_GRID_STATE, field(nodes.fields, RigidSums)
     if late and (hook.holds == 0 or _is_taken(rigid, n)):
         hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
@@ -464,10 +457,10 @@ def _change_update(what, call, c, q):
 
 @noinline
 def _change_velocity(what, call, c, q):
-    """Change the velocity of a node that deforms the points; return the total."""
+    """Change the deforming velocity of a node; return the total."""
     kin, nodes, hooks, n = what.kin, what.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
-    # Strain before the forces belongs to the last step, and to the hooks that held then.
+    # Strain before the forces belongs to the last step, and to hooks that held then.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
     # Before the forces, v* belongs to the previous step.
@@ -481,7 +474,6 @@ def _change_velocity(what, call, c, q):
 
 @noinline
 def _rub_at_nodes(what, call, count):
-    """Apply friction to the chosen nodes along their wall."""
     hooks = call.hooks
     if what.target == arrays.ON_VELOCITY:
         # Otherwise v* belongs to the step before.
@@ -496,10 +488,10 @@ def _rub_at_nodes(what, call, count):
 
 @noinline
 def _work_at_nodes(what, call, count):
-    """Sum the work of loads on the chosen nodes, and clear them; v* is the points' velocity.
+    """Sum the work of loads on the chosen nodes, and clear them.
 
-    Force times the mean of the velocities before and after the step: the effect of stress,
-    constraints and contact in the same step counts, or the work would be of first order.
+    Force times the mean of the velocities before and after the step, which include stress,
+    constraints and contact of the step: else the error would be of first order.
     """
     update, change = what.nodes.update, arrays.of_change(what.kin)
     hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[VALUE]
@@ -543,35 +535,31 @@ def _act_on_whole_nodes(what, task, call, count):
 
 
 def without_whole(hooks):
-    """Omit functions of whole points: otherwise loops are compiled again for each of them."""
+    """Omit functions of whole points, so that loops are not compiled again for each."""
     return arrays.with_items(hooks, whole=())
 
 
 def known_to_hooks(nodes):
-    """Return the declared fields that the loop uses: others would have it compiled again."""
+    """Return the fields that the loop uses; others would have it compiled again."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
 def hooked_nodes(s, target, kept):
-    """Return the nodes that node functions change, with the fields that the loop uses.
-
-    `kept` is the fraction of its velocity that a point retains, and changes by nodal increments.
-    """
+    """Return the nodes that node functions change; `kept` is the FLIP coefficient."""
     nodes = s.nodes
     known = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
     return HookedNodes(target, planar(s.kin), s.grids, known, s.ranges, kept)
 
 
 def whole_nodes(s, tag, stage, target):
-    """Return the nodes that a function of whole nodes changes."""
     early = stage == arrays.POST_PARTICLES_TO_GRID
     return WholeNodes(target, planar(s.kin), s.grids, s.nodes, s.ranges, 0.0, tag, early)
 
 
 def node_hooks(stage, what, hooks, s, dt):
-    """Call the node functions of `stage` on the members that have mass; `what`: `hooked_nodes`.
+    """Call the node functions of `stage` on members with mass.
 
-    For `LOADS` the work is summed: here, so that the loop over the nodes is compiled once.
+    `what` is of `hooked_nodes`; for `LOADS` the work is summed: the loop is compiled once.
     """
     own = [tag for tag in hooks.whole if tag.of_nodes]
     whole = tuple([whole_nodes(s, tag, stage, what.target) for tag in own])
@@ -605,7 +593,7 @@ def _node_hooks(stage, what, whole, call):
         else:
             _act_on_all(what, ACT, own)
         publish_total(hooks, h, control)
-    # Friction at walls follows when it is known which of them hold a node.
+    # Friction follows, when it is known which walls hold a node.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -618,7 +606,7 @@ def _node_hooks(stage, what, whole, call):
 
 @point_function(otherwise=True)
 def at_nodes(hooks, stage, target, s):
-    """Let the fixes act on the nodes."""
+    """Let fixes act on nodes."""
 
 
 @at_nodes.on(arrays.Hooks)
@@ -642,7 +630,7 @@ def _add_work_hooks(hooks, s):
 
 
 def choose_points(what, call, p, end):
-    """Choose up to a block of members; return their number, where to continue. Store places."""
+    """Choose up to a block of members, with places; return their number, where to continue."""
     hooks, h = call.hooks, call.h
     begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
     count = 0
@@ -668,7 +656,7 @@ def _act_on_motion(what, task, call, count):
             continue
         _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
-        # Forces act while a hook leads a point from its initial velocity in the step.
+        # Forces act while a hook moves a point from its initial velocity in the step.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
@@ -712,11 +700,11 @@ def _act_on_warmth(what, task, call, count):
         what.temperature[0, p] = T
         if slot >= 0:
             totals.add_to(control.totals, slot, supply - before)
-        # A prescribed temperature bounds it: the resulting one does not.
+        # The prescribed temperature is the bound, not the resulting one.
         if hooks.table[h].holds > 0:
             T = hooks.scratch[BEFORE, q]
         elif what.capacity[0, p] > 0:
-            # Another point may have got earlier what the fastest point takes.
+            # The heating rate is a bound for all points.
             rate = supply / what.capacity[0, p]
             clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
         if share == 0 or hooks.table[h].holds > 0:
@@ -725,7 +713,7 @@ def _act_on_warmth(what, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Return formulas of time now and at the end of the step, 0 without; and contact times."""
+    """Return formulas of time now and at the end of the step (0 without), and contact times."""
     found = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):
@@ -798,8 +786,8 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 def point_hooks(stage, then, hooks, s, arguments_of):
     """Call the point functions of `stage` on the members in each block; sum over them.
 
-    `arguments_of` are two functions: ``what_of(s, block, then)`` gives the argument of functions of
-    one component, ``heat_of(points)`` the heat arguments of functions of whole points.
+    `arguments_of`: ``what_of(s, block, then)`` for functions of a component, ``heat_of(points)``
+    for the heat of functions of whole points.
     """
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)
@@ -813,27 +801,24 @@ def point_hooks(stage, then, hooks, s, arguments_of):
 
 
 def _positions(s, points, then):
-    """Return the positions before a step, and after it if `then`, else the same."""
+    """Return the positions before a step, and after it if `then`."""
     now = s.control.clock[0].now
     return points.x[now], points.x[1 - now if then else now]
 
 
 def whole_points(tag, s, block, then, heat):
-    """Return the argument of a function of whole points."""
     points = block.points
     _, y = _positions(s, points, then)
     return WholePoints(tag, points.id, s.kin, points, block.laws, y, heat)
 
 
 def moving_points(s, block, then):
-    """Return the argument of point functions."""
     points, rigid = block.points, moves_as_told(block.laws)
     x, y = _positions(s, points, then)
     return MovingPoints(points.id, points.v, points.mass, x, y, corners_that_move(s), rigid)
 
 
 def clear_forces(kin, force, count):
-    """Clear the forces of fixes on points."""
     if force is not None:
         for c in range(kin.dimension):
             for p in range(count):
@@ -841,13 +826,13 @@ def clear_forces(kin, force, count):
 
 
 def corners_that_move(s):
-    """Count the corners that are stored after the position of a point, and move with it."""
+    """Count the corners stored after the position of a point, which move with it."""
     return placed(s.basis, s.kin) if s.frame.moves else 0
 
 
 @point_function(otherwise=True)
 def at_points(hooks, stage, then, s):
-    """Let the fixes act on the points; `then` is 1 when their new positions are known, else 0."""
+    """Let fixes act on points; `then` is 1 if their new positions are known, else 0."""
 
 
 @at_points.on(arrays.Hooks)

@@ -1,28 +1,29 @@
-"""Compiled hooks of fixes: functions of one component at one node or point, or of whole points.
+"""Compiled hooks of fixes: functions of one component at a node or point, or of whole points.
 
-A fix that is "a formula acting on a group" (all built-in ones are) gives a tiny function; the loops
-here choose the members, evaluate the formula over them block by block and apply the function. The
-functions are called by address, so a new list of fixes compiles nothing but the functions it adds.
+A fix is a formula acting on a group, with a tiny function. The loops choose members, evaluate the
+formula block by block and call the function by address: a new list of fixes compiles only new
+functions.
 
-Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``
-    `value` and `before` are the formula at the time of the step and one step earlier, `share` is
-    one over the number of members with mass; the totals are summed and published, with what
-    a change of v before the update adds to the momentum of points over dt. Of the hooks that hold
-    a node, the last to bring v_star to its value decides: it gets what the others had of that node.
-    `dt` is the time that forces act for in the step, half of the last step and half of this one.
-    Of the velocity that deforms, mapped apart from v_star, v is set; before the forces (usf, usavg)
-    that is done with the hooks of the update, where those that hold make it their v_star.
-Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``
-    `dt` is the time that the point moves for, `kick` the time that forces act for.
-Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``
-    acts on points where heat flows: `value` and `other` are the first and the second formula,
-    `face` is the area that the point shows, `supply` the heat it gets per time, `share` how much it
-    takes of the change of the nodes' temperature. The total is of what it supplies. Of a hook that
-    holds, `other` is the temperature that points are brought to.
-The node functions of heat see capacity, temperature before and after the step, and heat flow.
+Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``:
+`value` and `before` are the formula at the time of the step and one step earlier; `share` is 1 /
+number of members with mass; `dt` is the time for which forces act, half of the last step plus half
+of this one. Totals are summed and published, plus the momentum that a change of v before the update
+adds to points, over dt. Of several hooks that hold a node, the last to bring v_star to its value
+decides, and gets the others' totals of that node. Of the deforming velocity, if mapped separately
+from v_star, v is set; before the forces (usf, usavg) by the hooks of the update, where those that
+hold make it their v_star.
 
-Functions of whole points (:func:`vector_hook`) see vectors, fields and the state of the law. They
-are compiled into the loop, with it.
+Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``: `dt` is the time
+of the move, `kick` the time for which forces act.
+
+Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``, of points
+where heat flows: `value` and `other` are the first and second formula, `face` is the area of the
+point, `supply` its heat per time, `share` the fraction of the nodal temperature change that it
+takes. The total is the heat supplied. If a hook holds, `other` is the target temperature. Node
+functions of heat see capacity, temperature before and after the step, and heat flow.
+
+Functions of whole points (:func:`vector_hook`) see vectors, fields and the state of the law, and
+are compiled into the loop.
 """
 
 import sys
@@ -66,32 +67,32 @@ STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES
 
 
 class CompiledHook(NamedTuple):
-    """A scalar function that the compiled loop applies to each component of each member."""
+    """A function that the compiled loop applies to components of members."""
 
     function: Callable
-    where: str  # nodes (of heat, too), points, heated points, or whole points
+    where: str  # nodes (also of heat), points, heated points, or whole points
     publishes: bool  # its totals become ID_x, ID_y, ID_z
     uses_before: bool  # needs the formulas one step earlier as well
     uses_share: bool  # needs one over the number of members with mass
-    holds: bool  # sets v_star, or bounds it: one of several decides; leads a temperature
-    tag: Callable | None = None  # of whole points: makes the replacement of the function
+    holds: bool  # sets or bounds v_star; prescribes a temperature
+    tag: Callable | None = None  # of whole points: makes the tag of the function
     reads: tuple = ()
     writes: tuple = ()
-    internal: bool = False  # its arguments are no plug-in's, and cards do not know it
+    internal: bool = False  # not for plug-ins, nor on cards
 
     @property
     def on_nodes(self) -> bool:
-        """Tell whether it acts on nodes."""
+        """True for hooks on nodes."""
         return self.where in ("nodes", WHOLE_NODES)
 
     @property
     def signature(self) -> Any:
-        """Return the Numba type of its function."""
+        """The Numba type of its function."""
         return FUNCTIONS[self.where]
 
 
 WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
-# What a compiled hook acts on at each moment; those on whole points act where any on points does.
+# What compiled hooks act on at each stage; those on whole points act where any on points do.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
     **dict.fromkeys(POINT_STAGES, "points"),
@@ -107,30 +108,30 @@ def node_hook(
     shares: bool = False,
     holds: bool = False,
 ) -> CompiledHook:
-    """Make a compiled hook on nodes, of a function as described at the head of this file."""
+    """Make a compiled hook on nodes, of a node function (see the module)."""
     return CompiledHook(function, "nodes", publishes, uses_before, shares, holds)
 
 
 def point_hook(
     function: Callable, *, publishes: bool = True, uses_before: bool = False
 ) -> CompiledHook:
-    """Make a compiled hook on points, of a function as described at the head of this file."""
+    """Make a compiled hook on points, of a point function (see the module)."""
     return CompiledHook(function, "points", publishes, uses_before, False, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False) -> CompiledHook:
-    """Make a compiled hook for ``supply_heat``, of a function as described there."""
+    """Make a compiled hook for ``supply_heat``, of a heat function (see the module)."""
     return CompiledHook(function, "heated points", publishes, False, False, holds)
 
 
 @point_function()
 def results(tag, what, law, state, p, values, dt):
-    """Return what a function of whole points gives for point `p` (`vector_hook`): a tuple."""
+    """Return the results of a function of whole points for point `p`: a tuple."""
 
 
 @point_function()
 def written(tag, what, p, found):
-    """Write the results of a function of whole points; return the numbers that it publishes."""
+    """Write the results of a function of whole points; return the numbers to publish."""
 
 
 WORDS = {
@@ -163,12 +164,12 @@ NODE_WORDS = {
         what, what.nodes.sums, n, arrays.of_force(what.kin)
     ),
 }
-# The moments of hooks on whole nodes, and what they can change other than fields.
+# Stages of hooks on whole nodes, and what they can change besides fields.
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 
 def _field_reader(item: Any, number: Callable) -> Callable:
-    """Return what reads a declared field, whose numbers ``number(what, k, n)`` gives."""
+    """Return the reader of a declared field, whose numbers are ``number(what, k, n)``."""
     shape = item.shape
     as_vector = shape is vector
 
@@ -182,9 +183,8 @@ def _field_reader(item: Any, number: Callable) -> Callable:
 
 
 def _node_reader(item: Any) -> Callable:
-    """Return what reads an item of a node."""
     if not isinstance(item, type):
-        return NODE_WORDS.get(item, NODE_WORDS["mass"])  # others are refused before that
+        return NODE_WORDS.get(item, NODE_WORDS["mass"])  # others were refused
     return _field_reader(item, lambda what, k, n: field(what.nodes.fields, item)[n, k])
 
 
@@ -196,7 +196,6 @@ def _write_update(what, n, new):
 
 
 def _node_writer(item: Any) -> Callable:
-    """Return what writes an item of a node."""
     if isinstance(item, type):
         return lambda what, n, new: put_at(field(what.nodes.fields, item), n, 0, flat((new,)))
     if item == "force":
@@ -205,14 +204,12 @@ def _node_writer(item: Any) -> Callable:
 
 
 def _reader(item: Any) -> Callable:
-    """Return what reads an item of a point."""
     if isinstance(item, type):
         return _field_reader(item, lambda what, k, p: field(what.points.fields, item)[k, p])
     return WORDS.get(item) or (lambda what, law, state, p: item(law, what.kin, state))
 
 
 def _writer(item: Any) -> Callable:
-    """Return what writes an item of a point."""
     if isinstance(item, type):
         return lambda what, p, new: store(field(what.points.fields, item), p, (new,))
     return lambda what, p, new: store(what.points.v, p, (new,))
@@ -240,7 +237,7 @@ def vector_hook(
     where = WHOLE_NODES if nodes else WHOLE_POINTS
     if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
         return CompiledHook(function, where, publishes, False, False, False, None, reads, writes)
-    # In the module of the function, so that it can be imported, and its kernels cached.
+    # In the function's module, so that it can be imported, and its kernels cached.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
     while hasattr(module, name):  # it serves another hook, too

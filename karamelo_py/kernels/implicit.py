@@ -1,11 +1,10 @@
-"""Implicit steps: nodal forces of points after trial displacements, and their derivatives.
+"""Implicit steps: nodal forces after trial displacements, and their derivatives.
 
-Weights and gradients are taken at the beginning of a step, and do not change while Newton's
-method iterates. With H = sum_I u_I (x) grad N_I of the trial displacements, the nominal stress
-P(H) = tau(H) (I + H)^-T gives the forces V0 P grad N. Its derivatives dP/dH
-(:mod:`karamelo_py.compiler.slopes`) give the whole stiffness V0 grad N dP/dH grad N: geometry, and
-all that a law does while it yields (Charlton, Coombs & Augarde 2017 hold gradients in the same
-way).
+Weights and gradients are those at the beginning of the step, fixed while Newton's method iterates.
+With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H) (I + H)^-T gives the forces V0 P
+grad N. Its derivatives dP/dH (:mod:`karamelo_py.compiler.slopes`) give the whole stiffness V0 grad
+N dP/dH grad N: geometry, and all that a law does while it yields (Charlton, Coombs & Augarde 2017
+fix gradients in the same way).
 """
 
 from typing import NamedTuple
@@ -40,28 +39,28 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import advance, by_rates, kirchhoff_stress, specific_volume
 
-PARTS = 64  # of a parallel loop; points of whole groups of lanes each
+PARTS = 64  # of a parallel loop; each has whole groups of lanes
 GROUP = 8
 
 
 class Seen(NamedTuple):
-    """Nodes that the points of a block see: the k-th of each, of those that give it something."""
+    """Nodes of the points of a block, those with a nonzero weight or gradient."""
 
-    count: np.ndarray  # (n,) int32: how many; further ones are the first with weights of 0
-    nodes: np.ndarray  # (n, s) int32: numbers among the unknown nodes (int64: in the grid)
+    count: np.ndarray  # (n,) int32: number of nodes
+    nodes: np.ndarray  # (n, s) int32: indices among unknown nodes (int64: in the grid)
     weights: np.ndarray  # (n, s)
-    gradients: np.ndarray  # (n, s, c) in the places before the step
-    starts: np.ndarray  # (m + 1,) int64: where what sees each node begins in `entries`
-    entries: np.ndarray  # int32 or int64: p s + k, of the points that see a node, in their order
+    gradients: np.ndarray  # (n, s, c) at positions before the step
+    starts: np.ndarray  # (m + 1,) int64: begin of each node in `entries`
+    entries: np.ndarray  # int32 or int64: p s + k of the points that see a node, in order
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes that a point sees both of: the entries of K, row after row."""
+    """Pairs of nodes that one point sees: the blocks of K, row after row."""
 
-    codes: np.ndarray  # (m,) int64: places of the nodes in the grid; differences tell pairs apart
-    middle: int  # the difference 0 among the columns of `rank`
-    rank: np.ndarray  # (m, r) int32: number of the other node in the row of a node; -1: no pair
-    first: np.ndarray  # (m + 1,) int64: where the pairs of a node begin
+    codes: np.ndarray  # (m,) int64: positions of the nodes in the grid; differences identify pairs
+    middle: int  # column of the difference 0 in `rank`
+    rank: np.ndarray  # (m, r) int32: index of the other node in a node's row; -1: no pair
+    first: np.ndarray  # (m + 1,) int64: begin of the pairs of a node
 
 
 class Response(NamedTuple):
@@ -73,7 +72,6 @@ class Response(NamedTuple):
 
 
 def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
-    """Make the arrays of the points of a block."""
     n, t = block.points.mass.size, s.kin.tensor_size
     count, width = support(s.basis, s.kin), len(s.kin.Gradient._fields)
     none = np.zeros(0, np.int64)
@@ -90,14 +88,14 @@ def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
 
 
 def points_of(count, k):
-    """Find the first of `count` points in the k-th part of them."""
+    """Find the first of `count` points in the k-th part."""
     groups = (count + GROUP - 1) // GROUP
     return min(GROUP * (groups * k // PARTS), count)
 
 
 @by_threads
 def see(frame, kin, basis, grids, points, laws, now, seen, part):
-    """Find the nodes that points see, with weights and gradients in the present places."""
+    """Find the nodes that points see, with weights and gradients at the present positions."""
     points, laws, seen = at_hand(points), at_hand(laws), at_hand(seen)
     where = places_of(frame, points, now, 1 - now).where
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
@@ -135,7 +133,6 @@ def see(frame, kin, basis, grids, points, laws, now, seen, part):
 
 
 def gradient_at(kin, seen, p, k):
-    """Load the gradient of the k-th node of a point."""
     return gradient(kin, [seen.gradients[p, k, j] for j in range(len(kin.Gradient._fields))])
 
 
@@ -167,7 +164,7 @@ def strained_point(kin, points, laws, response, p):
 
 
 def nominal_stress(law, kin, state, H, dt):
-    """Return P by the places before the step, per reference volume."""
+    """Return P relative to the positions before the step, per reference volume."""
     after = advance(law, kin, state, large(H) if by_rates(law) else H, dt)
     return kirchhoff_stress(law, kin, after).nominal(I + H)
 
@@ -196,7 +193,7 @@ def respond(kin, points, laws, dt, response, part):
 
 @by_threads
 def respond_to_changes(kin, points, laws, dt, response, first, end, tangent, part):
-    """Find V0 dP/dH (t t, c) of c points from the `first` on, a row of P after another."""
+    """Find V0 dP/dH (t t, c) of c points from `first` on, a row of P after another."""
     points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
     lanes = lanes_with((), laws, points.mass)
     count = end - first
@@ -220,12 +217,12 @@ def keep_stress(kin, points, laws, stress):
 
 
 # --- at the nodes -----------------------------------------------------------------------------
-# A node sums the contributions of its points in order: threads divide the nodes.
+# A node sums over its points in order: threads divide the nodes.
 
 
 @kernel
 def list_points(seen):
-    """List for each node who sees it (`Seen.starts` and `Seen.entries`)."""
+    """List the points that see each node (`Seen.starts` and `Seen.entries`)."""
     starts, entries = seen.starts, seen.entries
     m, count, width = starts.size - 1, seen.nodes.shape[0], seen.nodes.shape[1]
     for p in range(count):
@@ -259,7 +256,7 @@ def spread(seen, places):
 
 @by_threads
 def mark_pairs(seen, pairs, part):
-    """Mark the pairs of nodes that there are, by 0 in `Pairs.rank`."""
+    """Mark existing pairs of nodes by 0 in `Pairs.rank`."""
     seen, pairs = at_hand(seen), at_hand(pairs)
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -271,7 +268,7 @@ def mark_pairs(seen, pairs, part):
 
 @by_threads
 def add_forces(kin, seen, stress, f, part):
-    """Add what stresses (t, n) make of forces (m, d): V0 P grad N."""
+    """Add the forces of stresses (t, n) to nodes (m, d): V0 P grad N."""
     seen = at_hand(seen)
     m, width = f.shape[0], seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -284,7 +281,7 @@ def add_forces(kin, seen, stress, f, part):
 
 
 def along(kin, row):
-    """Find the direction that a row of a tensor acts along: around an axis that is the radius."""
+    """Return the direction that a row of a tensor acts along: of the hoop row, the radius."""
     return row if row < kin.dimension else 0
 
 
@@ -303,7 +300,7 @@ def by_gradient(kin, h, C):
 
 
 def by_displacement(kin, D, g):
-    """Return df/du (d d) by the move of a node with gradient g, from df/dH (d t) of another."""
+    """Return df/du (d d) by a node with gradient g, from df/dH (d t) of another."""
     d, places = kin.dimension, kin.Tensor.places
     t = len(places)
     return tuple(
@@ -318,9 +315,9 @@ def by_displacement(kin, D, g):
 
 @by_threads
 def add_stiffness(kin, seen, tangent, first, end, done, pairs, K, part):
-    """Add derivatives of the forces of points from the `first` to the `end` to blocks K (b, d d).
+    """Add derivatives of the forces of points from `first` to `end` to blocks K (b, d d).
 
-    `done` (m,) are how many entries of each node were taken before, and are now.
+    `done` (m,) counts the entries of each node so far.
     """
     seen, pairs = at_hand(seen), at_hand(pairs)
     t = kin.tensor_size

@@ -4,15 +4,15 @@ With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k direction
 
     r_p = sum_i N_ip R_i,    R_i = sum_q N_iq V_q J_q / sum_q N_iq V_q.
 
-Of the energy e(A, r) of a point P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, with the
+The energy e(A, r) of a point has P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, with the
 mean p of the stresses tau along these directions. Nodal forces are the derivatives by
-displacements: P grad N, and V J A^-T grad N times the average of q paired with the average of r.
-Their derivatives, with S = dR/du,
+displacements: P grad N, and V J A^-T grad N times the average of q. With S = dR/du, their
+derivatives
 
-    K + X^T S + S^T Y + S^T Z S,
+    K + X^T S + S^T Y + S^T Z S
 
-are sums over each point, and products of matrices of the nodes that it sees: X of dP/dr, Y of dq/dA
-and Z of dq/dr.
+are sums over points, and products of matrices of their nodes: X of dP/dr, Y of dq/dA and Z of
+dq/dr.
 """
 
 from typing import Any, NamedTuple
@@ -51,7 +51,6 @@ class Averages(NamedTuple):
 
 
 def nothing_averaged(kin: Any, block: Block) -> Averages:
-    """Make the arrays of the points of a block."""
     n, t = block.points.mass.size, kin.tensor_size
     return Averages(
         *(rows_of_points((k, n), np.float64) for k in (1, 1, t, 1, 1, 1, t * t, t, t, 1))
@@ -77,7 +76,7 @@ def grow(kin, points, laws, response, averages, part):
 
 
 def averaged_stress(law, kin, state, H, ratio, dt):
-    """Return P and q per reference volume, after the increment H and a ratio of volumes."""
+    """Return P and q per reference volume, after an increment H with averaged volume ratio."""
     A = I + H
     dl = scaled_increment(Updated(), kin, H, (), ratio / det(A))
     tau = kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
@@ -130,7 +129,7 @@ def keep_averaged_stress(kin, points, laws, response, averages):
 
 @by_threads
 def bring_mean(kin, response, averages, part):
-    """Add to P and its derivatives what the average of q makes of them."""
+    """Add the terms of the average of q to P and its derivatives."""
     response, averages = at_hand(response), at_hand(averages)
     count = averages.mean.shape[1]
     for p in range(points_of(count, part), points_of(count, part + 1)):
@@ -158,7 +157,7 @@ def sum_at_nodes(seen, values, sums, part):
 
 @by_threads
 def average(seen, nodes, values, part):
-    """Find the average (1, n) that points have of the values of nodes (m,)."""
+    """Find the average (1, n) at points of the values of nodes (m,)."""
     seen = at_hand(seen)
     count = seen.nodes.shape[0]
     for p in range(points_of(count, part), points_of(count, part + 1)):

@@ -1,7 +1,4 @@
-"""The number of points that a visit takes at once, and the order in which it goes through them.
-
-One by one, or in lanes: four or eight, where all parts of the visit know them.
-"""
+"""The number of points that a visit processes at once: one, or four or eight in lanes."""
 
 from typing import Any, NamedTuple
 
@@ -15,15 +12,15 @@ from karamelo_py.kernels.equations.strain import Strain
 
 
 class OneByOne(NamedTuple):
-    """The points are visited one by one."""
+    """Points one by one."""
 
     width = 1
 
 
 def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose `OneByOne`, `FourLanes` or `EightLanes` for a loop with these parts over points.
+    """Choose `OneByOne`, `FourLanes` or `EightLanes` for a loop over points with these parts.
 
-    Interpreted, and where a part or a law does not know lanes, it is one by one.
+    One by one if interpreted, or if a part or law does not work in lanes.
     """
     return OneByOne()
 
@@ -37,33 +34,32 @@ def _lanes_with(parts, laws, mass):
 
 
 def points_from(lanes: Tag, q: int, end: int) -> Index:
-    """Return the point `q`, or the points in lanes from there on, before `end`."""
+    """Return point `q`, or the points in lanes from there on, before `end`."""
     if isinstance(lanes, OneByOne):
         return index(q)
     return group(lanes, q, min(lanes.width, end - q))
 
 
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
-    """Choose three loops over a stretch of points: gather, update, scatter; else one for all.
+    """Choose three loops over a stretch of points (gather, update, scatter) instead of one.
 
-    Three short loops are faster than a long one if there is much to update: processors cache
-    some thousand instructions at hand, and a law alone may have as many. That is so in lanes, of
-    visits that do nothing but strain. Where points move stretches cost more than they bring: there
-    is little to update, and stencils are found twice.
+    For visits in lanes that only strain: processors cache some thousand instructions, and a law
+    alone may have as many. Where points move, there is little to update, and finding stencils twice
+    costs more than it gains.
     """
     strains = [isinstance(task, Strain) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Choose the lanes of the particle update: with doubles, twice the lanes of the gather.
+    """Choose the lanes of the update: for doubles in stretches, twice as many as in the gather.
 
-    Chains of operations that wait for each other serve eight points in the time of four. To gather
-    and to scatter, four are faster.
+    Chains of dependent operations take the same time for eight points as for four. Gather and
+    scatter are faster with four.
     """
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 
 def zero_of(lanes: Tag, like: Number) -> Number:
-    """Return 0 as a number of a visit: of the type of `like`, or of lanes of it."""
+    """Return 0 in the number type of a visit: `like`, or lanes of it."""
     return like - like if isinstance(lanes, OneByOne) else spread(lanes, like - like)

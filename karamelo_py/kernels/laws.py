@@ -1,6 +1,6 @@
-"""Laws of materials as a run needs them: in its precision, and in tables.
+"""Laws in the precision of a run, and in tables.
 
-A law is a NamedTuple of numbers, rows of numbers, or parts that are NamedTuples of the same
+A law is a NamedTuple of numbers, rows of numbers, or such NamedTuples
 (:mod:`karamelo_py.points.laws`).
 """
 
@@ -13,7 +13,7 @@ from karamelo_py.points.laws.parameters import Numbers
 
 
 def law_in(law: Any, real: type) -> Any:
-    """Return the law with its numbers in the type `real`."""
+    """Return the law with numbers of type `real`."""
     return type(law)(*(_in(p, real) for p in law))
 
 
@@ -24,10 +24,7 @@ def _in(value: Any, real: type) -> Any:
 
 
 def law_table(laws: Sequence[Any], real: type) -> Any:
-    """Gather `laws` of one kind in a NamedTuple with an array (m,) for each number, m their count.
-
-    Rows of numbers become arrays (m, longest).
-    """
+    """Gather `laws` of one kind in a NamedTuple of arrays (m,); rows of numbers (m, longest)."""
     return type(laws[0])(*(_table(column, real) for column in zip(*laws, strict=True)))
 
 
@@ -41,10 +38,7 @@ def _table(column: Sequence, real: type) -> Any:
 
 
 def law_on(law: Any, h: float, T0: float | None) -> Any:
-    """Tell the law what it has to know of a solid: cell size `h`, initial temperature `T0`.
-
-    Laws and parts that need them have fields ``cell_size`` and ``initial_temperature``.
-    """
+    """Set the fields ``cell_size`` and ``initial_temperature`` of a law and its parts."""
     known = {"cell_size": h, "initial_temperature": T0}
     return type(law)(
         *(
@@ -59,5 +53,5 @@ def law_on(law: Any, h: float, T0: float | None) -> Any:
 
 
 def elastic_law(law: Any) -> Any:
-    """Return the law that makes the stress, of one that adds a temperature to it."""
+    """Return the law of the stress, of one that adds a temperature."""
     return getattr(law, "elastic", law)

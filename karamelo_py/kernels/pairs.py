@@ -1,7 +1,7 @@
-"""Pairs of points of two bodies that touch: found with linked cells, and what they do.
+"""Pairs of touching points of two bodies, found with linked cells, and their forces.
 
-Forces are summed in the order of the points' ids by one thread: they do not depend on threads nor
-on how the points are sorted. It takes double precision throughout.
+One thread sums forces in the order of the points' ids: they are independent of threads and of the
+sorting of points. In double precision.
 """
 
 from math import inf, sqrt
@@ -34,16 +34,15 @@ class Cells(NamedTuple):
     """Scratch of the search."""
 
     start: np.ndarray  # (c + 1,) int64: room for c cells
-    cell: np.ndarray  # (n,) int64: the cell of each point, or -1 where nothing can touch it
+    cell: np.ndarray  # (n,) int64: the cell of each point, or -1 if nothing can touch it
     order: np.ndarray  # (n,) int64: points of the second body by cell
     corner: np.ndarray  # (3,) float64: lower corner of the cells
-    length: np.ndarray  # (3,) float64: lengths of the region that they cover
+    length: np.ndarray  # (3,) float64: lengths of their region
     count: np.ndarray  # (3,) int64: cells along each direction
-    contact: np.ndarray  # (7,) what touches a point
+    contact: np.ndarray  # (7,) of a point, see `_touch`
 
 
 def cells_for(points: int) -> Cells:
-    """Make scratch for the search among this number of points."""
     return Cells(
         start=np.zeros(2 * points + 65, np.int64), cell=np.zeros(points, np.int64),
         order=np.zeros(points, np.int64), corner=np.zeros(3), length=np.zeros(3),
@@ -53,7 +52,7 @@ def cells_for(points: int) -> Cells:
 
 @noinline
 def _body(id, begin1, end1, begin2, end2):
-    """Return the body of the point with an id, 0 or 1; -1 where it is of neither."""
+    """Return the body of the point with an id, 0 or 1; -1 for neither."""
     if begin1 <= id < end1:
         return 0
     return 1 if begin2 <= id < end2 else -1
@@ -67,9 +66,9 @@ def _radius(kin, x, points, laws, p):
 
 @kernel
 def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
-    """Let the extents of two bodies take in the points of a block.
+    """Extend the extents of two bodies by the points of a block.
 
-    Of each body `extents` (2, 7) holds the largest of -x, -y, -z, x, y, z and of the radii.
+    `extents` (2, 7): for each body the largest of -x, -y, -z, x, y, z and of the radii.
     """
     points, laws = at_hand(points), at_hand(laws)
     for p in range(points.id.size):
@@ -110,7 +109,7 @@ def collect(kin, x, points, laws, rows, found):
 
 @noinline
 def _range(x, begin, end, k):
-    """Find the least and largest coordinate k of some points."""
+    """Return the least and largest coordinate k of some points."""
     lo, hi = inf, -inf
     for i in range(begin, end):
         lo = min(lo, x[i, k])
@@ -128,9 +127,9 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Lay cells over all places where the bodies may touch; return their width, 0 without any.
+    """Cover the region where the bodies may touch by cells; return their width, 0 if none.
 
-    They are as wide as two points that touch can be apart, or wider where there is no room.
+    As wide as touching points can be apart, or wider if there are too few cells.
     """
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
@@ -140,7 +139,7 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # The length, for now; so written, NaN means that there are none.
+        # In this form, NaN means that there are none.
         length = min(hi1, hi2) + width - cells.corner[k]
         if not 0 <= length < inf:
             return 0.0
@@ -178,7 +177,7 @@ def _find_cells(d, bodies, cells, width):
             cells.start[number + 1] += 1
     for c in range(used):
         cells.start[c + 1] += cells.start[c]
-    # start[c] moves on to the end of cell c, which is where cell c + 1 begins.
+    # start[c] moves to the end of cell c, where cell c + 1 begins.
     for j in range(n, m):
         c = cells.cell[j]
         if c >= 0:
@@ -188,7 +187,7 @@ def _find_cells(d, bodies, cells, width):
 
 @noinline
 def _push_between(law, kin, bodies, reach, dt, kick, i, j):
-    """Return the force across the surface on point `i` from point `j`, 0 if they do not touch."""
+    """Return the normal force on point `i` from point `j`, 0 if they do not touch."""
     x, none = bodies.x, zero_vector(kin, 0.0)
     dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)
     squared, near = 0.0, True
@@ -214,10 +213,10 @@ def _add(kin, bodies, i, j, force, total):
 
 @noinline
 def _touch(law, kin, bodies, reach, dt, kick, i, j, total, contact):
-    """Add the force across the surface between two points, if they touch; tell whether they do.
+    """Add the normal force between two points, if they touch; return 1 if so, else 0.
 
-    `contact` takes up what friction on point `i` asks for: the load, the force across the surface,
-    the stiffness of each partner times its velocity along the surface.
+    `contact` sums, for the friction on point `i`: the load, the normal force, and the stiffness of
+    each partner times its tangential velocity.
     """
     force, d = _push_between(law, kin, bodies, reach, dt, kick, i, j), kin.dimension
     square = force.squared()
@@ -243,7 +242,7 @@ def _rub(law, kin, bodies, step, dt, i, contact):
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
-    slid = step if grip[i, d] > 0 else 0.0  # the way so far: none where it did not touch
+    slid = step if grip[i, d] > 0 else 0.0  # 0 if it did not touch before
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
     force, hold, mean, unused = rub(
         law.friction, hold, contact[0], grip[i, d], grip[i, d + 1], dt * slide
@@ -267,11 +266,11 @@ def _pass_on(law, kin, bodies, reach, dt, kick, i, j, total, contact):
 
 @kernel
 def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
-    """Add the forces of all pairs that touch; returns their number.
+    """Add the forces of all touching pairs; return their number.
 
-    Two points touch when they are closer than the sum of their radii, and closer than `reach` in
-    every direction. `total` (3,) takes the force on the first body. Points have moved
-    for the time `step`; `dt` and `kick` set the stiffness.
+    Two points touch if they are closer than the sum of their radii, and closer than `reach` in
+    every direction. `total` (3,) gets the force on the first body. Points have moved for the time
+    `step`; `dt` and `kick` set the stiffness.
     """
     bodies, cells = at_hand(bodies), at_hand(cells)
     d = kin.dimension
@@ -292,14 +291,14 @@ def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
         contact[:] = 0.0
         for turn in range(2 if rubs else 1):
             if turn == 1:
-                if not contact[0] > 0:  # a point that bounces forgets by degrees
+                if not contact[0] > 0:  # a bouncing point forgets gradually
                     for k in range(d + 2):
                         bodies.grip[i, k] *= 1 - NEW
                     break
                 _rub(law, kin, bodies, step, dt, i, contact)
             for a in range(max(cx - 1, 0), min(cx + 2, nx)):
                 for b in range(max(cy - 1, 0), min(cy + 2, ny)):
-                    # Cells along the last direction follow each other, and so do their points.
+                    # Cells along the last direction are adjacent, and so are their points.
                     first = (a * ny + b) * nz + max(cz - 1, 0)
                     last = (a * ny + b) * nz + min(cz + 1, nz - 1)
                     begin = cells.start[first - 1] if first > 0 else 0

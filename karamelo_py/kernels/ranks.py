@@ -1,7 +1,6 @@
-"""A scene on several processes: where the kernels of one call the others.
+"""A scene on several processes: where kernels of one call the others.
 
-They call a function of Python by its address. Whatever it gets from the other processes, it leaves
-in the arrays that the kernels know.
+They call a Python function by address. It leaves what it receives in the arrays of the kernels.
 """
 
 from typing import NamedTuple
@@ -23,8 +22,8 @@ _call = caller_of(CALL)
 class Linked(NamedTuple):
     """This process has some tiles of the scene."""
 
-    address: int  # of the function ``(what, a, b) -> number``
-    foreign: np.ndarray  # (N,) uint8: 1 where another process adds up what a node gives
+    address: int  # of ``(what, a, b) -> number``
+    foreign: np.ndarray  # (N,) uint8: 1 if another process counts the terms of a node
 
 
 @kernel

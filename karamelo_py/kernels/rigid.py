@@ -1,8 +1,7 @@
 """Rigid bodies on a common grid: nodes near them take their velocity.
 
-Rigid points scatter mass and momentum to separate sums (`RigidSums`), so that the nodal sums belong
-to the other solids alone, whatever the density of a rigid body. A node with rigid points takes
-their velocity; the force needed for that is the force on the other solids.
+Rigid points scatter to separate sums (`RigidSums`): the nodal sums belong to other solids, whatever
+the density of a rigid body. The force needed for its velocity acts on these.
 """
 
 from typing import NamedTuple
@@ -35,12 +34,10 @@ class RigidBodies(NamedTuple):
 
 @noinline
 def _impose(kin, nodes, rigid, dt, control, n):
-    """Set the velocity of a node with rigid points; the force for that is stored in `rigid`.
+    """Set the velocity of a node with rigid points; store the force for that in `rigid`.
 
-    Its work on the other points is as for a prescribed velocity.
-
-    The change v* - v of the node includes that force: otherwise FLIP points never acquire the
-    velocity of the body that they touch.
+    Its work on other points is as for a prescribed velocity. The change v* - v includes that force:
+    else FLIP points never acquire the velocity of the body.
     """
     d = kin.dimension
     if not rigid[n, MASS] > 0:
@@ -53,7 +50,7 @@ def _impose(kin, nodes, rigid, dt, control, n):
         impulse = change = 0.0
         if mass > 0:
             impulse = velocity - nodes.update[n, k]
-            # From what the points brought: a fix may have held the node, and left no change.
+            # From the points' momentum: a fix may have held the node, and left no change.
             change = velocity - nodes.sums[n, of_momentum(kin) + k] / mass
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity
@@ -63,14 +60,13 @@ def _impose(kin, nodes, rigid, dt, control, n):
 
 
 def _impose_on_strain(kin, nodes, rigid, n):
-    """Do the same with the velocity that deforms the points."""
     if rigid[n, MASS] > 0:
         for k in range(kin.dimension):
             nodes.velocity[n, k] = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
 
 
 def _add_forces(s, block, p):
-    """Add the force on a rigid point, and its torque about the origin, to its solid's."""
+    """Add the force on a rigid point, and its torque about the origin."""
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
     grid = record(s.grids, points.grid[p])

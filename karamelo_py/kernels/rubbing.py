@@ -1,4 +1,4 @@
-"""Friction of points on tools, one after another. It takes double precision throughout."""
+"""Friction of points on tools, one by one, in double precision."""
 
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.kernels.arrays import vector_at

@@ -1,4 +1,4 @@
-"""Sorting the points by tile, and how far their domains reach."""
+"""Sorting points by tile, and the reach of their domains."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from karamelo_py.points.grid import Grid, cells_along, in_cells
 
 
 class TileGrid(NamedTuple):
-    """Division of g grids into T tiles."""
+    """Tiles of g grids."""
 
     size: np.ndarray  # (d,) cells of a tile
     count: np.ndarray  # (g, d) number of tiles
@@ -24,39 +24,39 @@ class TileGrid(NamedTuple):
 
 
 class Neighbourhood(NamedTuple):
-    """Neighbourhood of a point: the nodes that it may see before it has gone `reach` cells."""
+    """Nodes that a point may see before it has moved `reach` cells."""
 
     top: np.ndarray  # (g, d) the last node of each grid
     per_cell: int
-    beyond: int  # nodes seen beyond the nodes of a cell
-    least: int  # points at a wall see as many nodes as others: all up to this one
+    beyond: int  # nodes seen beyond the cell's
+    least: int  # points at a wall see all nodes up to this one, as many as others
     reach: float
-    offset: float  # of the first node that a point sees now, see points.basis.first_node
+    offset: float  # of the first node seen now, see points.basis.first_node
 
 
 class SortedOrder(NamedTuple):
-    """Order and boxes of n points that threads sort, each of which has a part of them."""
+    """Order and boxes of n points, sorted by threads in parts."""
 
     width: int  # of groups of points
-    ends: np.ndarray  # (parts, T) the last row takes where the points of each tile end
-    share: np.ndarray  # (parts + 1,) output: the first tile of each part of as many points
-    boxes: np.ndarray  # (2, T, d) takes the first and last nodes that points of each tile may see
+    ends: np.ndarray  # (parts, T); the last row: where the points of each tile end
+    share: np.ndarray  # (parts + 1,) first tile of each part with equally many points
+    boxes: np.ndarray  # (2, T, d) first and last nodes that points of each tile may see
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
-    order: np.ndarray  # (n,) takes the numbers that the points had
-    tile: np.ndarray  # (n,) takes the tile of each
+    order: np.ndarray  # (n,) previous numbers of the points
+    tile: np.ndarray  # (n,) tiles
     room: np.ndarray  # (2, n) scratch
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
     """Find the cell of a point from its distance to the corner of the grid, in cells.
 
-    Clamped, since a hook may have put a point anywhere: the next sweep finds it.
+    Clamped, since a hook may have moved a point anywhere; the next sweep detects that.
     """
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
 def _seen(grid, around, g, direction, at):
-    """Find the first and last node of grid `g` that a point at `at` cells may see that way."""
+    """Find the first and last node of grid `g` that a point at `at` cells may see along one."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]
@@ -67,9 +67,9 @@ def _seen(grid, around, g, direction, at):
 
 @by_threads
 def find_tiles(kin, grids, tiles, x, of, ends, tile, k):
-    """Find the tile of each point of the k-th part at `x` (w, n), on the grids `of` (n,).
+    """Find the tile of each point of the k-th part at `x` (w, n), on grids `of` (n,).
 
-    `tile` (n,) takes them, `ends` (parts, T) how many of these points each tile has.
+    Fills `tile` (n,), and `ends` (parts, T) with the number of these points in each tile.
     """
     grids, tiles = at_hand(grids), at_hand(tiles)
     parts = ends.shape[0]
@@ -107,7 +107,7 @@ def _begin_tiles(found):
 
 @shared_out
 def _order_parts(found, k):
-    """Put the k-th part of the points into their places; what begins at `ends` ends there then."""
+    """Place the k-th part of the points (counting sort); `ends` moves from begin to end."""
     ends, tile, order = found.ends, found.tile, found.order
     parts = ends.shape[0]
     for p in range(tile.size * k // parts, tile.size * (k + 1) // parts):
@@ -118,10 +118,10 @@ def _order_parts(found, k):
 
 @shared_out
 def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
-    """Sort the points of each tile of the k-th part by the first node that they see, then by id.
+    """Sort the points of each tile of the k-th part by their first node, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
-    first. The order follows from where the points are, not from where they were.
+    first. The order follows from the positions alone.
     """
     grids, tiles, found, around = at_hand(grids), at_hand(tiles), at_hand(found), at_hand(around)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
@@ -148,7 +148,7 @@ def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
             cell[0, q] = number
             cell[1, q] = p
             bins[k, 0, number] += 1
-        # Twice: whole groups, then the others. From here on, where a cell begins and where it ends.
+        # Cells of whole groups, then the others. From here on bins hold begin and end.
         place = begin
         for rest in (False, True):
             for c in range(cells):
@@ -160,7 +160,7 @@ def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
             c, p = cell[0, q], cell[1, q]
             at = bins[k, 1, c]
             bins[k, 1, c] += 1
-            # Nearly all were in this order before.
+            # Insertion sort: nearly all were in this order before.
             while at > bins[k, 0, c] and ids[order[at - 1]] > ids[p]:
                 order[at] = order[at - 1]
                 at -= 1
@@ -169,7 +169,7 @@ def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
 
 @by_threads
 def find_rows(kin, grids, around, x, tiling, parts, k):
-    """Find `Tiling.rows` of the k-th part of the tiles in 3D; their points are at `x` (w, n)."""
+    """Find `Tiling.rows` of the k-th part of the tiles in 3D, with points at `x` (w, n)."""
     grids, around, tiling = at_hand(grids), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]
@@ -214,10 +214,7 @@ def _put_all_rows(rows, first, last, room, parts, k):
 
 @noinline
 def _permute(mode, rows, order, room, parts):
-    """Put the items of rows into `order`, a few rows at a time.
-
-    A copy of a whole field would be the peak of the set-up.
-    """
+    """Permute rows by `order`, a few at a time, without a copy of a whole field."""
     first = 0
     while first < rows.shape[0]:
         last = min(first + room.shape[0], rows.shape[0]) - 1
@@ -243,16 +240,16 @@ _sort_by_team = by_team(_sort)
 def sort_points(mode, kin, grids, around, tiles, x, of, ids, found, rows):
     """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
 
-    They are on the grids `of` (n,) and have the numbers `ids` (n,). Of all that they carry, these
-    and the places among it, the addresses of its `rows` are given (:mod:`~.compiler.rows`): one
-    kernel serves all bases and laws in as many dimensions.
+    They are on the grids `of` (n,) and have the ids `ids` (n,). Of all their arrays the addresses
+    of `rows` are given (:func:`~karamelo_py.compiler.fields.pick_items`): one kernel serves all
+    bases and laws of a dimension.
     """
     _sort_by_team(mode, kin, grids, around, tiles, x, of, ids, found, rows)
 
 
 @kernel
 def widest(kin, basis, grids, x, of):
-    """Return the largest distance of a corner of a domain from its point, in cells."""
+    """Return the largest distance of a domain corner from its point, in cells."""
     grids = at_hand(grids)
     far = 0.0
     for p in range(x.shape[1]):

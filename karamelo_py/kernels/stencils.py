@@ -1,6 +1,6 @@
 """Gather from the nodes of a stencil and scatter to them: node by node, or all at once.
 
-All at once go sums along the arms of a stencil, what is affine, and the corners of domains.
+At once: moments along the arms of a stencil, affine sums, corners of domains.
 """
 
 from karamelo_py.compiler.compile import all_lanes, point_function, prefetch_records, real
@@ -21,8 +21,8 @@ from karamelo_py.points.kinematics import from_columns
 
 # --- sums that are affine around a point: mass, momentum, force of MLS ------------------------
 #
-# In lanes they are brought into the order of the nodes' records once per point, not once per node:
-# half of the work of a scatter in 2D, two thirds in 3D.
+# In lanes they are arranged like the nodes' records once per point, not once per node: half of the
+# work of a scatter in 2D, two thirds in 3D.
 
 
 def _beside(a, b):
@@ -31,7 +31,7 @@ def _beside(a, b):
 
 
 def joined(lanes, kin, parts):
-    """Join momentum and force as one part, where both grow and a register takes both."""
+    """Join momentum and force as one part, if both have increments and a register holds both."""
     if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, a, to_a = parts[0]
@@ -44,7 +44,6 @@ def joined(lanes, kin, parts):
 
 
 def give_affine(lanes, w, stencil, parts):
-    """Give the nodes of a stencil what is affine."""
     seen = PointView(w, stencil, (), ()).nodes
     nodes, weights = tuple([node.i for node in seen]), tuple([node.N for node in seen])
     for array, first, value, growths in joined(lanes, w.kin, parts):
@@ -59,7 +58,7 @@ def gathered_by_arms(w):
 
 @point_function(otherwise=True)
 def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
-    """Return the total of a gather over all nodes of a stencil; () where that goes node by node."""
+    """Return the total over all nodes of a stencil; () to gather node by node."""
     return ()
 
 
@@ -70,7 +69,7 @@ def _gathered_at_once_move(task, w, stencil, total):
         return ()
     found = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
     # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
-    # planes, as the weights are products.
+    # planes, as weights are products.
     sums = tuple([(v,) for v, _ in found])
     changes = tuple([dv for _, dv in found])
     for line in reversed(stencil.lines):
@@ -86,7 +85,7 @@ def _gathered_at_once_move(task, w, stencil, total):
 
 
 def _tails(weights, vectors):
-    """Sum weights times vectors: of the last one, of the last two, ... of all."""
+    """Return suffix sums of weights times vectors: of the last one, the last two, ... all."""
     last = len(weights) - 1
     sums = (weights[last] * vectors[last],)
     for k in range(last - 1, -1, -1):
@@ -95,30 +94,31 @@ def _tails(weights, vectors):
 
 
 def _with_moment(weights, row):
-    """Of the sums of the nodes of a row: the sum of the first, and k times that; all the others."""
+    """Return sum_k w_k v_k and sum_k k w_k v_k of a row (Horner: the sum of suffix sums).
+
+    `row` (nodes, vectors): the moment is of the first vectors; of the others, only the sum.
+    """
     first, *others = zip(*row[: len(weights)], strict=True)
     *tails, total = _tails(weights, first)
     return total, sum(tails[1:], tails[0]), *[_tails(weights, other)[-1] for other in others]
 
 
 def affine_parts(quantities, w, stencil, loads):
-    """Return the affine parts of all quantities."""
     pairs = zip(quantities, loads, strict=True)
     return tuple([eq.affine_part(quantity, w, stencil, load) for quantity, load in pairs])
 
 
 # --- corners of domains, used as nodes -------------------------------------------------------
 #
-# The functions of CPDI are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What takes the weight
-# or the gradient of a node once, as a factor, is therefore done with the few corners: a corner
-# interpolates from the nodes around it, and distributes contributions to them.
+# CPDI functions are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What is linear in the weight
+# or gradient of a node is done with the few corners: a corner interpolates from the nodes around
+# it, and distributes contributions to them.
 
 
 def all_by_corners(parts, w):
-    """Tell whether all tasks or quantities take the weight or gradient of a node as a factor.
+    """Return True if all tasks or quantities are linear in the weight or gradient of a node.
 
-    Those that do say so by `not_at_corners`: with what in the visit they do not. Moments are of the
-    velocities and places of nodes.
+    `not_at_corners` lists exceptions. Moments are of velocities and positions of nodes.
     """
     asked = transfers.add_moment, transfers.nodal_momentum, transfers.gradient_weight
     there = {
@@ -131,23 +131,21 @@ def all_by_corners(parts, w):
 
 
 def _seeing(basis, w):
-    """Return the work with the basis replaced."""
     items = zip(w._fields, w, strict=True)
     return type(w)(*[basis if name == "basis" else item for name, item in items])
 
 
 def in_block(w):
-    """Return the work of points that see blocks of nodes."""
+    """Return the work with points that see blocks of nodes."""
     return _seeing(InBlock(w.basis), w)
 
 
 def shows_corners(tasks, w):
-    """Return True if the visit needs the velocities of the corners themselves."""
+    """Return True if the visit needs the velocities of corners."""
     return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
 
 
 def gather_corners(tasks, w, stencil, totals):
-    """Add up the totals of the tasks over all corners."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
         totals = eq.gathered_all(tasks, at, stencil, c, totals)
@@ -155,7 +153,6 @@ def gather_corners(tasks, w, stencil, totals):
 
 
 def scatter_corners(quantities, w, stencil, loads):
-    """Give all corners their parts."""
     at = _seeing(AtCorners(w.basis), w)
     for c in range(support(at.basis, w.kin)):
         eq.scattered_all(quantities, loads, node_of(at, stencil, c))
@@ -173,13 +170,13 @@ def _scatter(quantities, w, stencil, loads):
 
 
 def _even(w, stencil, asked):
-    """Return True if D^-1 is the same for all points in lanes, or nothing depends on it."""
+    """Return True if D^-1 is the same for all lanes, or not needed."""
     return all_lanes(product.evenly(w.basis, w.grid, stencil)) if asked else True
 
 
 @point_function(otherwise=True)
 def gather_nodes(stencil: tuple, lanes: Tag, tasks: tuple, w: Work, totals: tuple) -> tuple:
-    """Add the parts of all nodes of the stencil to the totals of the tasks."""
+    """Add the contributions of all nodes of the stencil to the totals of the tasks."""
     return _gather(tasks, w, stencil, totals)
 
 
@@ -189,7 +186,7 @@ def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
         return _gather(tasks, w, stencil, totals)
     if isinstance(lanes, OneByOne):
         return _gather_parts(tasks, w, stencil, totals)
-    # Sorted points mostly see the same nodes: their records are loaded once for all lanes.
+    # Sorted points mostly see the same nodes: records are loaded once for all lanes.
     if product.sees_same_nodes(stencil):
         return _gather_parts(tasks, w, product.with_one_node(stencil), totals)
     _ask_ahead(tasks, w, stencil)
@@ -211,7 +208,7 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
 
 
 def _ask_ahead(tags, w, stencil):
-    """Prefetch node records after the last of a stencil; the others were used before."""
+    """Prefetch node records after the last of a stencil; others were used before."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
     for array in [type(tag).records for tag in tags]:
         if array:
@@ -219,7 +216,7 @@ def _ask_ahead(tags, w, stencil):
 
 
 def _gather_parts(tasks, w, stencil, totals):
-    """Gather affine parts from all nodes at once, the rest node by node."""
+    """Gather what can be from all nodes at once, the rest node by node."""
     pairs = zip(tasks, totals, strict=True)
     found = [gathered_at_once(task, w, stencil, total) for task, total in pairs]
     rest = [k for k, total in enumerate(found) if not len(total)]
@@ -280,5 +277,5 @@ def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
 
 
 def gathered_by(lanes: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
-    """Gather the totals of the tasks over the nodes of a stencil."""
+    """Gather the totals of the tasks over a stencil."""
     return gather_nodes(stencil, lanes, tasks, w, eq.empty_all(tasks, w, x))

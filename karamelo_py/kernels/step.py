@@ -1,10 +1,11 @@
-"""A step from the table of its scheme, and the loop over steps.
+"""The rows of a step, compiled or in plain Python, and the loop over steps.
 
-The same source serves two drivers: compiled, where many steps run in one call, and plain Python,
-where hooks that are written in Python are called between the rows.
+Many steps run in one compiled call. Where hooks are written in Python, the same source runs
+interpreted and calls them between rows.
 """
 
 import functools
+from collections.abc import Iterable
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -16,8 +17,9 @@ from karamelo_py.compiler.threads import by_team
 from karamelo_py.kernels import clock as clocks
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
-from karamelo_py.kernels.hook_loop import at_nodes, at_points
+from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
 from karamelo_py.kernels.sweep import sweep, sweep_nodes
+from karamelo_py.kernels.table import Processor, take
 from karamelo_py.kernels.views import deformation_of, state_at
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
@@ -25,68 +27,120 @@ from karamelo_py.points.laws import wave_speed_squared
 
 
 class Fused(NamedTuple):
-    """As few visits of the points as the scheme allows; no hooks between them on points."""
+    """As few visits of the points as possible; no hooks on points between them."""
 
 
 class Staged(NamedTuple):
-    """One visit for each stage, so that hooks on points can act in between."""
+    """One visit per stage; hooks on points act in between."""
 
 
 def rows_of(scheme: Any, visits: Any) -> list[Any]:
-    """List the rows of a step of `scheme`."""
+    """List the rows of a step."""
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
 def first_rows(scheme: Any, visits: Any) -> list[Any]:
-    """List the row that fused steps expect before them: the scatter of the last visit, alone."""
+    """List what precedes the first fused step: the scatter of its last visit."""
     if visits is not Fused:
         return []
     return [rows_of(scheme, Fused)[-1]._replace(gathers=False, only_if_more=False, moves=False)]
 
 
-def _take(row, s, mode, hooks, more):
-    """Take one row of the table; tell whether all points went well."""
-    if isinstance(row, table.AtPoints):
-        at_points(hooks, row.stage, row.then, s)
-    elif isinstance(row, table.AtNodes):
-        at_nodes(hooks, row.stage, row.target, s)
-    elif isinstance(row, table.ByFixes):
-        row.function(hooks, *row.arguments, s)
-    elif isinstance(row, table.NodeTask):
-        task = row.task(s) if callable(row.task) else row.task
-        here = row.at(s) if row.at else s
-        sweep_nodes(mode, task, here.kin, here.nodes, s.ranges, (row.length or clocks.kick)(s))
-    elif isinstance(row, table.EachNode):
-        row.loop(s)
-    elif isinstance(row, table.EachPoint):
-        for block in s.blocks:
-            if isinstance(block.laws, row.law):
-                row.loop(s, block)
-    elif isinstance(row, table.Once):
-        row.function(s)
-    elif isinstance(row, table.Repeated):
-        for k in range(row.count(s)):
-            _take_all(row.rows(k), s, mode, hooks, more)
-    elif isinstance(row, table.Check):
-        return clocks.check_moves(s, mode)
-    else:
-        return _visit(row, s, mode, more)
+def untaken(rows: Iterable[Any], backend: type) -> list[str]:
+    """Name the kinds of rows that a back end cannot take."""
+    # Others become these before they are taken.
+    combined = table.Gather, table.Scatter, table.SceneTask, table.Repeated
+    kinds = dict.fromkeys(type(row) for row in rows if not isinstance(row, combined))
+    return [kind.__name__ for kind in kinds if not take.defined(kind, backend)]
+
+
+class InStep(NamedTuple):
+    """Arguments of rows besides the setup."""
+
+    mode: Tag  # one thread, or several
+    hooks: Tag  # of the fixes
+    more: bool  # another step follows: a fused one leaves its sums on the nodes
+
+
+class StepKind(NamedTuple):
+    """Tags that select the code of a step."""
+
+    scheme: Tag
+    visits: Tag  # `Fused` or `Staged`
+    mode: Tag  # one thread, or several
+
+
+@take.on(table.AtPoints, Processor)
+def _at_points(row, s, step):
+    at_points(step.hooks, row.stage, row.then, s)
     return True
 
 
-def _visit(row, s, mode, more):
-    """Visit the points; tell whether all went well."""
+@take.on(table.AtNodes, Processor)
+def _at_nodes(row, s, step):
+    at_nodes(step.hooks, row.stage, row.target, s)
+    return True
+
+
+@take.on(table.WorkOfLoads, Processor)
+def _work_of_loads(row, s, step):
+    add_work(step.hooks, s)
+    return True
+
+
+@take.on(table.NodeTask, Processor)
+def _node_task(row, s, step):
+    task = row.task(s) if callable(row.task) else row.task
+    here = row.at(s) if row.at else s
+    sweep_nodes(step.mode, task, here, (row.length or clocks.kick)(s))
+    return True
+
+
+@take.on(table.EachNode, Processor)
+def _each_node(row, s, step):
+    row.loop(s)
+    return True
+
+
+@take.on(table.EachPoint, Processor)
+def _each_point(row, s, step):
+    for block in s.blocks:
+        if isinstance(block.laws, row.law):
+            row.loop(s, block)
+    return True
+
+
+@take.on(table.Once, Processor)
+def _once(row, s, step):
+    row.function(s)
+    return True
+
+
+@take.on(table.Repeated, Processor)
+def _repeated(row, s, step):
+    for k in range(row.count(s)):
+        _take_all(row.rows(k), s, step)
+    return True
+
+
+@take.on(table.Check, Processor)
+def _check(row, s, step):
+    return clocks.check_moves(s, step.mode)
+
+
+@take.on(table.Sweep, Processor)
+def _sweep(row, s, step):
     whole = clocks.last_step_size(s) if row.of_last_step else clocks.step_size(s)
     dt = whole if row.share == 1 else real(row.share, whole) * whole
-    scatters = more if row.only_if_more else row.scatters
+    scatters = step.more if row.only_if_more else row.scatters
     here = row.at(s) if row.at else s
-    sweep(here, mode, row.visit, dt, row.gathers, scatters, row.moves)
+    sweep(here, step.mode, row.visit, dt, row.gathers, scatters, row.moves)
     return clocks.all_well(s, row.reported) if row.reported else True
 
 
-def _take_all(rows, s, mode, hooks, more):
-    for row in table.plain(rows, s):  # noqa: SIM110  (no more rows after what went wrong)
-        if not _take(row, s, mode, hooks, more):
+def _take_all(rows, s, step):
+    for row in table.plain(rows, s):  # noqa: SIM110  (no more rows after a failed point)
+        if not take.find((type(row), Processor))(row, s, step):
             return False
     return True
 
@@ -95,34 +149,36 @@ _step_rows: Any = functools.cache(rows_of)  # interpreted
 _begin_rows: Any = functools.cache(first_rows)
 
 
-def step(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, more: bool) -> bool:
-    """Take a step of `scheme`. With `more`, a fused one leaves the next one's sums on the nodes.
+def step(kind: StepKind, s: Setup, hooks: Tag, more: bool) -> bool:
+    """Take a step; return whether no point failed.
 
-    Returns whether all points went well.
+    With `more` a fused step leaves the sums of the next one on the nodes.
     """
-    return _take_all(_step_rows(type(scheme), type(visits)), s, mode, hooks, more)
+    scheme, visits, mode = kind
+    return _take_all(_step_rows(type(scheme), type(visits)), s, InStep(mode, hooks, more))
 
 
 @implements(step, by_type=True)
-def _step(scheme, visits, mode, s, hooks, more):
-    rows = rows_of(scheme.instance_class, visits.instance_class)
-    return lambda scheme, visits, mode, s, hooks, more: _take_all(rows, s, mode, hooks, more)
+def _step(kind, s, hooks, more):
+    rows = rows_of(*(tag.instance_class for tag in kind.types[:2]))
+    return lambda kind, s, hooks, more: _take_all(rows, s, InStep(kind.mode, hooks, more))
 
 
-def begin(scheme: Tag, visits: Tag, mode: Tag, s: Setup) -> bool:
-    """Prepare the first of several steps; tell whether all points are on the grid."""
-    return _take_all(_begin_rows(type(scheme), type(visits)), s, mode, NoHooks(), True)
+def begin(kind: StepKind, s: Setup) -> bool:
+    """Prepare the first of several steps; return whether all points are on the grid."""
+    scheme, visits, mode = kind
+    return _take_all(_begin_rows(type(scheme), type(visits)), s, InStep(mode, NoHooks(), True))
 
 
 @implements(begin, by_type=True)
-def _begin(scheme, visits, mode, s):
-    rows = first_rows(scheme.instance_class, visits.instance_class)
-    return lambda scheme, visits, mode, s: _take_all(rows, s, mode, NoHooks(), True)
+def _begin(kind, s):
+    rows = first_rows(*(tag.instance_class for tag in kind.types[:2]))
+    return lambda kind, s: _take_all(rows, s, InStep(kind.mode, NoHooks(), True))
 
 
 def take_rows(rows: tuple, s: Setup, mode: Tag, hooks: Tag) -> bool:
-    """Take a part of a step from Python; returns whether all points went well."""
-    return _take_all(_alone(rows), s, mode, hooks, False)
+    """Take a part of a step from Python; return whether no point failed."""
+    return _take_all(_alone(rows), s, InStep(mode, hooks, False))
 
 
 _alone: Any = functools.cache(table.one_by_one)
@@ -133,26 +189,25 @@ PATIENCE = 50  # steps above the stable limit before a run is stopped
 SMALLEST = 1e-6  # fraction of the first stable step at which a run is stopped: it would never end
 
 
-def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
-    """Take up to `count` steps, as far as the end time; say why it stopped.
+def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
+    """Take up to `count` steps, to the end time at most; return why it stopped.
 
-    Returns DONE, STOPPED (a point went wrong), ABOVE_LIMIT (the step is above the stable limit),
-    SHRUNK (the stable step has become next to nothing), GAINED (spurious energy gain), HEATED
-    (temperatures that no source explains) or SORT: the points must be sorted before one can have
-    left the surroundings of its tile. When that is depends on the points only, never on where a run
-    is interrupted.
+    DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt next
+    to 0), GAINED (spurious energy), HEATED (temperatures that no source explains), or SORT: a point
+    may soon leave the nodes of its tile. SORT depends on the points only, not on where a run is
+    resumed.
     """
     values = s.control.values
     clock = s.control.clock[0]
-    if not begin(scheme, visits, mode, s):
+    if not begin(kind, s):
         return STOPPED
     for n in range(count):
         time = values[TIME] + values[DT]
         last = n + 1 == count or time >= clock.end_time
-        if not step(scheme, visits, mode, s, hooks, not last):
+        if not step(kind, s, hooks, not last):
             return STOPPED
         clocks.finish(s.control)
-        if not look(s, mode):
+        if not look(s, kind.mode):
             return GAINED
         if not look_at_heat(s):
             return HEATED
@@ -167,17 +222,13 @@ def run_steps(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: 
     return DONE
 
 
-def _led(mode, scheme, visits, s, hooks, count):
-    return run_steps(scheme, visits, mode, s, hooks, count)
-
-
-_by_team = by_team(_led)
+_by_team = by_team(lambda mode, kind, s, hooks, count: run_steps(kind, s, hooks, count))
 
 
 @kernel
-def advance(scheme: Tag, visits: Tag, mode: Tag, s: Setup, hooks: Tag, count: int) -> int:
-    """Call `run_steps`, by a team of threads where there are some."""
-    return _by_team(mode, scheme, visits, s, hooks, count)
+def advance(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
+    """Call `run_steps`, with a team of threads if there is one."""
+    return _by_team(kind.mode, kind, s, hooks, count)
 
 
 @kernel
@@ -197,7 +248,7 @@ def _fastest(frame, kin, points, laws, control):
 
 
 def measure(s: Setup) -> None:
-    """Measure the rate of the present state, for the first dt."""
+    """Store the rate of the present state in the clock, for the first dt."""
     s.control.clock[0].rate = 0.0
     for block in s.blocks:
         _fastest(s.frame, s.kin, block.points, block.laws, s.control)

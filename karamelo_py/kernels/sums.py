@@ -1,4 +1,4 @@
-"""Sums at nodes of what the points of all tiles gave, in one order for any number of threads."""
+"""Sums at nodes over the boxes of all tiles, in one order for any number of threads."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -14,12 +14,12 @@ from karamelo_py.kernels.equations import found
 
 
 def adds(quantity: NamedTuple) -> bool:
-    """Return True if a quantity adds to the values at the nodes."""
+    """Return True if a quantity adds to the values at nodes."""
     return type(quantity).adds  # type: ignore[attr-defined]
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """List the columns that take all the quantities; adjacent ones are one entry."""
+    """List the column ranges of the quantities; adjacent ones are joined."""
     ends: dict[tuple[Any, int], int] = {}  # the first column of each array that ends there
     for one in [one for quantity in quantities for one in type(quantity).gives]:
         array, first = one.into.array, one.into.first(kin)
@@ -28,7 +28,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[Any, int, bool]]:
-    """List each column that takes the quantities, of arrays that are present; those adding last."""
+    """List each column of the quantities, of arrays that are present; those that add last."""
     turns = sorted(quantities, key=adds)
     sums = [(one.into, adds(quantity)) for quantity in turns for one in type(quantity).gives]
     return [
@@ -40,7 +40,7 @@ def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[An
 
 
 def arrays_given(quantities: tuple, kin: Tag) -> int:
-    """Add up the kinds of arrays that take the quantities: 1 the sums, 2 velocities, 4 fields."""
+    """Sum the kinds of arrays of the quantities: 1 the sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
@@ -53,7 +53,7 @@ def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
 
 
 def _take_record(quantities, kin, nodes, n, buffers, m, keep):
-    """Move record `m` of the buffers to node `n`, adding or replacing; the record becomes zero."""
+    """Move record `m` of the buffers to node `n`, adding or replacing; zero it."""
     for name, first, end, add in _columns(quantities, kin):
         array = found(nodes, name)
         if array is not None:
@@ -62,7 +62,7 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
 
 
 def _clear_record(quantities, kin, nodes, n):
-    """Clear the columns of node `n` for the quantities, except those that add."""
+    """Clear the columns of node `n`, unless quantities add to them."""
     for name, first, end, add in _columns(quantities, kin):
         array = found(nodes, name)
         if array is not None and not add:

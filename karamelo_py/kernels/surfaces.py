@@ -1,11 +1,11 @@
 """Faces in trees of boxes: the distance of a position from the nearest, and if they enclose it.
 
-Faces are simplices: points in 1D, segments in 2D, triangles in 3D. They are the leaves of a binary
-tree of boxes. Node k has the children 2k and 2k + 1, so that a walk through the tree needs no
-stack. A position is enclosed if the faces wind around it: each face that a ray along the last axis
-crosses counts 1 or -1, by its side. Faces that have an edge in common find the same crossings, bit
-for bit, and whether an edge is reached at all is a comparison without rounding: no position is
-counted twice or left out. (Winding number: Sunday 2001; triangles: Ericson 2005, section 5.1.5.)
+Faces are simplices: points in 1D, segments in 2D, triangles in 3D; leaves of a binary tree of
+boxes. Node k has the children 2k and 2k + 1: a walk needs no stack. A position is enclosed if the
+faces wind around it: each face that a ray along the last axis crosses counts 1 or -1, by its side.
+Faces with a common edge find the same crossings bit for bit, and whether an edge is reached is a
+comparison without rounding: no position is counted twice or omitted. (Winding number: Sunday 2001;
+triangles: Ericson 2005, section 5.1.5.)
 """
 
 from math import sqrt
@@ -30,7 +30,7 @@ class Surface(NamedTuple):
     low: np.ndarray  # (2 l, d) corners of the boxes; the last l nodes are leaves
     high: np.ndarray
     faces: np.ndarray  # (m, d, d): face, corner, direction
-    odd: bool  # only an odd number of crossings encloses: the faces know no sides
+    odd: bool  # an odd number of crossings encloses: faces have no sides
 
 
 class Convex(NamedTuple):
@@ -48,7 +48,7 @@ def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surfac
     middle = faces.mean(axis=1)
     extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
     index = ((middle - middle.min(axis=0, initial=np.inf)) * (1023 / extent)).astype(np.int64)
-    code = np.zeros(count, np.int64)  # along a curve that stays near (Morton 1966)
+    code = np.zeros(count, np.int64)  # along a space-filling curve (Morton 1966)
     for bit in range(10):
         for k in range(d):
             code |= (index[:, k] >> bit & 1) << (d * bit + k)
@@ -80,13 +80,13 @@ def _corner(kin, surface, i, k):
 
 
 def _from_line(a, b, x):
-    """Square of the distance of `x` from a segment."""
+    """Squared distance of `x` from a segment."""
     way, local = b - a, x - a
     return (local - _share_along(way, local) * way).squared()
 
 
 def _share_along(way, local):
-    """Return how far along a segment, from 0 to 1, it is nearest to a place."""
+    """Return the fraction of a segment at its point nearest to a place."""
     return min(max(dot(way, local) / max(way.squared(), TINY), 0.0), 1.0)
 
 
@@ -97,7 +97,7 @@ def _cross(a, b):
 
 
 def _is_above(a, b, c, normal, size, x):
-    """Tell whether `x` is above or below a triangle."""
+    """Return True if `x` projects into a triangle."""
     above = size > TINY
     above = above and dot(_cross(b - a, x - a), normal) >= 0
     above = above and dot(_cross(c - b, x - b), normal) >= 0
@@ -106,7 +106,7 @@ def _is_above(a, b, c, normal, size, x):
 
 @point_function()
 def _squared(kin, surface, i, x):
-    """Square of the distance of `x` from face `i`."""
+    """Squared distance of `x` from face `i`."""
 
 
 @_squared.on(KINEMATICS[1])
@@ -132,7 +132,7 @@ def _from_triangle(kin, surface, i, x):
 
 @noinline
 def _from_box(kin, surface, k, x):
-    """Square of the distance of `x` from the box of node `k`."""
+    """Squared distance of `x` from the box of node `k`."""
     found = 0.0
     for c in range(kin.dimension):
         away = max(max(surface.low[k, c] - x[c], x[c] - surface.high[k, c]), 0.0)
@@ -153,7 +153,7 @@ def distance(kin, surface, x, reach):
     leaves = surface.low.shape[0] // 2
     best = reach * reach
     k = 1
-    while k < leaves:  # to a face that is near, so that the walk enters few boxes
+    while k < leaves:  # to a near face, so that the walk enters few boxes
         here, there = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
         if min(here, there) >= best:
             break
@@ -173,14 +173,14 @@ def distance(kin, surface, x, reach):
 
 
 def _on_line(a, b, x):
-    """Return the place on a segment that is nearest to `x`."""
+    """Return the place on a segment nearest to `x`."""
     way = b - a
     return a + _share_along(way, x - a) * way
 
 
 @point_function()
 def _place_on(kin, surface, i, x):
-    """Return the place on face `i` that is nearest to `x`."""
+    """Return the place on face `i` nearest to `x`."""
 
 
 @_place_on.on(KINEMATICS[1])
@@ -230,17 +230,17 @@ def nearest(kin, surface, x, reach):
 
 @noinline
 def _crossed(ax, ay, bx, by, x, y):
-    """Tell if a ray from (x, y) along x crosses an edge from a to b: 1 if that rises, -1, or 0."""
+    """Return 1 if a ray from (x, y) along x crosses a rising edge a b, -1 a falling one, else 0."""
     if (ay > y) == (by > y):
         return 0
-    if ay < by:  # both faces at an edge take it the same way
+    if ay < by:  # the same for both faces of an edge
         return 1 if x < ax + (y - ay) / (by - ay) * (bx - ax) else 0
     return -1 if x < bx + (y - by) / (ay - by) * (ax - bx) else 0
 
 
 @point_function()
 def _crossing(kin, surface, i, x):
-    """Tell if a ray from `x` along the last axis crosses face `i`: 1 or -1, by its side, or 0."""
+    """Return 1 or -1, by the side, if a ray from `x` along the last axis crosses face `i`; or 0."""
 
 
 @_crossing.on(KINEMATICS[1])
@@ -264,7 +264,7 @@ def _crossing_triangle(kin, surface, i, x):
         return 0
     normal = _cross(b - a, c - a)
     low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
-    # A triangle seen edge-on has any height between its ends: there the position is next to it.
+    # A triangle seen edge-on has any height between its ends: the position is next to it.
     height = low
     if normal[2] != 0:
         fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
@@ -274,7 +274,7 @@ def _crossing_triangle(kin, surface, i, x):
 
 @noinline
 def encloses(kin, surface, x):
-    """Tell whether the faces enclose `x`."""
+    """Return True if the faces enclose `x`."""
     leaves, count = surface.low.shape[0] // 2, surface.faces.shape[0]
     last = kin.dimension - 1
     found = 0
@@ -308,10 +308,7 @@ _depths = by_threads(_depths_of_some)
 
 
 def depths(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
-    """Return how deep positions (n, d) lie in what a surface encloses: (n,).
-
-    Below 0 outside; `reach` at most.
-    """
+    """Return depths (n,) of positions (n, d) in a surface, `reach` at most, below 0 outside."""
     return _of(_depths, surface, x, float(reach))
 
 
@@ -325,7 +322,7 @@ _distances = by_threads(_distances_of_some)
 
 
 def distances(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
-    """Return the distances of positions (n, d) from the nearest face, `reach` at most: (n,)."""
+    """Return distances (n,) of positions (n, d) from the nearest face, `reach` at most."""
     return _of(_distances, surface, x, float(reach))
 
 
@@ -340,7 +337,7 @@ def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
 
 
 class HalfSpace(NamedTuple):
-    """One side of a plane, however deep."""
+    """One side of a plane."""
 
     normal: np.ndarray  # (d,) into it
     offset: float  # its product with a place on the plane
@@ -359,19 +356,19 @@ class Common(NamedTuple):
 
 
 class Outside(NamedTuple):
-    """All outside of a shape."""
+    """The complement of a shape."""
 
     part: NamedTuple
 
 
 @point_function()
 def depth(shape, kin, x, reach):
-    """Return how deep `x` lies in a shape, below 0 outside: right as far as it is below `reach`."""
+    """Return the depth of `x` in a shape, below 0 outside; exact below `reach`."""
 
 
 @point_function(otherwise=True)
 def slopes(shape, kin, x, reach, within, step):
-    """Return how the depth changes from a step before `x`, at depth `within`, to a step after."""
+    """Return the differences of depth from a step before `x`, at depth `within`, to a step on."""
     return _slopes_across(shape, kin, x, reach, step)
 
 

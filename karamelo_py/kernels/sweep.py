@@ -1,8 +1,8 @@
-"""Sweeps: over the points, tile by tile, and over the nodes in use.
+"""Sweeps over the points, tile by tile, and over the nodes in use.
 
 The points of a tile scatter to a separate buffer: a dense box of the nodes that they may reach.
-Then each tile of nodes sums the boxes that reach it. Threads divide the tiles and need no atomics;
-sums are made in one order, whatever the number of threads.
+Then each tile of nodes sums the boxes that reach it. Threads divide tiles, without atomics; sums
+have one order, whatever the number of threads.
 """
 
 from math import inf
@@ -45,13 +45,13 @@ from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.transfers import in_step
 
-ROUNDING = 1e-3  # cells by which distances in cells may be rounded
-STRETCH = 64  # points: what they gather, and what they have, stays in the nearest cache
+ROUNDING = 1e-3  # rounding of distances, in cells
+STRETCH = 64  # points, whose totals and arrays fit in the nearest cache
 WHOLE = 1 << 40  # points, more than any tile has
 
 
 class Visit(NamedTuple):
-    """The work of a visit of the points: tags of its tasks, then of the quantities it scatters."""
+    """Tags of the tasks of a visit of points, then of the quantities it scatters."""
 
     tasks: tuple
     quantities: tuple
@@ -59,7 +59,7 @@ class Visit(NamedTuple):
 
 
 class Context(NamedTuple):
-    """The part of a `Setup` that a sweep over the points needs; its type selects the kernel."""
+    """The part of a `Setup` that a sweep needs; its type selects the kernel."""
 
     frame: Tag
     kin: Tag
@@ -68,28 +68,36 @@ class Context(NamedTuple):
     averaging: Tag
     grids: Grid
     nodes: Nodes
-    buffers: Nodes  # nodes that are given to
+    buffers: Nodes  # nodes to scatter to
     now: int
-    room: Number  # cells that points may still go before their tile's box does not hold them
-    stride: Number  # cells that they may go at all
+    room: Number  # cells that points may still move within their tile's box
+    stride: Number  # cells that they may move at all
     common: tuple  # (d,) velocity that speeds are measured from
-    then: int  # which of the two arrays of places takes the new ones
-    gathers: bool  # whether the tasks of the visit are done
-    scatters: bool  # whether its quantities are scattered
+    then: int  # index of the array of new places
+    gathers: bool  # whether tasks are done
+    scatters: bool  # whether quantities are scattered
     dt: Number
-    kick: Number  # how long forces act
+    kick: Number  # time that forces act
+
+
+class NodesInUse(NamedTuple):
+    """Nodes of a task; `ranges` as in `Setup`."""
+
+    kin: Tag
+    nodes: Nodes
+    ranges: np.ndarray
 
 
 class OldWeights(NamedTuple):
-    """The weights of the gather, of the place before the move."""
+    """Weights of the gather, at the place before the move."""
 
 
 class PresentWeights(NamedTuple):
-    """The weights of the place after the move."""
+    """Weights at the place after the move."""
 
 
 def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
-    """Return the arrays and tags of a visit to points of a block; `nodes` belong to `grid`."""
+    """Return the `Work` of a visit of a block; `nodes` belong to `grid`."""
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
         places, s.common, s.kick,
@@ -97,41 +105,37 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
 
 
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the scatter from the gather's; unchanged for reference positions."""
+    """Return the stencil of the scatter; in the total frame the gather's."""
     if isinstance(weights, OldWeights) or not w.frame.moves:
         return stencil
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
-    """Return True while points give to nodes of their tile's box.
+    """Return True while points scatter to nodes of their tile's box.
 
-    Points that left it are sorted before the next step, and give then what they would give now.
+    Points that left it are sorted before the next step, and scatter then.
     """
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
 def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
-    """Return the places of the weights of a sweep, and of the points before and after it.
-
-    `now` and `then` are rows of `Points.x`.
-    """
+    """Return the places of a sweep; `now` and `then` are indices of `Points.x`."""
     weighed: Any = points.x[now] if frame.moves else points.home
     return Places(weighed, points.x[now], points.x[then])
 
 
 def position_of(w: Work, p: Index) -> tuple:
-    """Return the position (d,) of a point, or of points in lanes, before the move."""
+    """Load a position (d,) before the move."""
     return load_vector(w.kin, w.places.x, p)
 
 
 def stencil_of(w: Work, p: Index) -> tuple:
-    """Return the stencil of a point, or of points in lanes, before the move."""
+    """Return the stencil before the move."""
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.where, p))
 
 
 def scatter_point(visit: Visit, lanes: Tag, pt: PointView, out: Work) -> None:
-    """Scatter the quantities of a point, or of points in lanes, to the nodes of `out`."""
     stencil = recompute_stencil(visit.weights, pt.w, pt.stencil, pt.p)
     scatter_nodes(stencil, lanes, visit.quantities, out, load_all(visit.quantities, pt))
 
@@ -212,16 +216,15 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
 
 @by_threads
 def visit_shares(visit: Visit, s: Context, block: Block, first: int, k: int) -> None:
-    """Visit the points of the tiles of part `first` + k, the work of one thread."""
+    """Visit the points of the tiles of part `first` + k."""
     share, order = block.tiling.share, block.tiling.order
     for t in range(share[first + k], share[first + k + 1]):
         visit_tile(visit, s, block, order[t])
 
 
 @by_threads
-def _visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number, k: int) -> None:
-    """Do `task` at the nodes of the k-th part; `ranges` as in `Setup`."""
-    nodes = at_hand(nodes)
+def _visit_nodes(task: Tag, used: NodesInUse, dt: Number, k: int) -> None:
+    kin, nodes, ranges = at_hand(used)
     for r in range(ranges[k, 0], ranges[k, 1]):
         for n in range(ranges[r, 0], ranges[r, 1]):
             at_node(task, kin, nodes, index(n), dt)
@@ -233,7 +236,7 @@ def _visit_nodes(task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Numb
 def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool) -> Context:
     """Return the context of a sweep that begins now."""
     clock = s.control.clock[0]
-    # A little more, so that points are sorted next whenever one did not fit (see run.tiles).
+    # A little more, so that points are sorted whenever one did not fit (see run.tiles).
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     return Context(
         s.frame, s.kin, s.basis, in_step(s.transfer, clock.kept), s.averaging, s.grids, s.nodes,
@@ -244,7 +247,7 @@ def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool)
     )  # fmt: skip
 
 
-# What a sweep consists of, in the way of its mode: by one thread or several, if not otherwise.
+# Parts of a sweep, by the class of its mode.
 
 
 @point_function(otherwise=True)
@@ -255,17 +258,15 @@ def sweep_points(mode: Tag, visit: Visit, s: Context, block: Block) -> None:
 
 @point_function(otherwise=True)
 def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
-    """Sum at the nodes what the points gave of the quantities, if that is due."""
+    """Sum the quantities at the nodes, if due."""
     count = s.buffers.count[0] if due else 0
     sum_shares(mode, count, quantities, s.kin, s.nodes, s.buffers)
 
 
 @point_function(otherwise=True)
-def sweep_nodes(
-    mode: Tag, task: Tag, kin: Tag, nodes: Nodes, ranges: np.ndarray, dt: Number
-) -> None:
-    """Do `task` at every node in use; `ranges` as in `Setup`."""
-    _visit_nodes(mode, ranges[0, 0], task, kin, nodes, ranges, dt)
+def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
+    """Do `task` at every node in use."""
+    _visit_nodes(mode, s.ranges[0, 0], task, NodesInUse(s.kin, s.nodes, s.ranges), dt)
 
 
 # --- whole sweeps -----------------------------------------------------------------------------
@@ -273,7 +274,7 @@ def sweep_nodes(
 
 @point_function(otherwise=True)
 def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context) -> None:
-    """Sweep over the points of all blocks; begin to pass on what they give to other processes."""
+    """Sweep over the points of all blocks, and begin to send to other processes."""
     for block in s.blocks:
         sweep_points(mode, visit, context, block)
 
@@ -281,12 +282,11 @@ def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context
 def sweep(
     s: Setup, mode: Tag, visit: Visit, dt: Number, gathers: bool, scatters: bool, moves: bool
 ) -> None:
-    """Visit all points and sum at the nodes what they gave.
+    """Visit all points and sum at the nodes.
 
-    With `moves` new places go to the other array. How the points fared is in the reports of the
-    tiles (`clock.read_reports`).
+    With `moves` new places go to the other array. Tiles have the reports (`clock.read_reports`).
     """
-    # Where points give to the nodes themselves, these start from zero.
+    # Without buffers, nodes start from zero.
     direct = s.buffers.count[1]
     anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
     sum_given(mode, anew, s, scatters & (direct == 1))
@@ -296,7 +296,7 @@ def sweep(
 
 
 def sum_given(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
-    """Sum at the nodes what the points gave, here and in other processes, if that is due."""
+    """Sum the quantities at the nodes, from here and other processes, if due."""
     if len(quantities):
         take_over(s.control.ranks, due & (s.buffers.count[1] == 0))
         sum_buffers(mode, quantities, s, due)

@@ -1,11 +1,9 @@
-"""A scheme as a table: visits of the points, tasks at nodes and fixes, in the order of a step.
+"""Rows of schemes, and the fused and staged steps made of them.
 
-A scheme names its rows once, stage by stage, as its class attribute ``rows``. From them follow
-
-- the staged step, in which fixes act on points between the stages;
-- the fused step, with as few visits of the points as the rows allow: tasks and scatters that
-  nothing separates use one visit, and the first scatter joins the last visit of the step before;
-- what `karamelo-py check` says of a step, and the traffic that `karamelo-py bench` counts.
+The class attribute ``rows`` of a scheme lists its stages once. From these follow the staged step,
+in which fixes act on points between stages; the fused step with as few visits of the points as
+possible, whose first scatter joins the last visit of the previous step; the text of `karamelo-py
+check`; and the memory traffic of `karamelo-py bench`.
 
 F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
 """
@@ -13,7 +11,7 @@ F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler.compile import point_function, real
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.tuples import clear_first
@@ -25,29 +23,41 @@ from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain, Normal
 from karamelo_py.kernels.equations.move import Move
-from karamelo_py.kernels.hook_loop import add_work
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.transfers import stores_moment
 from karamelo_py.points.transfers.xpic import XPIC
 
 
+class Processor(NamedTuple):
+    """Back end: loops of the threads of a processor."""
+
+
+@point_function(tags=2)
+def take(row: Any, backend: Any) -> Any:
+    """Take a row on a back end, `Processor` or `~.compiler.gpu.Card`: ``take.on(Row, Card)``.
+
+    Processor: ``(row, s, step)`` of a `Setup` and an `~.kernels.step.InStep`, traced; returns
+    whether no point failed. Card: ``(row, steps)`` of a `~.run.gpu.StepsOnCard`; yields launches.
+    """
+
+
 class AtPoints(NamedTuple):
-    """Fixes act on the points; `then` is 1 when their new places are known, else 0."""
+    """Fixes act on points; `then` is 1 if their new positions are known, else 0."""
 
     stage: int
     then: int
 
 
 class AtNodes(NamedTuple):
-    """Fixes act on the nodes, on their sums, their update or the velocity that strains."""
+    """Fixes act on nodes; `target` is one of `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`."""
 
     stage: int
     target: int
 
 
 class Gather(NamedTuple):
-    """Grid to points: a task, with its fraction of dt, of this step or of the last."""
+    """Grid to points: a task for a fraction of dt, of this step or the last."""
 
     task: NamedTuple
     share: float = 1.0
@@ -55,32 +65,29 @@ class Gather(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """Points to grid: quantities, by old weights or present ones.
-
-    Present weights are taken at the position after the move, for the next step.
-    """
+    """Points to grid: quantities, with the weights before the move or after it."""
 
     quantities: tuple
     weights: NamedTuple = PresentWeights()
 
 
 class NodeTask(NamedTuple):
-    """A task at every node in use: its tag, or a function of the setup that makes it."""
+    """A task at every node in use: a tag, or a function of the setup that returns one."""
 
     task: Any
-    at: Any = None  # function of the setup: that with the nodes that are meant
-    length: Any = None  # function of the setup: the time interval, if it is not `kick`
+    at: Any = None  # function of the setup: one with other nodes
+    length: Any = None  # function of the setup: the time interval, if not `kick`
 
 
 class EachNode(NamedTuple):
-    """A function ``(s, n)`` of every node in use; ``loop(s)`` calls it for them."""
+    """``function(s, n)`` at every node in use, called by ``loop(s)``."""
 
     function: Any
     loop: Any
 
 
 class EachPoint(NamedTuple):
-    """A function ``(s, block, p)`` of every point with a kind of law; ``loop(s, block)``."""
+    """``function(s, block, p)`` at every point with a kind of law, called by ``loop(s, block)``."""
 
     function: Any
     law: type
@@ -88,48 +95,45 @@ class EachPoint(NamedTuple):
 
 
 class Once(NamedTuple):
-    """A function ``(s)`` between two loops."""
+    """``function(s)`` between two loops."""
 
     function: Any
 
 
-class ByFixes(NamedTuple):
-    """A function ``(hooks, *arguments, s)``: fixes act in it."""
-
-    function: Any
-    arguments: tuple = ()
+class WorkOfLoads(NamedTuple):
+    """The work of the loads on nodes is summed."""
 
 
 class Repeated(NamedTuple):
-    """Rows that are taken ``count(s)`` times: those of time k, from 0, are ``rows(k)``."""
+    """``rows(k)`` for k from 0 to ``count(s)`` - 1."""
 
     count: Any
     rows: Any
 
 
 class SceneTask(NamedTuple):
-    """Rows that only some scenes have: ``rows(s)`` lists them for a scene."""
+    """Rows of some scenes: ``rows(s)``."""
 
     rows: Any
     says: str | None = None
 
 
 class Check(NamedTuple):
-    """Look at the new places again, after fixes that may have changed them."""
+    """New positions are checked again, after fixes that may have changed them."""
 
 
 class Sweep(NamedTuple):
-    """A visit of the points, as it is compiled; `gathers` and `scatters` say what of it is done."""
+    """A compiled visit of the points."""
 
     visit: Visit
     share: float = 1.0
     of_last_step: bool = False
     gathers: bool = True
     scatters: bool = True
-    moves: bool = True  # whether new places go to the other of the two arrays
+    moves: bool = True  # new positions go to the other of the two arrays
     only_if_more: bool = False  # the scatter belongs to the next step
-    at: Any = None  # function of the setup: that with the nodes that are meant
-    reported: Any = take_reports  # function of the clock, which has the reports of the points
+    at: Any = None  # function of the setup: one with other nodes
+    reported: Any = take_reports  # accepts the reports of the points in the clock; None: nothing
 
 
 def each_node(function: Any) -> EachNode:
@@ -156,11 +160,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of one visit; strains depend on the tasks before them.
-
-    Strain after a move uses what that gathered. By the velocity of the last step, points are
-    strained where that has led them.
-    """
+    """List the tasks of one visit: strain depends on a move before it, and the step of its v."""
     own: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         own = strain.StrainInMove
@@ -170,12 +170,12 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: Any) -> Any:
-    """Return the classes of tags: as tuples, tags without numbers are all equal."""
+    """Return the classes of tags, since tags without numbers are all equal tuples."""
     return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step with as few visits as they allow; sums are on the nodes before."""
+    """List the rows of a step with the fewest visits; the sums are on the nodes before it."""
     kept = [row for row in rows if not isinstance(row, AtPoints | Check)]
     first = next(k for k, row in enumerate(kept) if isinstance(row, Scatter))
     next_sums = kept.pop(first)
@@ -186,7 +186,7 @@ def fused(rows: Iterable[Any]) -> list[Any]:
         found = scatter or Scatter((), OldWeights())
         visit = Visit(_tasks(waiting), found.quantities, found.weights)
         share, of_last_step = waiting[0][1:] if waiting else (1.0, False)
-        # The new places are read by a scatter of the next step, whoever made them.
+        # The scatter of the next step reads the new positions.
         moves = bool(waiting) or more
         scatters = scatter is not None
         out.append(Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more))
@@ -205,16 +205,15 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step one by one, where they can be as parts of visits of the fused."""
+    """List the rows of a step one by one, as parts of the fused step's visits where possible."""
     rows = list(rows)
     return one_by_one(rows, [row.visit for row in fused(rows) if isinstance(row, Sweep)])
 
 
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
-    """List the rows of a part of a step, each a separate visit, or a part of one of `loops`."""
+    """List rows as separate visits, or as parts of `loops`."""
 
     def loop_of(own: Visit) -> Visit:
-        """Find the one of `loops` with such tasks, or such quantities; else the visit itself."""
         part = slice(0, 1) if own.tasks else slice(1, 3)
         return next((visit for visit in loops if _kinds(visit[part]) == _kinds(own[part])), own)
 
@@ -230,7 +229,7 @@ def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """Describe a row in words; None where it does nothing in this scene."""
+    """Describe a row; None if it does nothing in this scene."""
     if isinstance(row, Sweep):
         parts = [tag.says for tag in row.visit.tasks if row.gathers]
         parts += [tag.says for tag in row.visit.quantities if row.scatters]
@@ -243,7 +242,7 @@ def says(row: Any, setup: Any) -> str | None:
 
 
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
-    """List the rows of a scene with all it adds: F-bar belongs to visits that strain."""
+    """Yield the rows of a scene with those that it adds; F-bar adds a visit before strains."""
     for row in rows:
         if isinstance(row, SceneTask):
             yield from plain(row.rows(s), s)
@@ -294,14 +293,13 @@ def _hold_node(s, n):
 
 
 def hold_axis(s: Setup) -> tuple:
-    """Let no node on an axis of symmetry leave it, where there is one."""
-    # v_r = 0 at r = 0: N / r of a node there grows without bound where a point comes near. And a
-    # body that touches another on the axis has a normal along it.
+    """Hold the nodes on an axis of symmetry."""
+    # v_r = 0 at r = 0, where N / r is unbounded; and normals of contact are along the axis.
     return (EachNode(_hold_node, _hold_axis),) if isinstance(s.kin, Axisymmetric) else ()
 
 
 def sum_series(s: Setup) -> tuple:
-    """Replace the change of velocity by XPIC's new velocity; others need nothing."""
+    """Replace the velocity change by XPIC's new velocity."""
     if not isinstance(s.transfer, XPIC):
         return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
@@ -315,7 +313,7 @@ def _next_term(k: int) -> tuple:
 
 
 def average_volumes(row: Sweep) -> tuple:
-    """Average the change of volume of the strain to come at the nodes."""
+    """Average the volume change of the coming strain at the nodes (F-bar)."""
     if not (row.gathers and any(isinstance(task, strain.Strain) for task in row.visit.tasks)):
         return ()
     trial = strain.TrialStrainOfLastStep() if row.of_last_step else strain.TrialStrain()
@@ -325,7 +323,7 @@ def average_volumes(row: Sweep) -> tuple:
 
 
 def average_stress(s: Setup) -> tuple:
-    """Replace the points' mean stress by the averaged one, with F-bar."""
+    """Replace the points' mean stress by the averaged one (F-bar)."""
     if not isinstance(s.averaging, fbar.FBar):
         return ()
     visit = Visit((fbar.SetMeanStress(),), (fbar.AveragedForce(),), OldWeights())
@@ -333,17 +331,17 @@ def average_stress(s: Setup) -> tuple:
 
 
 def at_nodes_with(kind: type, task: Tag) -> Any:
-    """Make the rows of a task at nodes that have a field."""
+    """Make the rows of a task at nodes, if they have a field."""
     return lambda s: (NodeTask(task),) if field(s.nodes.fields, kind) is not None else ()
 
 
 def light_node(s):
-    """Return the mass below which USL limits gradients: d (c dt / h)^2 of a point that a node sees.
+    """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
-    Less than one: a fraction below m / m_p would be less than what comes back to the node through
-    the points' velocities, and the strain of the node would run ahead of its stress. None in the
-    total frame where points have moments: what comes back through these is all of the node's
-    velocity, and any limit makes it grow. The step knows such nodes there.
+    At most 1: a fraction below m / m_p would be less than what comes back to the node through the
+    points' velocities, and the strain of the node would run ahead of its stress. No limit in the
+    total frame with moments, which return all of the node's velocity: there any limit makes it
+    grow.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
@@ -364,8 +362,8 @@ LOSS = SceneTask(
 )
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
 CONTACT = SceneTask(lambda s: s.contact.rows, "contact of v*")
-WORK_OF_LOADS = SceneTask(lambda s: (ByFixes(add_work),))
-# The velocity that deforms the points has to agree with contact, where it is not v*.
+WORK_OF_LOADS = WorkOfLoads()
+# The deforming velocity must satisfy contact, too, if it is not v*.
 CONTACT_BEFORE = SceneTask(lambda s: s.contact.rows_before)
 CONTACT_AFTER = SceneTask(lambda s: s.contact.rows_after)
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
@@ -375,7 +373,7 @@ BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((MassMomentum(), InternalForce()))
 MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
-# For schemes that strain first: the nodal velocity before the forces.
+# For schemes that strain first: the nodal velocity before the forces act.
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
     AXIS,
@@ -384,7 +382,7 @@ VELOCITY_BEFORE = (
     CONTACT_BEFORE,
 )
 FORCE = Scatter((InternalForce(),), OldWeights())
-# v* = v + dt f / m, with what the fixes add and prescribe; and heat flows.
+# v* = v + dt f / m, with loads, prescribed velocities, contact; heat flow.
 ACCELERATE = (
     FRICTION,
     LOSS,
@@ -403,7 +401,7 @@ MOVE = (
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
 )
-# The velocity of the moved points, at the nodes once more.
+# The velocity of the moved points, mapped to the nodes again.
 MOMENTUM_AGAIN = (
     Scatter((MomentumAgain(),), OldWeights()),
     NodeTask(nodes.MomentumToVelocity()),

@@ -1,12 +1,12 @@
-"""Tables of numbers as text, the same bytes as ``"%.9g" % x`` and ``"%d" % n``, compiled.
+"""Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``, compiled.
 
-The nine digits of x are the digits of x 10^k, rounded. The product is taken with twice the digits
-of a double: it is exact where 10^k is (0 <= k <= 22), and elsewhere so close that only what lies
-within `DOUBT` of a tie cannot be told. Such a number is left to Python, and so are those near the
-ends of the range of doubles. Where nothing is compiled, or bytes are in the other order, all are.
+The nine digits of x are the rounded digits of x 10^k. The product has twice the digits of a double:
+it is exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Such numbers,
+and those near the ends of the range of doubles, are left to Python; all are without compilation, or
+on big-endian machines.
 
-Digits are written eight at a time; surplus ones are overwritten later: branches that
-cannot be foreseen cost more than bytes.
+Digits are written eight at a time; surplus ones are overwritten: mispredicted branches cost more
+than bytes.
 """
 
 import sys
@@ -23,7 +23,7 @@ from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.values import intrinsic
 
 ROWS = 1024  # written at a time
-# The longest: -1.23456789e-308 and -4611686018427387903, a blank, and what is overwritten.
+# The longest: -1.23456789e-308 and -4611686018427387903, a blank, and surplus digits.
 NUMBER_BYTES = 32
 
 DIGITS = 9
@@ -80,21 +80,10 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 def write_rows(numbers, integers, is_integer, start, text, at):
     """Write numbers, row after row, until the end or one that is left to Python.
 
-    Parameters
-    ----------
-    numbers, integers : (rows, columns) float64, int64
-        The same memory, seen as numbers and as integers.
-    is_integer : (columns,) bool
-        Which of the two a column holds.
-    start
-        Index of the first number to write, counted along the rows.
-    text : bytes
-        Has at least `NUMBER_BYTES` for each number; the text continues at `at`.
-
-    Returns
-    -------
-    Index of the number that is left to Python (or how many numbers there are), and where the text
-    ends.
+    `numbers` (rows, columns) and `integers` view the same memory; `is_integer` (columns,) selects.
+    `start` is the index of the first number, along the rows. `text` has `NUMBER_BYTES` per number,
+    and continues at `at`. Returns the index of the number left to Python (or their count), and the
+    end of the text.
     """
     rows, columns = numbers.shape
     first = start % columns
@@ -174,7 +163,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Find nine digits of x > 0 as an integer, 0 if in doubt, and the power of ten of the first.
+    """Return nine digits of x > 0 as an integer (0 if in doubt), and the power of ten of the first.
 
     `binary` is the power of two of x.
     """
@@ -194,7 +183,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """Return the eight digits of n < 10^8 as the bytes of their text: halves, quarters, eighths."""
+    """Return the eight digits of n < 10^8 as text: halves, quarters, eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100
@@ -204,7 +193,7 @@ def _eight(n):
 
 
 def _without_zeros(word):
-    """Count eight digits without the zeros at their end."""
+    """Count eight digits without trailing zeros."""
     kept = 8
     while kept > 0 and word >> 8 * (kept - 1) & 255 == ZERO:
         kept -= 1
@@ -213,7 +202,7 @@ def _without_zeros(word):
 
 @intrinsic
 def _put_eight(text, at, word):
-    """Write the bytes of an integer, wherever they begin."""
+    """Write the bytes of an integer, unaligned."""
 
     def codegen(builder, array, at, number):
         data = code.ArrayParts(builder, text, array).data

@@ -1,9 +1,9 @@
 """Sums that do not depend on the order of their terms: reactions, work, energies.
 
-A total is a fixed-point number as wide as the range of double precision, in limbs of 32 bits with
-room for carries: every term is added without rounding, so that points and nodes may be shared out
-in any way. A published total is right within a unit of its last digit (Kulisch 1971; Neal 2015,
-"Fast exact summation using small and large superaccumulators").
+A total is a superaccumulator: a fixed-point number as wide as the range of doubles, in limbs of 32
+bits with room for carries. Terms are added without rounding; a published total is right within a
+unit of its last digit (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
+superaccumulators").
 """
 
 from math import frexp, ldexp
@@ -16,16 +16,16 @@ from karamelo_py.compiler.loops import kernel, many_threads, noinline
 from karamelo_py.compiler.threads import add_among
 
 LIMBS = 68
-LOST = LIMBS - 1  # counts terms that are no numbers
+LOST = LIMBS - 1  # counts terms that are NaN or infinite
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
-MANY = 1 << 10  # terms whose whole numbers can be added up before one overflows
-COARSE, FINE = 1e-200, 1e200  # largest terms that are added up as whole numbers
-MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # bits without the sign, which are in the order of the numbers
+MANY = 1 << 10  # terms whose integers can be summed without overflow
+COARSE, FINE = 1e-200, 1e200  # range of the largest term, if terms are summed as integers
+MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # bits without the sign, ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# Rows of the totals: published values use their slots, of which time, timestep and dt
-# are no sums.
+# Rows of the totals; published values use their slots, the first of which (time, timestep, dt) are
+# not sums.
 KINETIC, STORED, WORK = 0, 1, 2
 
 
@@ -34,7 +34,6 @@ class Alone(NamedTuple):
 
 
 def _grow(totals, row, limb, number):
-    """Add to a limb."""
     if many_threads():
         add_among(totals, row, limb, number)
     else:
@@ -69,9 +68,9 @@ def add_to(totals, row, x):
 def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
-    They are sums of whole numbers of two sizes, but for terms 2^30 times smaller than the largest.
-    A number added to 1.5 2^52 has its whole part in its last bits: both loops are sums of bits, in
-    any order, which vectors of the processor do.
+    As integers of two sizes, except for terms 2^30 times smaller than the largest. A number added
+    to 1.5 2^52 has its integer part in its last bits: both loops sum bits, in any order, and
+    vectorise.
     """
     if many_threads():  # each has a term or two
         for q in range(count):
@@ -121,7 +120,7 @@ def hand_over(own, totals, row):
 
 @kernel
 def carry(total):
-    """Carry digits over to 0 to 2^32 - 1, the last one signed."""
+    """Carry digits to 0 to 2^32 - 1, the last one signed."""
     for k in range(LOST - 1):
         carry = total[k] >> 32
         total[k] -= carry << 32
@@ -136,7 +135,7 @@ def rounded(total):
     carry(total)
     sign = 1.0
     if total[LOST - 1] < 0:
-        # So that the digits have one sign, and adding them up loses nothing.
+        # Digits of one sign sum without cancellation.
         sign = -1.0
         for k in range(LOST):
             total[k] = -total[k]
@@ -158,14 +157,13 @@ def _round(totals, digits, answer, first, count):
 
 @kernel
 def add_all(totals, row, terms):
-    """Add all `terms` to a total, without rounding."""
     for first in range(0, terms.size, MANY):
         add_many(totals, row, terms[first:], min(MANY, terms.size - first))
 
 
 @kernel
 def add_rows(totals, rows, terms):
-    """Add each of the `terms` to the total in its row, without rounding."""
+    """Add each of the `terms` to the total in its row."""
     for q in range(terms.size):
         add_to(totals, rows[q], terms[q])
 
@@ -190,7 +188,7 @@ def number_of_all(ranks, control, number):
 
 @point_function(otherwise=True)
 def agree_on_reports(ranks, control):
-    """Find the largest move and rate of all processes, and whether a point of any went wrong."""
+    """Find the largest move and rate, and any failed point, of all processes."""
 
 
 @point_function(otherwise=True)
@@ -200,11 +198,11 @@ def agree_on_heat(ranks, control):
 
 @point_function(otherwise=True)
 def take_over(ranks, due):
-    """Wait for what the tiles of other processes give to nodes in use here."""
+    """Wait for what tiles of other processes give to nodes in use here."""
 
 
 def publish(control, slot, count):
-    """Set the published values from `slot` on to their totals."""
+    """Set published values from `slot` on to their totals."""
     collect(control.ranks, control, slot, count)
     for k in range(count):
         control.values[slot + k] = control.answer[k]

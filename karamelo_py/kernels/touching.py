@@ -1,6 +1,6 @@
-"""Contact of points with the surface of a shape, which may move, in the loop over the points.
+"""Contact of points with the surface of a shape, which may move, in the loop over points.
 
-A point is a ball. Its force is along the direction in which its depth falls fastest.
+A point is a ball. Its force is along the steepest descent of its depth.
 """
 
 from collections.abc import Callable
@@ -20,9 +20,9 @@ from karamelo_py.kernels.views import volume_of
 from karamelo_py.points.bodies import along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
-SOFT = 0.1  # fraction of a penetration that a step removes while it stops the approach
-ASIDE = 0.05  # of the reach: where depths are compared
-LEVEL = 1e-3  # of that: a depth that changes by less falls nowhere
+SOFT = 0.1  # fraction of the penetration removed in a step
+ASIDE = 0.05  # of the reach: distance at which depths are compared
+LEVEL = 1e-3  # of that: a depth that changes by less has no direction
 CALL = types.int64(types.int64)
 
 _call = caller_of(CALL)
@@ -35,22 +35,22 @@ class Touch(NamedTuple):
     values: tuple
     shape: NamedTuple
     mu: float
-    reach: float  # from where on a depth is not known
-    lost: int  # address of the function called with the number of a point without a way out
+    reach: float  # largest known depth
+    lost: int  # address of a function, called with a point without a way out
 
     of_nodes = False
-    of_time = True  # its formulas are that, and it sees them at the end of the step, too
+    of_time = True  # its formulas are of time, also at the end of the step
 
 
 def direction_of(falls, step):
-    """Return the direction in which a depth falls that differs by `falls` over two steps."""
+    """Return the unit direction of a depth's differences over two steps; 0 if level."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 
 
 @point_function()
 def grip_of(tag, what):
-    """Return the array of what friction remembers; None of a touch without."""
+    """Return the array of the memory of friction, or None."""
 
 
 @grip_of.on(Touch)
@@ -68,7 +68,7 @@ def force_of(tag, what, volume, p, values, dt):
     ball = radius(kin, float(volume), place)
     x = place - way
     grip = grip_of(tag, what)
-    # Most points are far away: a short look is cheap.
+    # Most points are far away: a short reach is cheap.
     within = depth(tag.shape, kin, x, 1.001 * ball)
     if within <= -ball:
         if grip is not None and grip[d, p] != 0:
@@ -86,7 +86,7 @@ def force_of(tag, what, volume, p, values, dt):
     slip = velocity - none._make([float(v) for v in load_vector(kin, what.points.v, p)])
     contact_dt, contact_kick, kick = values[2 * d :]
     stiffness = float(what.points.mass[p]) / (contact_dt * contact_kick)
-    # A spring alone, which takes all penetration out within a step, throws bodies back.
+    # A spring that removes all penetration within a step would throw bodies back.
     push = SOFT * (within + ball) + contact_dt * dot(slip, normal)
     load = stiffness * max(push, 0.0)
     if grip is None:
@@ -94,7 +94,7 @@ def force_of(tag, what, volume, p, values, dt):
     hold = none._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
     slid = none
-    if mean > 0:  # velocities of points have noise, by which they do not move
+    if mean > 0:  # positions: velocities of points have noise
         slid = none._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + SOFT * stiffness * slid, normal)
@@ -123,7 +123,7 @@ def touch_kind(grip: type | None) -> type[Touch]:
 
 
 def touch_hook(tag: Callable) -> hooks.CompiledHook:
-    """Make the hook of a fix, of which ``tag(row, values)`` makes a `Touch`."""
+    """Make the hook of a fix; ``tag(row, values)`` makes a `Touch`."""
     return hooks.CompiledHook(
         force_of, hooks.WHOLE_POINTS, True, False, False, False, tag, internal=True
     )

@@ -1,7 +1,7 @@
-"""Views of a visit: what equations read of a point, `pt`, and of a node that it sees, `node`.
+"""Views of a point, `pt`, and of a node that it sees, `node`: what equations read.
 
-An equation such as ``node.N * pt.mass`` is a function of these two. Views exist while a kernel is
-traced; no kernel contains them. docs/house/kernels.md lists the attributes, with shapes and units.
+Views exist while a kernel is traced; no kernel contains them. docs/house/kernels.md lists their
+attributes, with shapes and units.
 """
 
 from collections import namedtuple
@@ -34,7 +34,7 @@ from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
 
 
 class Work(NamedTuple):
-    """Arrays and tags of a visit to a point; made once per tile."""
+    """Arrays and tags of a visit of points; made once per tile."""
 
     frame: Tag
     kin: Tag
@@ -52,7 +52,7 @@ class Work(NamedTuple):
 
 @algebra
 class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
-    """The k-th node of the stencil of a point."""
+    """The k-th node of a point's stencil."""
 
     __slots__ = ()
     kin = property(lambda node: node.w.kin)
@@ -72,7 +72,7 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
 
     def v_star(self, like):
-        """v* and v* - v: one record in 2D, two in 3D; `like` is a vector."""
+        """v* and v* - v, like the vector `like`; one record in 2D, two in 3D."""
         kin, records, i = self.w.kin, self.w.nodes.update, self.i
         first, d = of_change(kin), kin.dimension
         if many_threads() and not isinstance(i, Weighted):  # adjacent records
@@ -85,7 +85,7 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
 
     @property
     def v(self):
-        """The velocity that deforms the points."""
+        """The deforming velocity."""
         kin, records = self.w.kin, self.w.nodes.velocity
         if many_threads() and not isinstance(self.i, Weighted):
             return vector(kin, aligned_record(records, self.i, of_change(kin))[: kin.dimension])
@@ -109,13 +109,13 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
 
     @property
     def law_state_F(self):
-        """Its law, the state, and F as `deformation_of`."""
+        """Law, state, and F as `deformation_of`."""
         w, material = self.w, self.law_and_state
         return *material, deformation_of(w.frame, w.kin, w.points, material, self.p)
 
     @property
     def nodes(self):
-        """The nodes that it sees."""
+        """The nodes of the stencil."""
         w = self.w
         return tuple([node_of(w, self.stencil, k) for k in range(support(w.basis, w.kin))])
 
@@ -124,27 +124,26 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
         return field(self.w.points.fields, kind)
 
     def load(self, kind, like):
-        """Components 0, 1, ... of a field, as `like` has them; () where there is none."""
+        """Load as many components of a field as `like` has; () if it is absent."""
         return load(self.of(kind), self.p, like)
 
 
 def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
-    """Load the place (w,) of point `p`: its position and the shape of its domain."""
+    """Load a place (w,): position, and shape of the domain."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
 
 
 def node_of(w: Work, stencil: tuple, k: int) -> NodeView:
-    """Return the view of the k-th node of a stencil."""
     return NodeView(w, stencil, k, *entry(w.basis, w.kin, w.grid, stencil, k))
 
 
 def law_at(points: Points, laws: NamedTuple, p: Index) -> Tag:
-    """Load the law of point `p`, with the parameters of its material."""
+    """Load the law of point `p` with the parameters of its material."""
     return record(laws, index(points.material[p]))  # type: ignore[arg-type]
 
 
 def state_at(kin: Tag, points: Points, laws: NamedTuple, p: Index) -> tuple:
-    """Load the law of point `p` and its state."""
+    """Load law and state of point `p`."""
     law = law_at(points, laws, p)
     return law, load(points.state, p, initial_state(law, kin, points.mass[p]))
 
@@ -155,10 +154,7 @@ def volume_of(kin: Tag, points: Points, law: Tag, state: tuple, p: Index) -> Num
 
 
 def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Index) -> tuple:
-    """Return the deformation gradient F of a point where the frame needs it, else ().
-
-    `material` is its law and state.
-    """
+    """Return F of a point if the frame needs it, else (); `material` is law and state."""
     if frame.moves:
         return ()
     law, state = material
@@ -169,9 +165,8 @@ def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Ind
 def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
     """Prefetch the data of the next points in 3D.
 
-    Points with velocity moments are visited once per step with all their arrays, more than the
-    hardware prefetcher follows. So are the arrays that the update of a stretch of points needs
-    (`apart`) while it gathers.
+    Points with moments, and stretches of points (`apart`), have more arrays than the hardware
+    prefetcher follows.
     """
     d, fields = w.kin.dimension, w.points.fields
     moment = len(zero_moment(w.transfer, w.kin, like))

@@ -1,8 +1,7 @@
 """Coulomb friction at walls: nodes held by a fix across a wall rub along it.
 
-The normal force of the wall on a node is the force for the prescribed velocity. The tangential
-force is at most mu times as much, against the motion, and at most what stops it. The wall is at
-rest in the directions without a prescribed velocity.
+The normal force on a node is the force for the prescribed velocity. The tangential force is at most
+mu times as large, and at most what stops the motion. The wall is at rest along itself.
 """
 
 from math import sqrt
@@ -18,7 +17,7 @@ FRICTION = 3  # the program of the coefficient, after the components' programs
 
 @noinline
 def _is_free(held, programs, n, c):
-    """Return True if no fix holds node `n` in direction `c`, judged by `programs` and `held`."""
+    """Return True if no fix holds node `n` in direction `c`."""
     return programs[c].begin < 0 and (held.size == 0 or held[n, c].slot == 0)
 
 
@@ -26,8 +25,8 @@ def _is_free(held, programs, n, c):
 def rub(what, call, n, mu):
     """Apply the wall friction of coefficient `mu` to node `n`; add the force to the totals.
 
-    The change of v* by the holding hook is the normal impulse. If several fixes hold the node, each
-    applies friction for the directions in which it decides.
+    The normal impulse is the change of v* by the holding hook. Of several fixes that hold the node,
+    each applies friction for the directions in which it decides.
     """
     kin, nodes, hooks, control, dt = what.kin, what.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], what.kept
@@ -61,7 +60,7 @@ def rub(what, call, n, mu):
             hooks.loads[n, c] -= mass * taken / dt
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
-    # With the mean of the speeds at the beginning and end of the step; a wall takes no heat.
+    # With the mean speed of the step; a wall takes no heat.
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 
@@ -69,7 +68,7 @@ def rub(what, call, n, mu):
 def stick(kin, nodes, programs, n):
     """Also stop the deforming velocity if friction stopped the node.
 
-    If it is mapped separately from v*, stress would otherwise do work on a spurious slip.
+    If it is mapped separately from v*, stress would do work on a spurious slip.
     """
     d = kin.dimension
     for c in range(d):

@@ -1,16 +1,14 @@
-"""The watch over energy and temperatures, at intervals of steps, inside the compiled loop.
+"""The monitor of energy and temperatures, at intervals of steps, in the compiled loop.
 
-Kinetic plus stored plus dissipated energy minus the work of the loads cannot grow. Velocities
-belong to the middles of steps and stresses to their ends, more or less, by the scheme: two
-consecutive steps give energies at one time, to second order. Sums run over the points in the order
-of their tiles, the same on any number of threads.
+Kinetic plus stored plus dissipated energy minus the work of loads cannot grow. Velocities belong to
+the middles of steps and stresses to their ends: two consecutive steps give energies at one time, to
+second order. Sums run over points in the order of tiles, on any number of threads.
 
-Growth is measured relative to the energy besides drift, the motion of the centres of mass: however
-large that is, from the start or by loads, it cannot hide vibrations.
+Growth is relative to the energy without drift (motion of the centres of mass): drift cannot hide
+vibrations, however large it is.
 
-The same looks measure the number of cells that stressed material moves through, weighted by the
-elastic energy of points (`karamelo_py.kernels.watch.note_crossing`): in the updated frame, a linear
-basis loses stress by that.
+The same looks measure the number of cells that stressed material moves through, weighted by elastic
+energy (`note_crossing`): a linear basis in the updated frame loses stress by that.
 """
 
 from math import exp, inf, sqrt
@@ -38,29 +36,28 @@ from karamelo_py.points.laws import (
 )
 
 LOOK = 10  # steps between two looks
-FEW = 3  # looks that are compared without a full window: the present and the two before
+FEW = 3  # looks compared without a full window: the present and the two before
 LOOKS = 10  # looks that are averaged, in a window of 100 steps
-GROWTH = 0.01  # of the largest energy so far, in a window: more gives a warning
-WITHIN = 0.1  # of the unit: more growth since the start gives a warning
+GROWTH = 0.01  # of the largest energy so far, in a window: more is a warning
+WITHIN = 0.1  # of the unit, since the start: more is a warning
 DRIFTING = 1e-3  # of the energy of drifting bodies: relevant vibrations have more
-BOUND = 10.0  # times the initial energy and the work of loads: more stops the run
+BOUND = 10.0  # times initial energy and work of loads: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of this size is noise, too
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
 HEAT_NOISE = 1e-4  # of a temperature: tolerated if all are equal
 OVERSHOOT = 0.1  # of the range of temperatures from the sources: more stops the run
-# Steps up to these multiples of the stable one of conduction are tolerated: point temperatures in
-# the null space decay (measured with 2 points per cell: 4 and 5.8 with and without convection).
+# Tolerated multiple of the stable step of conduction: point temperatures in the null space decay
+# (measured with 2 points per cell: 4 and 5.8 with and without convection).
 BORNE = 4.0
 
 
 def solid_of(firsts, number):
-    """Return the solid of the point with this id."""
     return first_from(firsts, 0, firsts.size, number + 1) - 1
 
 
 def energies_of(kin, points, laws, p):
-    """Return mass, velocity, and energies of a point: kinetic, elastic, elastic and dissipated."""
+    """Return mass, velocity, and energies of a point: kinetic, elastic, elastic plus dissipated."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
@@ -72,7 +69,7 @@ def energies_of(kin, points, laws, p):
 
 @shared_out
 def _look_at_shares(kin, points, laws, tiling, firsts, k):
-    """Sum energies, mass and momentum of points of each tile of the k-th part, for its report."""
+    """Sum energies, mass and momentum of each tile of the k-th part in its report."""
     points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
@@ -112,7 +109,7 @@ def _take_work(work, control):
 
 
 def sum_energies(s, mode):
-    """Sum energies of points, kinetic and stored plus dissipated, and the work into the clock.
+    """Sum kinetic, stored plus dissipated energy, and work, in the clock.
 
     Rigid bodies have none: their motion is prescribed, and does work on other bodies.
     """
@@ -128,7 +125,6 @@ def sum_energies(s, mode):
 
 
 def take_energies(s):
-    """Copy the totals of energies and work to the clock."""
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
     clock, answer = s.control.clock[0], s.control.answer
     clock.kinetic = answer[totals.KINETIC]
@@ -138,9 +134,9 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, ids, masses, v, tiling, control):
-    """Add mass and momentum of each solid, 1 + d, to the totals after the published values.
+    """Add mass and momentum of each solid (1 + d) to the totals after the published values.
 
-    Elastic energy, and this times velocity, of all points follow.
+    Then elastic energy, and this times velocity, of all points.
     """
     firsts, sums = control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
@@ -174,7 +170,7 @@ def _add_momentum(control, solid, d):
 
 
 def _sum_drift(s):
-    """Sum kinetic energies of centres of mass of solids into the clock, after `sum_energies`."""
+    """Sum kinetic energies of the centres of mass in the clock, after `sum_energies`."""
     control, d = s.control, s.kin.dimension
     own = control.values.size
     control.totals[own:] = 0
@@ -203,8 +199,8 @@ def take_drift(s):
 def note_crossing(control, d):
     """Add the cells that elastic energy has moved through since the last look.
 
-    When energy leaves, its path is removed, too; new energy has none. Vibrations renew it in the
-    time of a wave there and back, so transient waves count by what they move while they last.
+    Energy that leaves takes its path along; new energy has none. Vibrations renew it in the time of
+    a wave there and back: transient waves count by what they move while they last.
     """
     clock, row = control.clock[0], (control.firsts.size - 1) * (1 + d)
     now, before = control.answer[row], clock.elastic
@@ -220,7 +216,7 @@ def note_crossing(control, d):
     renewed = (
         min(max((clock.kinetic - clock.of_drift) / now, 0.0), 1.0) * lasting / clock.to_and_fro
     )
-    # The loss by a linear basis on the way does not count as leaving.
+    # The loss by a linear basis does not count as leaving.
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
@@ -228,7 +224,6 @@ def note_crossing(control, d):
 
 
 def _sum_before(s, mode, step):
-    """Sum the energies of a step if the next one is checked."""
     sum_energies(s, mode)
     note_before(s.control.clock[0], step)
 
@@ -241,7 +236,6 @@ def note_before(clock, step):
 
 
 def growth(first, later, unit):
-    """Growth of a later mean over the first, as a fraction of the unit."""
     return (later - first) / unit
 
 
@@ -251,7 +245,7 @@ def keeps(first, later, unit, within=WITHIN):
 
 
 def unit_of(clock):
-    """Return the unit of energy growth: the largest energy, with a limited part of the drift."""
+    """Return the unit of energy growth: the largest energy, with a limited part of drift."""
     return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
 
 
@@ -259,9 +253,9 @@ def unit_of(clock):
 def judge(control):
     """Update the balance with the present sums; return whether energy is within its bound."""
     clock = control.clock[0]
-    # The mean of the balances at the middle of a step and at its end, each with the other energy
-    # from both sides. Over the phase omega dt of a step, each alone oscillates by (omega dt)^2/8,
-    # in opposite phase, and the mean by (omega dt)^3/16.
+    # The mean of the balances at the middle and the end of a step, each with the other energy
+    # interpolated. With the phase omega dt of a step, each oscillates by (omega dt)^2/8, in
+    # opposite phase, and the mean by (omega dt)^3/16.
     moving = clock.kinetic - clock.work
     balance = moving + clock.level * (clock.moving_before - moving)
     balance += clock.stored_before + clock.level * (clock.stored - clock.stored_before)
@@ -286,7 +280,7 @@ def judge(control):
         if part > clock.lost:
             clock.lost = part
             clock.crossed = way
-    # Means: a single look also shows the shortest waves.
+    # Means, as a single look also shows the shortest waves.
     unit = unit_of(clock)
     if clock.looks == FEW:
         clock.first_few = clock.first_mean = clock.largest_mean = (
@@ -294,7 +288,7 @@ def judge(control):
         ) / FEW
     if clock.looks >= 2 * FEW:
         # The minimum of a few: in collisions a look or two may be wrong. Stored, so that the result
-        # does not depend on which look is the last before it is read.
+        # does not depend on the last look.
         least = min(balance, clock.last_balance, clock.last_but_one)
         clock.grown = max(clock.grown, growth(clock.first_few, least, unit))
     clock.sum_of_balance += balance
@@ -336,7 +330,7 @@ def measure_heat(s):
 
 
 def look_at_heat(s):
-    """Compare all temperatures with what fixes, sources and the initial state allow."""
+    """Return whether temperatures are within what fixes, sources and the initial state allow."""
     clock = s.control.clock[0]
     if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
@@ -349,10 +343,10 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Note the stored energy before a run, if a look is due after a step.
+    """Store the energies before a run, if a look is due after its first step.
 
-    `level` is the fraction of the later stored energy, and of the earlier kinetic energy, in the
-    balance. With `anew` the balance starts from here.
+    `level` is the fraction of the later stored and the earlier kinetic energy in the balance. With
+    `anew` the balance starts here.
     """
     clock = s.control.clock[0]
     clock.level = level
@@ -368,7 +362,7 @@ def begin_to_look(s, mode, level, anew):
 
 
 def look(s, mode):
-    """Check the energy if it is due; return whether it is within its bound."""
+    """Check the energy if due; return whether it is within its bound."""
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
         return True
@@ -383,10 +377,7 @@ def look(s, mode):
 
 
 def look_at_end(s, mode):
-    """Check the energy at the end of an implicit step; return whether it is within its bound.
-
-    Velocities and stresses belong to one time there, and steps are few: each is checked.
-    """
+    """Check the energy at the end of an implicit step: velocities and stresses are of one time."""
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
         return True

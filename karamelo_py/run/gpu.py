@@ -1,4 +1,4 @@
-"""Steps of a scene on a GPU: its arrays there, and the launches that a step consists of."""
+"""Steps of a scene on a GPU: device memory, and the launches of a step."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.choices import INTERPRETED
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
-from karamelo_py.compiler.gpu import Images, KernelLaunch, numbers_of
+from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of
 from karamelo_py.kernels import arrays, gpu, heat, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
-from karamelo_py.kernels.hook_loop import ACT, RUB, add_work, moving_points
+from karamelo_py.kernels.hook_loop import ACT, RUB, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
+from karamelo_py.kernels.table import take
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.kernels.watch import LOOK
@@ -27,11 +28,12 @@ from karamelo_py.points.basis import support
 from karamelo_py.points.laws import moves_as_told
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 
-POLL = 64  # steps between two looks at how far a run is
-REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell sums up, by the size of numbers
-FAR = 1.0  # cells that points go before they are ordered anew in memory
+POLL = 64  # steps between two reads of `fate`
+REGISTERS = {4: 200, 8: 130}  # words that the thread of a cell sums, by the size of numbers
+FAR = 1.0  # cells that points move before they are reordered in memory
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # of launches
-_NONE = arrays.NoHooks()
+Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
+NO_HOOKS: Hooks = arrays.NoHooks(), ()
 
 
 def arrays_in(thing: Any) -> Iterator[np.ndarray]:
@@ -44,7 +46,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 
 
 def there(s: arrays.Setup) -> arrays.Setup:
-    """Leave out of a setup what no card needs: tiles, and the boxes of their nodes."""
+    """Return the setup without tiles and their buffers, which no card needs."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, own = s.buffers._replace(nodes=s.nodes), s.heat
     if isinstance(own, heat.Conducting):
@@ -53,7 +55,7 @@ def there(s: arrays.Setup) -> arrays.Setup:
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
-    """See the numbers of points, (..., n), as whole numbers (rows, n) of as many bytes."""
+    """View an array of points (..., n) as integers (rows, n) of the same size."""
     rows = int(np.prod(image.shape[:-1], dtype=int))
     step = image.strides[-2] if image.ndim > 1 else 0
     whole = {4: np.int32, 8: np.int64}[image.itemsize]
@@ -61,99 +63,59 @@ def as_rows(image: np.ndarray) -> np.ndarray:
 
 
 def _no_formula(*_):
-    """Evaluate nothing, for hooks whose formulas are numbers."""
+    """Evaluate nothing: the formulas of the hook are numbers."""
 
 
 class StepsOnCard:
-    """Take the steps of a lowered scene on a card.
+    """The steps of a lowered scene on a card.
 
-    `functions` belong to the compiled hooks, in the order of their table.
+    `program` is the scheme's class and the class of its visits; `hooks` are the compiled hooks and
+    their functions, in the order of their table.
     """
 
     def __init__(
-        self, card: Any, s: arrays.Setup, scheme: Any, visits: type,
-        hooks: arrays.Hooks | arrays.NoHooks = _NONE, functions: Sequence[Callable] = (),
+        self, card: Any, s: arrays.Setup, program: tuple[Any, type],
+        hooks: Hooks = NO_HOOKS,
     ):  # fmt: skip
-        self.card, self.s, self.hooks, self.functions = card, (s := there(s)), hooks, functions
+        self.card, self.s, (self.hooks, self.functions) = card, (s := there(s)), hooks
+        self.table = () if isinstance(self.hooks, arrays.NoHooks) else self.hooks.table
         self.images = Images(card)
         self.fate = np.zeros(5)
-        self.images.of(self.fate)
         self.nodes = len(s.nodes.sums)
-        self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
-        self.cells = [self._cells(b.points.mass.size * self.corners) for b in s.blocks]
         self.use = np.zeros(self.nodes, np.int8)
-        self.images.of(self.use)
-        self._totals()
-        rows = rows_of(scheme, visits)
-        self._rooms(s, rows)
-        self.begin = self._launches(first_rows(scheme, visits))
+        self.copies = np.zeros((card.copies, *s.control.totals.shape), np.int64)
+        self.heavy = np.zeros(max(len(self.functions), 1), np.int64)
+        self.images.of((self.fate, self.use, self.copies, self.heavy))
+        self.images.send([self.copies, self.heavy])
+        self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
+        first, rows = (list(self._plain(of(*program))) for of in (first_rows, rows_of))
+        sweeps = [row for row in (*first, *rows) if isinstance(row, table.Sweep)]
+        self.visits = {id(row): self._visit(row) for row in sweeps}
+        self.cells = [self._cells(block) for block in s.blocks]
+        self.begin: list[KernelLaunch] = []
+        self._ahead: list[KernelLaunch] = []  # sums for the next step
+        self.begin = self._launches(first)
         self.step, self.last_step = self._steps(rows)
-        self.end = self._launch(gpu.end_step, 1, s)
+        self.end = self.launch(gpu.end_step, 1, s)
         self.before, self.behind = self._looks()
         self.order = list(self._order())
         parts = (self.begin, self.step, self.last_step, self.before, self.behind, self.order)
         self._do = dict(zip(PARTS, map(card.together, parts), strict=True))
-        self.ordered = -np.inf  # how far points had gone when they were ordered
+        self.ordered = -np.inf  # cells that points had moved when they were reordered
 
     def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         """List the launches of a step, and of the last of several steps."""
-        begin, end = self._clear(*self._slots()), [self._launch(gpu.finish_step, 1, self.s)]
-        ahead: list[KernelLaunch] = []  # sums for the next step
-        own = self._launches(rows, ahead)
-        last = [launch for launch in own if launch not in ahead]
+        begin, end = self._clear(*self._slots()), [self.launch(gpu.finish_step, 1, self.s)]
+        own = self._launches(rows)
+        last = [launch for launch in own if launch not in self._ahead]
         return (
             [*begin, *own, *end, *self._publish(last=False)],
             [*begin, *last, *end, *self._publish(last=True)],
         )
 
-    # --- rooms
+    # --- device memory
 
-    def _cells(self, points: int) -> gpu.CellLists:
-        nodes, new, boxes = self.nodes, self.images.new, min(self.nodes, points) + 1
-        self.levels = [-(-nodes // gpu.CHUNK)]
-        while self.levels[-1] > gpu.CHUNK:
-            self.levels.append(-(-self.levels[-1] // gpu.CHUNK))
-        sums = (sum(self.levels),)
-        count = np.zeros(nodes, np.int32)
-        self.images.of(count)
-        self.images.send([count])
-        return gpu.CellLists(
-            count, new((points,), np.int32), new((nodes + 1,), np.int32),
-            new((nodes + 1,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
-            new(sums, np.int64), new(sums, np.int64), np.zeros((0, 0)), np.zeros((0, 0)),
-        )  # fmt: skip
-
-    def _totals(self) -> None:
-        """Give room to copies of the totals, and to counts of members."""
-        self.copies = np.zeros((self.card.copies, *self.s.control.totals.shape), np.int64)
-        self.heavy = np.zeros(max(len(self.functions), 1), np.int64)
-        self.images.of((self.copies, self.heavy))
-        self.images.send([self.copies, self.heavy])
-
-    def _rooms(self, s: arrays.Setup, rows: list) -> None:
-        """Give room to what cells sum: for the visit that gives most."""
-        stages = [self._stage(row) for row in self._plain(rows) if isinstance(row, table.Sweep)]
-        most = max((stage.numbers for stage in stages), default=0)
-        self.cells = [
-            cells._replace(
-                boxes=self.images.new((most, cells.cell.size), s.nodes.sums.dtype),
-                loads=self._loads(stages, block),
-            )
-            for cells, block in zip(self.cells, s.blocks, strict=True)
-        ]
-
-    def _loads(self, stages: list[gpu.Stage], block: Any) -> np.ndarray:
-        """Give room to what the points of a block give."""
-        loads = [stage.load for stage in stages if stage.scatters]
-        if INTERPRETED:
-            counts = [len(load(self.s, block, 0)) for load in loads]
-        else:
-            arguments = self.images.of((self.s, block))
-            counts = [numbers_of(load, arguments) for load in loads]
-        shape = (max(counts, default=0), block.points.mass.size)
-        return self.images.new(shape, self.s.nodes.sums.dtype)
-
-    def _stage(self, row: Any) -> gpu.Stage:
+    def _visit(self, row: Any) -> gpu.Stage:
         nodes = (row.at(self.s) if row.at else self.s).nodes
         present = ["sums", "velocity", *(type(one) for one in nodes.fields)]
         stage = gpu.Stage(row, self.s, present)
@@ -162,58 +124,53 @@ class StepsOnCard:
         stage.parts = max(1, -(-words // REGISTERS[size]))
         return stage
 
+    def _cells(self, block: Any) -> gpu.CellLists:
+        """Make the lists of a block's points by cell, and room for the largest sums and loads."""
+        nodes, new, points = self.nodes, self.images.new, block.points.mass.size * self.corners
+        boxes = min(nodes, points) + 1
+        self.levels = [-(-nodes // gpu.CHUNK)]
+        while self.levels[-1] > gpu.CHUNK:
+            self.levels.append(-(-self.levels[-1] // gpu.CHUNK))
+        sums = (sum(self.levels),)
+        count, real = np.zeros(nodes, np.int32), self.s.nodes.sums.dtype
+        self.images.of(count)
+        self.images.send([count])
+        most = max((visit.numbers for visit in self.visits.values()), default=0)
+        loads = (self._count_loads(block), block.points.mass.size)
+        return gpu.CellLists(
+            count, new((points,), np.int32), new((nodes + 1,), np.int32),
+            new((nodes + 1,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
+            new(sums, np.int64), new(sums, np.int64), new(loads, real), new((most, boxes), real),
+        )  # fmt: skip
+
+    def _count_loads(self, block: Any) -> int:
+        loads = [visit.load for visit in self.visits.values() if visit.scatters]
+        if INTERPRETED:
+            counts = [len(load(self.s, block, 0)) for load in loads]
+        else:
+            arguments = self.images.of((self.s, block))
+            counts = [numbers_of(load, arguments) for load in loads]
+        return max(counts, default=0)
+
     # --- launches
 
-    def _launch(
+    def launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
+        """Launch ``function(i, fate, *arguments)`` by `count` threads, while steps continue."""
         function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
-    def _of_points(self, function: Callable, block: Any, *rest: Any, **more: Any) -> KernelLaunch:
-        """Launch a function of the setup and a block, by a thread for each point."""
-        return self._launch(function, block.points.mass.size, self.s, block, *rest, **more)
+    def of_points(self, function: Callable, block: Any, *rest: Any, **more: Any) -> KernelLaunch:
+        """Launch ``function(i, fate, s, block, *rest)`` by a thread for each point."""
+        return self.launch(function, block.points.mass.size, self.s, block, *rest, **more)
 
-    def _launches(self, rows: list, ahead: list[KernelLaunch] | None = None) -> list[KernelLaunch]:
-        """List the launches of rows of a step; `ahead` takes those that serve the next one."""
-        found: list[KernelLaunch] = []
-        self._stages: set[int] = set()  # at which hooks have acted
-        for row in self._plain(rows):
-            if isinstance(row, table.Sweep):
-                found += self._visit(row, ahead)
-            elif isinstance(row, table.NodeTask):
-                found.append(self._launch(gpu.of_nodes(row), self.nodes, self.s, self.use))
-            elif isinstance(row, table.EachNode):
-                act = fixes.each_node(row.function, self.s)
-                found.append(self._launch(act, self.nodes, self.s, self.use, self.copies))
-            elif isinstance(row, table.EachPoint):
-                act = fixes.each_point(row.function, self.s)
-                for block in self.s.blocks:
-                    if isinstance(block.laws, row.law):
-                        found.append(self._of_points(act, block, self.copies))
-            elif isinstance(row, table.Once):
-                found += self._collect(0, len(self.s.control.totals))
-                found.append(self._launch(fixes.once(row.function), 1, self.s))
-            elif isinstance(row, table.AtNodes):
-                found += self._hooks_on_nodes(row.stage, row.target)
-            elif isinstance(row, table.AtPoints):
-                found += self._hooks_on_points(row.stage, row.then)
-            elif isinstance(row, table.Check):
-                found += [self._of_points(fixes.check_point, block) for block in self.s.blocks]
-                found.append(self._launch(fixes.take_moves, 1, self.s))
-                found.append(self._launch(gpu.take_reports(take_reports), 1, self.s))
-            elif row.function is add_work:
-                found += self._work_of_loads()
-            elif row.function is heat.at_heat_nodes:
-                found += self._hooks_on_nodes(*row.arguments, of_heat=True)
-            elif row.function is heat.at_heated_points:
-                found += self._hooks_on_points(arrays.SUPPLY_HEAT, 0)
-            else:
-                raise TypeError(f"no GPU knows what {row.function.__name__} does in a step")
-        return found
+    def _launches(self, rows: list) -> list[KernelLaunch]:
+        self._acted: set[int] = set()  # stages of hooks so far
+        return [one for row in rows for one in take.find((type(row), Card))(row, self)]
 
     def _plain(self, rows: Iterable) -> Iterator[Any]:
-        """Yield the rows of the scene, those that are repeated one after another."""
+        """Yield the rows of the scene; repeated ones one after another."""
         for row in table.plain(rows, self.s):
             if isinstance(row, table.Repeated):
                 for k in range(row.count(self.s)):
@@ -221,118 +178,103 @@ class StepsOnCard:
             else:
                 yield row
 
-    def _visit(self, row: Any, ahead: list[KernelLaunch] | None) -> list[KernelLaunch]:
-        gathers, scatters = list(self._gathers(row)), list(self._scatters(row, ahead))
-        if row.only_if_more and ahead is not None:
-            ahead += scatters
-        return gathers + scatters
+    def gathers(self, row: Any) -> Iterator[KernelLaunch]:
+        """Yield the launches of a gather."""
+        for block, cells in zip(self.s.blocks, self.cells, strict=True):
+            yield self.of_points(self.visits[id(row)].gather, block, cells)
+        if row.reported:
+            yield self.launch(gpu.take_reports(row.reported), 1, self.s)
 
-    def _gathers(self, row: Any) -> Iterator[KernelLaunch]:
-        if row.gathers:
-            gather = self._stage(row).gather
-            for block, cells in zip(self.s.blocks, self.cells, strict=True):
-                yield self._of_points(gather, block, cells)
-            if row.reported:
-                yield self._launch(gpu.take_reports(row.reported), 1, self.s)
-
-    def _scatters(self, row: Any, ahead: list[KernelLaunch] | None) -> Iterator[KernelLaunch]:
-        s, stage = self.s, self._stage(row)
+    def scatters(self, row: Any) -> Iterator[KernelLaunch]:
+        """Yield the launches of a scatter."""
+        s, visit = self.s, self.visits[id(row)]
         pairs = list(zip(s.blocks, self.cells, strict=True))
-        if not stage.scatters:
-            return
         if not row.gathers:
-            load = stage.load_point
             for block, cells in pairs:
-                yield self._of_points(load, block, cells)
-        # Points that stay are listed once, before the first step, where something is done then.
-        if stage.lists and (s.frame.moves or ahead is None or not self.begin):
-            count = stage.count
+                yield self.of_points(visit.load_point, block, cells)
+        # Points in reference places are listed once, before the first step if there is a launch.
+        if visit.lists and (s.frame.moves or not self.begin):
             for block, cells in pairs:
-                yield self._of_points(count, block, cells)
+                yield self.of_points(visit.count, block, cells)
                 yield from self._lists(block, cells)
-            yield self._launch(gpu.take_reports(take_reports), 1, s)
-            yield self._launch(stage.age(), self.nodes, s, self.use)
-            mark = stage.mark()
+            yield self.launch(gpu.take_reports(take_reports), 1, s)
+            yield self.launch(visit.age(), self.nodes, s, self.use)
+            mark = visit.mark()
             for cells in self.cells:
-                yield self._launch(mark, cells.cell.size, s, cells, self.use)
+                yield self.launch(mark, cells.cell.size, s, cells, self.use)
         for k, (block, cells) in enumerate(pairs):
-            for part in range(stage.parts):
-                scatter, sum_up = stage.scatter(part), stage.sum(part, anew=k == part == 0)
-                yield self._launch(scatter, cells.cell.size, s, block, cells)
-                yield self._launch(sum_up, self.nodes, s, block, cells, self.use)
+            for part in range(visit.parts):
+                scatter, sum_up = visit.scatter(part), visit.sum(part, anew=k == part == 0)
+                yield self.launch(scatter, cells.cell.size, s, block, cells)
+                yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
+        """Sort the points of a block by cell (counting sort with prefix sums by chunks)."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
-        yield self._launch(gpu.sum_counts, levels[0], cells)
+        yield self.launch(gpu.sum_counts, levels[0], cells)
         for k in range(len(levels) - 1):
-            rest = (begins[k], levels[k], begins[k + 1])
-            yield self._launch(gpu.sum_sums, levels[k + 1], cells, *rest)
+            level = begins[k], levels[k], begins[k + 1]
+            yield self.launch(gpu.sum_sums, levels[k + 1], cells, level)
         for k in reversed(range(len(levels))):
             above = begins[k + 1] if k + 1 < len(levels) else -1
-            yield self._launch(gpu.sum_before, levels[k], cells, begins[k], above)
-        yield self._launch(gpu.place_list, self.nodes, cells)
-        yield self._launch(gpu.list_point, cells.number.size, cells)
-        yield self._launch(gpu.sort_cell(self.corners), cells.cell.size, block.points.id, cells)
+            yield self.launch(gpu.sum_before, levels[k], cells, begins[k], above)
+        yield self.launch(gpu.place_list, self.nodes, cells)
+        yield self.launch(gpu.list_point, cells.number.size, cells)
+        yield self.launch(gpu.sort_cell(self.corners), cells.cell.size, block.points.id, cells)
 
     def _order(self) -> Iterator[KernelLaunch]:
-        """Bring points into the order in which threads go through them; domains stay."""
+        """Reorder points in memory as threads read them; not with several corners."""
         if self.corners > 1:
             return
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
             size = block.points.mass.size
             come_from = self.images.new((size,), np.int32)
-            yield self._launch(gpu.order_cell, cells.cell.size, cells, come_from)
+            yield self.launch(gpu.order_cell, cells.cell.size, cells, come_from)
             tables = [as_rows(self.images.of(array)) for _, array in arrays.arrays_of(block.points)]
             room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in tables)
-            if room.nbytes < most:  # where cells sum, there is room meanwhile
+            if room.nbytes < most:  # the sums of cells are free meanwhile
                 room = self.images.new((-(-most // 8),), np.int64)
             for rows in tables:
                 own = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
-                yield self._launch(gpu.take_rows, size, rows, come_from, own)
-                yield self._launch(gpu.put_rows, size, rows, own)
+                yield self.launch(gpu.take_rows, size, rows, come_from, own)
+                yield self.launch(gpu.put_rows, size, rows, own)
 
     # --- hooks of fixes
 
-    def _table(self) -> Any:
-        return () if isinstance(self.hooks, arrays.NoHooks) else self.hooks.table
-
     def _called(self, h: int) -> dict:
-        """Map what is called by its address to the functions of a hook."""
+        """Map what is called by address to the functions of a hook."""
         own = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
     def _has_formulas(self, h: int) -> bool:
-        """Tell whether a hook has formulas that are no numbers."""
+        """Return True for a hook with formulas that are not numbers."""
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
-        """Count published values that a thread needs for itself: of formulas a step earlier."""
-        if not (self._table()[h].uses_before and self._has_formulas(h)):
+        """Count published values that a thread copies: for formulas one step earlier."""
+        if not (self.table[h].uses_before and self._has_formulas(h)):
             return 0
-        return 1 + max((operand for op, operand in self._globals()), default=0)
+        return 1 + max(self._slots_read(), default=0)
 
-    def _globals(self) -> Iterator[tuple[int, int]]:
-        """Yield the instructions of formulas that ask for published values."""
-        return ((op, int(slot)) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL)
+    def _slots_read(self) -> list[int]:
+        """List the published values that formulas read."""
+        return [int(slot) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL]
 
-    def _members(self, h: int) -> int:
-        row = self._table()[h]
-        return self.nodes if row.begin < 0 else int(row.end - row.begin)
-
-    def _hooks_on_nodes(
+    def hooks_on_nodes(
         self, stage: int, target: int, of_heat: bool = False
     ) -> Iterator[KernelLaunch]:
+        """Yield the launches of hooks on nodes at a stage."""
         s = heat.at_its_nodes(self.s) if of_heat else self.s
-        own = [h for h, row in enumerate(self._table()) if row.stage == stage]
+        own = [h for h, row in enumerate(self.table) if row.stage == stage]
         yield from self._clear_again(stage, own)
         if own and target == arrays.ON_UPDATE and self.hooks.held.size:
-            yield self._launch(fixes.clear_held, self.nodes, self.hooks.held)
+            yield self.launch(fixes.clear_held, self.nodes, self.hooks.held)
         nodes_of, length = fixes.hooked_nodes(target, of_heat), step_size if of_heat else kick
         for h in own:
-            row = self._table()[h]
+            row = self.table[h]
             if row.uses_share:
-                yield self._launch(gpu.clear, 1, self.heavy, h)
+                yield self.launch(gpu.clear, 1, self.heavy, h)
                 yield self._act(fixes.count_node, h, s)
             if row.address != arrays.WHOLE:
                 yield self._act(fixes.on_node(nodes_of, ACT, self._values(h), length), h, s)
@@ -351,85 +293,89 @@ class StepsOnCard:
 
     def _act(self, function: Callable, h: int, s: arrays.Setup, *tag: arrays.Tag) -> KernelLaunch:
         """Launch a function of the members of a hook on nodes."""
-        about, called = fixes.Act(h, self.heavy, self.copies), self._called(h)
-        return self._launch(function, self._members(h), s, self.hooks, about, *tag, called=called)
+        about, called = fixes.Act(self.hooks, h, self.heavy, self.copies), self._called(h)
+        row = self.table[h]
+        count = self.nodes if row.begin < 0 else int(row.end - row.begin)
+        return self.launch(function, count, s, about, *tag, called=called)
 
-    def _hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
-        s, hooks = self.s, self.hooks
-        own = [h for h, row in enumerate(self._table()) if row.stage == stage]
+    def hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
+        """Yield the launches of hooks on points at a stage."""
+        own = [h for h, row in enumerate(self.table) if row.stage == stage]
         heats = stage == arrays.SUPPLY_HEAT
+        points_of = heat.heated if heats else moving_points
         yield from self._clear_again(stage, own)
-        for block in s.blocks:
-            if stage == arrays.INITIAL_INTEGRATE and getattr(hooks, "whole", ()):
-                yield self._of_points(fixes.clear_force, block)
+        for block in self.s.blocks:
+            if stage == arrays.INITIAL_INTEGRATE and len(self.table) and self.hooks.whole:
+                yield self.of_points(fixes.clear_force, block)
             for h in own:
-                about, called = fixes.Act(h, self.heavy, self.copies), self._called(h)
-                if self._table()[h].address != arrays.WHOLE:
-                    points_of = heat.heated if heats else moving_points
+                about, called = fixes.Act(self.hooks, h, self.heavy, self.copies), self._called(h)
+                if self.table[h].address != arrays.WHOLE:
                     act = fixes.on_point(points_of, then, self._values(h))
-                    yield self._of_points(act, block, hooks, about, called=called)
+                    yield self.of_points(act, block, about, called=called)
                 else:
                     act, tag = fixes.on_point(fixes.whole_points(heats), then), self._whole(h)
-                    yield self._of_points(act, block, hooks, about, tag, called=called)
+                    yield self.of_points(act, block, about, tag, called=called)
         for h in own:
             yield from self._publish_at_once(h)
 
-    def _work_of_loads(self) -> Iterator[KernelLaunch]:
-        if len(self._table()) and self.hooks.loads.size:
-            rest = self.s, self.hooks, fixes.Act(0, self.heavy, self.copies)
-            yield self._launch(fixes.work_of_loads, self.nodes, *rest, called=self._called(0))
+    def work_of_loads(self) -> Iterator[KernelLaunch]:
+        """Yield the launch that sums the work of loads on nodes."""
+        if len(self.table) and self.hooks.loads.size:
+            about = fixes.Act(self.hooks, 0, self.heavy, self.copies)
+            called = self._called(0)
+            yield self.launch(fixes.work_of_loads, self.nodes, self.s, about, called=called)
 
-    # --- totals, and the watch over energy
+    # --- totals, and the energy monitor
 
     def _rows_of(self, h: int) -> tuple[int, int]:
-        """Return the first of the rows of totals that a hook publishes, and where they end."""
-        row = self._table()[h]
+        """Return the range of rows of totals that a hook publishes."""
+        row = self.table[h]
         return int(row.slot), int(row.slot) + max(3, int(row.totals))
 
     def _slots(self) -> tuple[int, int]:
-        """Return the first of the rows of totals that hooks publish, and where they end."""
-        rows = [self._rows_of(h) for h, row in enumerate(self._table()) if row.slot >= 0]
+        """Return the range of rows of totals that all hooks publish."""
+        rows = [self._rows_of(h) for h, row in enumerate(self.table) if row.slot >= 0]
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
     def _clear_again(self, stage: int, own: list[int]) -> Iterator[KernelLaunch]:
-        """Clear the totals of hooks whose stage comes again in a step: the last time counts."""
-        if stage in self._stages:
+        """Clear the totals of hooks whose stage is repeated in a step: the last time counts."""
+        if stage in self._acted:
             for h in own:
-                if self._table()[h].slot >= 0:
+                if self.table[h].slot >= 0:
                     yield from self._clear(*self._rows_of(h))
-        self._stages.add(stage)
+        self._acted.add(stage)
 
     def _clear(self, first: int, end: int) -> list[KernelLaunch]:
-        """Clear rows of the totals."""
         sums, count = self.s.control.totals, end - first
         size = count * sums.shape[1]
         if not size:
             return []
         return [
-            self._launch(fixes.clear_totals, len(self.copies) * size, self.copies, first, count),
-            self._launch(fixes.clear_rows, size, sums, first),
+            self.launch(fixes.clear_totals, len(self.copies) * size, self.copies, first, count),
+            self.launch(fixes.clear_rows, size, sums, first),
         ]
 
-    def _collect(self, first: int, end: int) -> list[KernelLaunch]:
-        """Add up the copies of rows of the totals."""
+    def collect(self, first: int, end: int) -> list[KernelLaunch]:
+        """Sum rows of the totals over their copies."""
         sums = self.s.control.totals
         size = (end - first) * sums.shape[1]
-        return [self._launch(fixes.collect_total, size, self.copies, sums, first)] if size else []
+        return [self.launch(fixes.collect_total, size, self.copies, sums, first)] if size else []
 
     def _publish(self, last: bool) -> list[KernelLaunch]:
-        if not len(self._table()):
+        if not len(self.table):
             return []
-        numbers = 0, len(self._table())
-        publish = self._launch(fixes.publish, 1, self.s, self.hooks, numbers, last)
-        return [*self._collect(*self._slots()), *self._collect(WORK, WORK + 1), publish]
+        publish = self._publish_some((0, len(self.table)), last)
+        return [*self.collect(*self._slots()), *self.collect(WORK, WORK + 1), publish]
+
+    def _publish_some(self, numbers: tuple[int, int], always: bool) -> KernelLaunch:
+        return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish the totals of a hook after it, if other formulas may read them."""
+        """Publish the totals of a hook after it, if formulas read any hook's."""
         slots = range(*self._slots())
-        if self._table()[h].slot < 0 or all(read not in slots for _, read in self._globals()):
+        if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []
-        publish = self._launch(fixes.publish, 1, self.s, self.hooks, (h, h + 1), True)
-        return [*self._collect(*self._rows_of(h)), publish]
+        return [*self.collect(*self._rows_of(h)), self._publish_some((h, h + 1), True)]
 
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         """List the launches of a look at the energy: before, and a step later."""
@@ -439,12 +385,12 @@ class StepsOnCard:
         for block in s.blocks:
             if not moves_as_told(block.laws):
                 threads = -(-block.points.mass.size // gpu.CHUNK)
-                found.append(self._launch(fixes.add_energies, threads, s, block, copies, threads))
+                found.append(self.launch(fixes.add_energies, threads, s, block, copies))
             if field(block.points.fields, WorkOfForces) is not None:
-                found.append(self._of_points(fixes.add_work, block, copies))
-        found += [*self._collect(0, WORK + 1), *self._collect(*solids)]
+                found.append(self.of_points(fixes.add_work, block, copies))
+        found += [*self.collect(0, WORK + 1), *self.collect(*solids)]
         before, behind = (
-            self._launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
+            self.launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
         )
         return [*found, before], [*found, behind]
 
@@ -452,8 +398,8 @@ class StepsOnCard:
 
     def send(self) -> None:
         """Copy the state of the scene to the card."""
-        self.use[:] = 2  # what nodes show is unknown
-        # Steps that went wrong have left their part of the totals.
+        self.use[:] = 2  # nodes may have values of any step
+        # Failed steps have left terms in the copies of the totals.
         self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 
@@ -464,7 +410,7 @@ class StepsOnCard:
         self.images.fetch([array for array in here if id(array) not in nodes])
 
     def fetch_nodes(self) -> None:
-        """Copy back what nodes show, which no step needs."""
+        """Copy back the nodal output, which no step needs."""
         self.images.fetch(self._of_nodes())
 
     def _of_nodes(self) -> list[np.ndarray]:
@@ -473,7 +419,7 @@ class StepsOnCard:
 
     @property
     def wrong(self) -> int:
-        """Return the number of the first of the points that went wrong."""
+        """Return the lowest number of a failed point."""
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
@@ -515,3 +461,73 @@ class StepsOnCard:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]
         return list(zip(self.step, map(median, zip(*times, strict=True)), strict=True))
+
+
+# --- rows ---------------------------------------------------------------------------------------
+
+
+@take.on(table.Sweep, Card)
+def _sweep(row, steps):
+    gathers = list(steps.gathers(row)) if row.gathers else []
+    scatters = list(steps.scatters(row)) if steps.visits[id(row)].scatters else []
+    if row.only_if_more:
+        steps._ahead += scatters
+    return gathers + scatters
+
+
+@take.on(table.NodeTask, Card)
+def _node_task(row, steps):
+    yield steps.launch(gpu.of_nodes(row), steps.nodes, steps.s, steps.use)
+
+
+@take.on(table.EachNode, Card)
+def _each_node(row, steps):
+    act = fixes.each_node(row.function, steps.s)
+    yield steps.launch(act, steps.nodes, steps.s, steps.use, steps.copies)
+
+
+@take.on(table.EachPoint, Card)
+def _each_point(row, steps):
+    act = fixes.each_point(row.function, steps.s)
+    for block in steps.s.blocks:
+        if isinstance(block.laws, row.law):
+            yield steps.of_points(act, block, steps.copies)
+
+
+@take.on(table.Once, Card)
+def _once(row, steps):
+    yield from steps.collect(0, len(steps.s.control.totals))
+    yield steps.launch(fixes.once(row.function), 1, steps.s)
+
+
+@take.on(table.Check, Card)
+def _check(row, steps):
+    for block in steps.s.blocks:
+        yield steps.of_points(fixes.check_point, block)
+    yield steps.launch(fixes.take_moves, 1, steps.s)
+    yield steps.launch(gpu.take_reports(take_reports), 1, steps.s)
+
+
+@take.on(table.AtNodes, Card)
+def _at_nodes(row, steps):
+    return steps.hooks_on_nodes(row.stage, row.target)
+
+
+@take.on(heat.AtHeatNodes, Card)
+def _at_heat_nodes(row, steps):
+    return steps.hooks_on_nodes(row.stage, row.target, of_heat=True)
+
+
+@take.on(table.AtPoints, Card)
+def _at_points(row, steps):
+    return steps.hooks_on_points(row.stage, row.then)
+
+
+@take.on(heat.AtHeatedPoints, Card)
+def _at_heated_points(row, steps):
+    return steps.hooks_on_points(arrays.SUPPLY_HEAT, 0)
+
+
+@take.on(table.WorkOfLoads, Card)
+def _work_of_loads(row, steps):
+    return steps.work_of_loads()

@@ -164,9 +164,10 @@ class SimulationOnCard(Simulation):
             self._fetch()
             if steps is not None:
                 steps.images.close()
-            card, scheme = self.hub.settings.card, type(self.hub.update.scheme)
+            program = type(self.hub.update.scheme), type(self.visits)
+            card, acting = self.hub.settings.card, (hooks, functions)
             with missing_told(self.hub):
-                steps = StepsOnCard(card, self._setup, scheme, type(self.visits), hooks, functions)
+                steps = StepsOnCard(card, self._setup, program, acting)
             self._steps, self._known, self._sent = steps, known, False
         return steps
 

@@ -244,7 +244,7 @@ class SceneArrays:
         dt = step_size(s)
         sweep(s, self.mode, Visit((), SUMS.quantities, SUMS.weights), dt, False, True, False)
         all_well(s)
-        sweep_nodes(self.mode, SumsToVelocity(), s.kin, s.nodes, s.ranges, dt)
+        sweep_nodes(self.mode, SumsToVelocity(), s, dt)
         if isinstance(s.heat, Conducting):
             take_rows(SHOW, s, self.mode, NoHooks())
         self.mapped = True

@@ -12,7 +12,16 @@ from numba import config
 from karamelo_py.kernels.arrays import DT, TIME, Hooks, NoHooks, Setup
 from karamelo_py.kernels.clock import STILL, choose_dt
 from karamelo_py.kernels.hooks import POINT_STAGES
-from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, advance, measure, run_steps
+from karamelo_py.kernels.step import (
+    DONE,
+    SORT,
+    Fused,
+    Staged,
+    StepKind,
+    advance,
+    measure,
+    run_steps,
+)
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.kernels.watch import COARSE, ROUND_OFF, begin_to_look, measure_heat, sum_energies
 from karamelo_py.run import timestep
@@ -253,6 +262,11 @@ class Simulation(SceneArrays):
         clock[:] = present
         return energy
 
+    @property
+    def step_kind(self) -> StepKind:
+        """The tags that select the code of a step."""
+        return StepKind(self.hub.update.scheme, self.visits, self.mode)
+
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
         """Take up to `count` steps (to the end time at most); DONE, or why it stopped.
 
@@ -292,9 +306,9 @@ class Simulation(SceneArrays):
         if self.implicit:
             status = self.load_steps.advance(hooks, count)
         elif isinstance(hooks, PythonHooks):
-            status = run_steps(scheme, Staged(), self.mode, self.setup, hooks, count)
+            status = run_steps(StepKind(scheme, Staged(), self.mode), self.setup, hooks, count)
         else:
-            status = advance(scheme, self.visits, self.mode, self.setup, hooks, count)
+            status = advance(self.step_kind, self.setup, hooks, count)
         if first is None or status not in (DONE, SORT):
             return status
         self.begun |= set(self._first_fixes)
@@ -342,8 +356,7 @@ class Simulation(SceneArrays):
         hooks = self._acting
         if config.DISABLE_JIT or isinstance(hooks, PythonHooks) or self.implicit:
             return
-        arguments = self.hub.update.scheme, self.visits, self.mode, self.setup, hooks, 1
-        self.comm.in_turn(lambda: advance.compile(*arguments))
+        self.comm.in_turn(lambda: advance.compile(self.step_kind, self.setup, hooks, 1))
 
     def _make_ready(self) -> None:
         """Prepare the hooks of the fixes, and contact, for a run."""

@@ -25,6 +25,7 @@ from karamelo_py.kernels.hooks import (
     WORDS,
     CompiledHook,
 )
+from karamelo_py.kernels.step import untaken
 from karamelo_py.language import faults, registry
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
@@ -42,10 +43,6 @@ from karamelo_py.script.values import in_a_row
 # Required class attributes.
 SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "traits")}
 TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
-ROWS = (
-    table.AtPoints, table.AtNodes, table.Gather, table.Scatter, table.NodeTask, table.SceneTask,
-    table.Check,
-)  # fmt: skip
 COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
 ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelling
@@ -198,7 +195,7 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
     if family == "transfer" and not updated_velocity.defined(kind):
         error = error or f"updated_velocity is not defined for {kind.__name__}"
     if family == "scheme" and not error:
-        strange = [row for row in kind.rows if not isinstance(row, ROWS)]
+        strange = [row for row in kind.rows if untaken([row], table.Processor)]
         if strange:
             error = f"{strange[0]!r} in its rows is not a row of a scheme"
         elif not any(isinstance(row, table.Scatter) for row in kind.rows):

@@ -17,7 +17,7 @@ from karamelo_py.compiler.compile import index
 from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import Serial, Threaded, new_team, shared_out
 from karamelo_py.kernels.clock import finish
-from karamelo_py.kernels.step import DONE, Fused, begin, step
+from karamelo_py.kernels.step import DONE, Fused, StepKind, begin, step
 from karamelo_py.kernels.sums import columns_of
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.language.interpreter import Interpreter
@@ -177,10 +177,10 @@ def _sweep_points_timed(mode, visit, s, block):
 
 
 @sweep_nodes.on(Timed)
-def _sweep_nodes_timed(mode, task, kin, nodes, ranges, dt):
-    for swept in (ranges, np.zeros_like(ranges)):
+def _sweep_nodes_timed(mode, task, s, dt):
+    for swept in (s, s._replace(ranges=np.zeros_like(s.ranges))):
         with _noted(mode.of_nodes, _name(task)):
-            sweep_nodes(mode.mode, task, kin, nodes, swept, dt)
+            sweep_nodes(mode.mode, task, swept, dt)
 
 
 @sum_buffers.on(Timed)
@@ -302,7 +302,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {}, {})
-    begin(scheme, Fused(), timed, s)
+    begin(StepKind(scheme, Fused(), timed), s)
     _take_step(simulation, timed)
     timed.of_points.clear()
     timed.of_nodes.clear()
@@ -314,7 +314,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
         clock = s.control.clock[0]
         if clock.drift > clock.drift_limit:  # points would be out of date
             simulation.sort()
-            begin(scheme, Fused(), simulation.mode, s)
+            begin(StepKind(scheme, Fused(), simulation.mode), s)
     of_points, of_nodes = (
         {name: _per_step(taken, count) for name, taken in kind.items()} for kind in timed[1:]
     )
@@ -328,7 +328,7 @@ def _per_step(taken: list[float], count: int) -> float:
 
 def _take_step(simulation: Simulation, mode: Any) -> None:
     s, scheme = simulation.setup, simulation.hub.update.scheme
-    if not step(scheme, Fused(), mode, s, simulation.hooks, True):
+    if not step(StepKind(scheme, Fused(), mode), s, simulation.hooks, True):
         raise ScriptError("a workload went wrong")
     finish(s.control)
 
@@ -351,7 +351,7 @@ def _sweep_points_recorder(mode, visit, s, block):
 
 
 @sweep_nodes.on(_Recorder)
-def _sweep_nodes_recorder(mode, task, kin, nodes, ranges, dt):
+def _sweep_nodes_recorder(mode, task, s, dt):
     mode.nodes.extend(task.goes_through)
     mode.regions.append(1)
 
@@ -375,7 +375,7 @@ def traffic(simulation: Simulation) -> tuple[float, float, int]:
     recorder = _Recorder([], [], [], [])
     control = s.control
     kept = control.values.copy(), control.clock.copy()
-    step(scheme, Fused(), recorder, s, simulation.hooks, True)
+    step(StepKind(scheme, Fused(), recorder), s, simulation.hooks, True)
     control.values[:], control.clock[:] = kept
     of_point = {name: size for name, _, size in point_fields(s.blocks[0])}
     of_node = {name: array.itemsize * array.shape[1] for name, array in node_fields(s)}

@@ -1,7 +1,7 @@
-"""Quantities that points give to the nodes, and tasks that gather from them: one file each.
+"""Quantities that points scatter, and tasks that gather: one file each.
 
-A quantity is a tag with its equations as data, `takes` and `gives`; a task has functions `empty`,
-`gathered` and `updated`. docs/house/kernels.md shows one of each.
+A quantity is a tag with equations as data, `takes` and `gives`; a task has functions `empty`,
+`gathered` and `updated`. docs/house/kernels.md has an example of each.
 """
 
 from collections import namedtuple
@@ -23,12 +23,12 @@ from karamelo_py.points.transfers import Moment, zero_moment
 
 
 class NodeColumns(NamedTuple):
-    """Columns of an array of nodes: a name in `Nodes`, or the class of a field."""
+    """Columns of a node array: a name in `Nodes`, or the class of a field."""
 
     array: Any
     first: Callable  # functions of the kinematics
     count: Callable
-    end: Callable  # with the gap after them: records fill registers
+    end: Callable  # including padding to registers
 
 
 def _zero(kin):
@@ -36,11 +36,10 @@ def _zero(kin):
 
 
 class Sum(NamedTuple):
-    """Sum over the points at a node: ``of(pt, node)`` is the part of a point, a tuple.
+    """Sum over points at a node: ``of(pt, node)`` is a point's contribution, a tuple.
 
-    Where it is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b, no columns
-    for b = 0, or () if that is unknown: in lanes, such sums are brought into the order of the
-    records once per point, instead of once per node.
+    Where it is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none for b
+    = 0), else (): in lanes, affine sums are arranged for the records once per point, not per node.
     """
 
     into: NodeColumns
@@ -49,17 +48,16 @@ class Sum(NamedTuple):
 
 
 def whole(kind: Any, count: Callable | None = None) -> NodeColumns:
-    """Return the columns of a field; `count`, a function of the kinematics, if they are fewer."""
+    """Return the columns of a field, or its first `count(kin)`."""
     count = count or kind.shape
     return NodeColumns(kind, _zero, count, count)
 
 
 class RigidSums(SummedField):
-    """Sums of the rigid points at a node: mass, momentum, force on them, as in `Nodes.sums`."""
+    """Sums of rigid points at a node, as in `Nodes.sums`; force on them."""
 
     @staticmethod
     def shape(kin):
-        """Return the components of the sums of a node."""
         return arrays.SUMS_WIDTH[kin.dimension]
 
 
@@ -76,12 +74,12 @@ def of_point(**functions: Callable) -> MappingProxyType:
 
 
 class NodalQuantity(NamedTuple):
-    """Base of quantities that also work in lanes; `not_at_corners` as in `kernels.stencils`."""
+    """Base of quantities; they work in lanes. `not_at_corners`: see `kernels.stencils`."""
 
     in_lanes = True
     not_at_corners = ()
-    records = ""  # array of nodes whose records are prefetched, if any
-    adds = False  # to the present values at the nodes, instead of replacing them
+    records = ""  # array of nodes to prefetch
+    adds = False  # to present values at nodes, instead of replacing them
     also_reads = ()  # fields of points, in addition to `takes`
     takes = of_point()
     gives = ()
@@ -92,10 +90,7 @@ class NodalQuantity(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Base of tasks that also work in lanes and at domain corners.
-
-    They have functions ``empty``, ``gathered`` and ``updated``, as declared below.
-    """
+    """Base of tasks that work in lanes, with functions ``empty``, ``gathered`` and ``updated``."""
 
     in_lanes = True
     not_at_corners = ()
@@ -109,10 +104,10 @@ class Task(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Result of a point in a task; NaN or infinity for a failed one."""
+    """Result of a point in a task; NaN or infinity if it failed."""
 
-    moved: Number  # its move, in cells
-    rate: Number  # the largest so far, for the step size: as `Sweep.reported` takes it
+    moved: Number  # move, in cells
+    rate: Number  # largest rate so far, as `Sweep.reported` takes it
 
 
 @point_function()
@@ -122,20 +117,20 @@ def empty(task: Tag, w: Work, x: tuple) -> tuple:
 
 @point_function()
 def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
-    """Add the contribution of a node to `total`."""
+    """Return `total` plus the contribution of a node."""
 
 
 @point_function()
 def updated(task: Tag, pt: PointView, total: tuple, totals: tuple, fastest: Number) -> Report:
-    """Store the update from `total`, one of the `totals` of the visit; report on the point.
+    """Store the update from `total`, one of the `totals` of the visit.
 
-    The larger of its rate and `fastest`, the largest so far, is reported.
+    The reported rate is the larger of the point's and `fastest`.
     """
 
 
 @point_function()
 def load_of(quantity: Tag, pt: PointView) -> tuple:
-    """Return the load of a point: the numbers that it scatters, before weighting."""
+    """Return what a point scatters, before weighting."""
 
 
 @point_function()
@@ -145,14 +140,13 @@ def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
 
 @point_function()
 def affine_part(quantity, w, stencil, load):
-    """Return (array, first component, value at the first node, growth per node) of a quantity.
+    """Return (array, first component, value at the first node, increments per node), or ().
 
-    One growth for each direction, or none where all nodes see the same. () for what is not affine.
+    One increment per direction, or none if all nodes get the same.
     """
 
 
 def _register(own: Any) -> None:
-    """Register the equations of a quantity."""
     groups = [(array, (*sums,)) for array, sums in groupby(own.gives, lambda one: one.into.array)]
     made, takes = namedtuple("Load", own.takes), tuple(own.takes.values())  # type: ignore[misc]
     names = [name for take in takes for name in take.reads]
@@ -184,12 +178,12 @@ def _register(own: Any) -> None:
 
 
 def found(nodes: Nodes, array: Any) -> Any:
-    """Return an array of nodes by its name or the class of its field; None where it is absent."""
+    """Return an array of nodes by name or field class; None if it is absent."""
     return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
 
 
 def _at_first(w, stencil, value, slopes):
-    """Return the value at the first node and growth per node: of one at the point, per length."""
+    """Return value at the first node and increments per node, from value and slopes at a point."""
     value = value if isinstance(value, tuple) else (value,)
     if not len(slopes):
         return value, ()
@@ -201,7 +195,7 @@ def _at_first(w, stencil, value, slopes):
 
 
 def _joined(parts):
-    """Join values and growths of sums into one record; what does not grow has zeros."""
+    """Join values and increments of sums into one record, with zeros for constants."""
     values = flat([value for value, _ in parts])
     growing = [growths for _, growths in parts if len(growths)]
     if not growing:
@@ -217,7 +211,7 @@ def _joined(parts):
 
 
 def reads(*names: str) -> Callable:
-    """Declare the fields of points that a function of a point reads."""
+    """Declare the point fields that a function reads."""
 
     def declare(function: Any) -> Any:
         function.reads = names
@@ -227,13 +221,13 @@ def reads(*names: str) -> Callable:
 
 
 def is_apart(w):
-    """Return True for rigid points with separate sums at their nodes."""
+    """Return True for rigid points with separate sums."""
     return laws.moves_as_told(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
 @reads("mass")
 def mass(pt):
-    """Mass that a point gives to the sums of all solids: 0 for rigid points with separate sums."""
+    """Mass given to the sums of all solids: 0 for rigid points with separate sums."""
     own = of_present(pt.p, pt.w.points.mass[pt.p])
     return own - own if is_apart(pt.w) else own
 
@@ -246,7 +240,7 @@ def v(pt):
 
 @reads("moment")
 def moment(pt):
-    """Tensor that the transfer stores with the velocity; () if it stores none."""
+    """Tensor stored with the velocity; () if none."""
     return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
 
 
@@ -254,7 +248,6 @@ def moment(pt):
 
 
 def empty_all(tasks, w, x):
-    """Return the initial totals of all tasks."""
     return tuple([empty(task, w, x) for task in tasks])
 
 
@@ -265,7 +258,7 @@ def gathered_all(tasks, w, stencil, k, totals):
 
 
 def updated_all(tasks, pt, totals, fastest):
-    """Update by the tasks in order: moves are summed, and the rate is passed on."""
+    """Update by all tasks in order; return the sum of moves and the rate."""
     moved = real(0, fastest)
     for task, total in zip(tasks, totals, strict=True):
         further, fastest = updated(task, pt, total, totals, fastest)
@@ -274,11 +267,9 @@ def updated_all(tasks, pt, totals, fastest):
 
 
 def load_all(quantities, pt):
-    """Return the loads of all quantities."""
     return tuple([load_of(quantity, pt) for quantity in quantities])
 
 
 def scattered_all(quantities, loads, node):
-    """Add the contributions of all quantities to a node."""
     for quantity, load in zip(quantities, loads, strict=True):
         scattered(quantity, load, node)

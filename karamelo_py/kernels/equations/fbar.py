@@ -1,7 +1,7 @@
-"""F-bar: changes of volume are averaged over the surroundings, where a scene asks for it.
+"""F-bar: volume changes are averaged over the surroundings.
 
-The ratio of volumes J_p of an increment becomes the average of Jbar_i = sum_q N_iq V_q J_q / sum_q
-N_iq V_q over the nodes (after Coombs et al. 2018, "Overcoming volumetric locking in material point
+The volume ratio J_p of an increment becomes the average of Jbar_i = sum_q N_iq V_q J_q / sum_q N_iq
+V_q over the nodes (after Coombs et al. 2018, "Overcoming volumetric locking in material point
 methods", eq. 23; there over the points of a cell).
 """
 
@@ -18,46 +18,46 @@ from karamelo_py.points.kinematics import I, nothing
 
 
 class VolumeRatio(StepField):
-    """Ratio of volumes of the trial increment of a point."""
+    """Volume ratio of a point's trial increment."""
 
     start = 1.0
 
 
 class NodalMean(SummedField):
-    """Sum weight times value, and weights, at a node; then replace the first by the mean.
+    """Weighted sum of values, and sum of weights, at a node; then the mean.
 
-    Of ratios of volumes, weighted with volumes (F-bar); of temperatures, weighted with conductance.
+    Volume ratios weighted with volumes (F-bar); temperatures weighted with conductance.
     """
 
     shape = pair
 
 
 class AveragedStress(StepField):
-    """Mean stress of a point and its surroundings."""
+    """Averaged mean stress at a point."""
 
 
 class PressureBeside(Field):
-    """Pressure that the last forces had more than the point: averaged less own (F-bar)."""
+    """Averaged minus own pressure in the last forces (F-bar)."""
 
 
 class NodalStress(SummedField):
-    """Sum of weight, volume and mean stress, and of weight and volume; then the mean."""
+    """Sums of N V times mean stress, and of N V, at a node; then the mean."""
 
     shape = NodalMean.shape
 
 
 class PointByPoint(NamedTuple):
-    """Every point has its own change of volume."""
+    """No averaging."""
 
     in_lanes = True
 
 
 class FBar(NamedTuple):
-    """Changes of volume are averaged over the surroundings, against volumetric locking.
+    """Averaged volume changes, against volumetric locking.
 
-    With d_p the rate of volume of a point and V_p its volume, the average is
-    sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with volumes it is its own adjoint: the
-    mean stress averaged alike gives forces whose power equals the averaged strain's.
+    With volume rates d_p, the average is sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted
+    with volumes it is self-adjoint: the mean stress averaged alike gives forces whose power is that
+    of the averaged strain.
     """
 
     in_lanes = True
@@ -66,10 +66,10 @@ class FBar(NamedTuple):
 
 
 class FBarOfSoil(FBar):
-    """The same, with laws whose yield surface takes a part of the averaged pressure.
+    """F-bar with laws whose yield surface uses a part of the averaged pressure.
 
-    If it took the point's pressure, soil that dilates less than friction asks for would lose
-    strength in stripes (:func:`~karamelo_py.points.laws.strengths.frictional.share_of_average`).
+    With the point's pressure, soil that dilates less than friction requires would lose strength in
+    stripes (:func:`~karamelo_py.points.laws.strengths.frictional.share_of_average`).
     """
 
     point_fields = (*FBar.point_fields, PressureBeside)
@@ -77,7 +77,7 @@ class FBarOfSoil(FBar):
 
 @eq.reads("mass", "state", "material", "volume ratio")
 def volumes(pt):
-    """Volume of a point after and before the trial increment."""
+    """Volume after and before the trial increment."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     return volume * pt.of(VolumeRatio)[0, pt.p], volume
@@ -92,7 +92,7 @@ class Volumes(eq.NodalQuantity):
 
 
 def mean_stress(pt):
-    """Return volume times mean Kirchhoff stress of a point, and its present volume."""
+    """Return volume times mean Kirchhoff stress, and present volume."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()
@@ -101,7 +101,7 @@ def mean_stress(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
-    """Minus volume times the averaged mean stress less the point's, a tensor."""
+    """-V times averaged minus own mean stress, a tensor."""
     _, _, f = pt.law_state_F
     own, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - own
@@ -109,7 +109,7 @@ def minus_V_stress_beside(pt):
 
 
 class AveragedForce(eq.NodalQuantity):
-    """Add the force of the averaged mean stress minus the point's mean stress."""
+    """Add the force of averaged minus own mean stress."""
 
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
@@ -158,9 +158,9 @@ def gathered_ratio(node, total):
 
 
 def averaged(pt, dl, ratio):
-    """Give `dl` the change of volume that the surroundings have on average, where there is one.
+    """Give `dl` the averaged volume change, if there is one.
 
-    In the total frame, `dl` is dt Fdot, and F + dl is scaled.
+    In the total frame `dl` is dt Fdot, and F + dl is scaled.
     """
     if not len(ratio):
         return dl
@@ -174,7 +174,7 @@ def averaged(pt, dl, ratio):
 
 @node_task
 class TakeMean(NamedTuple):
-    """The weighted mean from its two sums, at the nodes."""
+    """The weighted mean from its two sums."""
 
     goes_through = ("nodal mean", "nodal mean")
 
@@ -185,6 +185,6 @@ class TakeMean(NamedTuple):
 
 
 class TakeMeanStress(TakeMean):
-    """The same of the mean stress."""
+    """The mean of the mean stress."""
 
     goes_through = ("nodal stress", "nodal stress")

@@ -1,4 +1,4 @@
-"""Heat: capacity and heat of nodes, the flow by conduction, and the temperature of points.
+"""Heat: capacity and heat of nodes, conduction, and the temperature of points.
 
 C_i = sum_p N_ip C_p, C_i T_i = sum_p N_ip C_p (T_p + grad T_p (X_i - x_p)), and the flow to a node
 -sum_p k_p V_p grad T_p grad N_ip. Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt &
@@ -15,7 +15,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.kinematics import Line
 
-# Heat has one component: its flow lies where a force of a line does.
+# Heat flow is where the force of a line is.
 HEAT = eq.NodeColumns("sums", lambda kin: 0, pair, lambda kin: of_force(Line()))
 FLOW = eq.NodeColumns("sums", HEAT.end, scalar, lambda kin: of_force(Line()) + 1)
 
@@ -43,7 +43,7 @@ class Supply(StepField):
 
 
 class TemperatureShare(StepField):
-    """Fraction of the change of the nodal temperature that a point takes."""
+    """Fraction of the nodal temperature change that a point takes."""
 
 
 class HeatGradient(Field):
@@ -60,14 +60,14 @@ def at_least_round_off(weight):
     """Return `weight`, or a tiny number if it is 0.
 
     A point on a node has no weight at the next node, but a gradient: that node needs the
-    temperature that the point has there, and the flow to it has to return.
+    temperature of the point, and the flow to it must return.
     """
     return max(weight, round_off(weight))
 
 
 @eq.reads("mass", "state", "material")
 def content(pt):
-    """Heat capacity, conductivity times volume, and temperature of a point; also stored."""
+    """Heat capacity, conductivity times volume, and temperature; also stored."""
     (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
@@ -77,7 +77,7 @@ def content(pt):
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance
     pt.of(Volume)[0, p] = volume
-    # Fixes may supply heat, and reset the fraction of the change that the point takes.
+    # Fixes may change both.
     pt.of(Supply)[0, p] = real(0, pt.dt)
     pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
     return of_present(p, capacity), of_present(p, conductance), T
@@ -110,7 +110,7 @@ def mean_at(pt, node):
 
 
 class HeatContent(eq.NodalQuantity):
-    """Scatter heat capacity and heat, with the points' gradients up to the nodes."""
+    """Scatter heat capacity and heat, extrapolated by gradients."""
 
     not_at_corners = ("anything",)
     says = "heat to grid"
@@ -171,7 +171,7 @@ class TemperatureGradient(eq.Task):
 
 
 class Warming(eq.Task):
-    """Gather the change of the nodal temperature; update the temperature of the point."""
+    """Gather the nodal temperature change; update the point's temperature."""
 
     not_at_corners = ("anything",)
     says = "temperature"
@@ -197,7 +197,7 @@ class Warming(eq.Task):
         return fma(weight, node.w.nodes.update[node.i, 1], change), mean
 
     def updated(task, pt, total, totals, fastest):
-        """Update the temperature; the rate is the factor by which conduction has become faster."""
+        """The reported rate is the factor by which conduction has become faster."""
         law, state, f = pt.law_state_F
         T, p = pt.of(Temperature)[0, pt.p], pt.p
         capacity = pt.of(Capacity)[0, p]

@@ -1,7 +1,6 @@
 """Forces on nodes: f_i = sum_p (-V_p sigma_p grad N_ip + N_ip f_p), f_p the force of fixes.
 
-In the total frame, with the reference volume, the first Piola-Kirchhoff stress and the gradient at
-reference positions.
+In the total frame with reference volume, first Piola-Kirchhoff stress and reference gradients.
 """
 
 from karamelo_py.compiler.compile import of_present, real
@@ -23,12 +22,12 @@ class Force(StepField):
 
 
 class WorkOfForces(Field):
-    """Work of that force since the last look at the energy."""
+    """Work of `Force` since the last look at the energy."""
 
 
 @eq.reads("mass", "state", "material", "deformation gradient")
 def minus_V_stress(pt):
-    """Minus volume times the stress that acts on the frame's gradients, a tensor."""
+    """-V times the stress conjugate to the frame's gradients, a tensor."""
     law, state, f = pt.law_state_F
     volume = eq.mass(pt) * laws.specific_volume(law)
     return -volume * force_stress(pt.w.frame, pt.kin, laws.kirchhoff_stress(law, pt.kin, state), f)
@@ -36,17 +35,17 @@ def minus_V_stress(pt):
 
 @eq.reads("force")
 def force_of_fixes(pt):
-    """Force (d,) of fixes on a point; () where none acts."""
+    """Force (d,) of fixes; () if none acts."""
     force = pt.load(Force, pt.v)
     if not len(force):
         return ()
-    # Rigid points take no force: it would act on other points at their nodes.
+    # A force on rigid points would act on other points at their nodes.
     return of_present(pt.p, real(0 if laws.moves_as_told(pt.w.laws) else 1, force[0])) * force
 
 
 @eq.reads()
 def V_mean_stress(pt):
-    """Volume times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
+    """V times mean Kirchhoff stress, and present volume (F-bar); else ()."""
     return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
 
 
@@ -57,7 +56,7 @@ def force_at(pt, node):
 
 
 def affine_force(pt, w):
-    """Force at the point and its slope, where strains have moments as weights (MLS)."""
+    """Force at the point and its slope, where gradients are moments of weights (MLS)."""
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()
@@ -66,7 +65,7 @@ def affine_force(pt, w):
 
 
 class InternalForce(eq.NodalQuantity):
-    """Scatter the internal force, and the forces of fixes on points."""
+    """Scatter internal force and forces of fixes."""
 
     not_at_corners = ("moments",)
     says = "internal force"

@@ -1,23 +1,22 @@
-"""Kinetic energy that a transfer takes, given back as heat to laws that have an internal energy.
+"""Kinetic energy lost in a transfer, returned as heat to laws with internal energy.
 
-A point p of mass m gives a node i the velocity a_ip = v_p + what its moment adds there, with the
-weight N_ip m. The nodes store the mean v_i, and lose sum_p N_ip m |a_ip - v_i|^2 / 2: never
-negative. The node stores it per mass, and points take it back by their weights, conserving it.
-On the way back points retain the mean and the moment of v_i, and m sum_i N_ip |v_i - v_p|^2 / 2,
-less what the moment holds, is gone at the point. FLIP, v -> alpha v + (1 - alpha) P v with P to the
-nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of the second.
+A point p of mass m gives node i the velocity a_ip = v_p + the part of its moment, with weight N_ip
+m. The nodes store the mean v_i, and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0. The node stores that
+per mass, and points take it back by their weights, conserving it. On the way back points retain the
+mean and the moment of v_i, and lose m sum_i N_ip |v_i - v_p|^2 / 2 less what the moment holds.
+FLIP, v -> alpha v + (1 - alpha) P v with P to the nodes and back, loses 1 - alpha^2 of the first
+sum and (1 - alpha)^2 of the second.
 
-For AFLIP and its kin these are the sums with their moments, and what is left out, the energy of the
-moments themselves, comes and goes: moments follow the velocity. XPIC leaves Q^m v of v, with Q =
-1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and w_k = S+ r_k, the terms of its
-series, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip
-|w_ki - S w_k|^2, q = [(m+1)/2]: each part is local, and never negative.
+AFLIP and its kin lose these sums with their moments; the energy of the moments themselves comes and
+goes, as moments follow the velocity. XPIC leaves Q^m v of v, Q = 1 - P, and loses <v, Q^m v> - |Q^m
+v|^2 / 2. With r_k = Q^k v and the terms of its series w_k = S+ r_k, this is half of |r_q|^2 +
+sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each part is
+local and >= 0.
 
-The change dv by forces is no part of this. What forces give to velocities that points do not take
-does not strain the points either, if the strain is from the points' velocity mapped again
-(musl): there is nothing to give back, and a hot point alone in its cells would heat itself by that.
-Apart from time integration, the remainder is that moments are mapped a little differently after a
-move (not with splines), and that usl strains by dv, which may only cost.
+The change dv by forces is not included: what forces give to velocities that points do not take does
+not strain the points either in musl, where strain is from the re-mapped velocity. A hot point alone
+in its cells would heat itself by that. Apart from time integration, the remainder is that moments
+are mapped differently after a move (not with splines), and that usl strains by dv.
 """
 
 from collections import namedtuple
@@ -33,15 +32,15 @@ from karamelo_py.points import laws, transfers
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 OnePoint = namedtuple("OnePoint", "mass v moment")  # for `transfers.nodal_momentum`
-# Fraction of the mass at its nodes above which a point loses its moment, per dimension:
-# for one point per cell, on nodes, it is 0.594 with quadratic splines, and less for other bases.
+# Fraction of the mass at its nodes above which a point loses its moment, per dimension. One point
+# per cell, on nodes, has 0.594 with quadratic splines, less with other bases.
 ALONE = 0.6
 
 
 class EnergyLoss(SummedField):
-    """Kinetic energy brought to a node; the part that it dissipates, per mass; and its mass.
+    """Kinetic energy brought to a node; the dissipated part per mass; and its mass.
 
-    A fused step brings the energy and mass of the next step while points take back the loss.
+    A fused step brings energy and mass of the next step while points take back the loss.
     """
 
     shape = triple
@@ -51,17 +50,16 @@ BROUGHT = whole(EnergyLoss, scalar)
 
 
 class FrictionalHeat(StepField):
-    """Heat of friction at a node, per mass: of contact between solids and of walls."""
+    """Frictional heat at a node per mass, of contact and walls."""
 
 
 @node_task
 class KeepLoss(NamedTuple):
-    """Energy loss of a node: kinetic energy from points minus its own kinetic energy."""
+    """Energy loss of a node: kinetic energy brought by points minus its own."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 
     def at_node(task, kin, nodes, n, dt):
-        """Store, per mass, the energy from points that the node does not have."""
         lost, mass = field(nodes.fields, EnergyLoss), nodes.sums[n, MASS]
         if mass > 0:
             one = real(1, mass)
@@ -70,7 +68,7 @@ class KeepLoss(NamedTuple):
             for k in range(kin.dimension):
                 v = nodes.sums[n, of_momentum(kin) + k] * factor
                 kinetic += real(0.5, mass) * v * v
-            # Of bodies that fly as one, the difference is round-off of either sign, and no heat.
+            # For rigid motion the difference is round-off of either sign.
             noise = real(8, mass) * round_off(mass) * kinetic
             lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
             lost[n, 2] = mass
@@ -78,7 +76,7 @@ class KeepLoss(NamedTuple):
 
 @node_task
 class ClearFrictionalHeat(NamedTuple):
-    """Heat of friction starts from zero."""
+    """Frictional heat starts from zero."""
 
     goes_through = ("frictional heat",)
 
@@ -87,13 +85,12 @@ class ClearFrictionalHeat(NamedTuple):
 
 
 def warm_node(rubbed, n, heat):
-    """Add `heat` per mass to a node, where the array is there for it."""
     if rubbed is not None:
         rubbed[n, 0] += heat
 
 
 def warm_by_friction(pt):
-    """Give a point the heat of friction at its nodes by its weights: none is lost."""
+    """Give a point frictional heat of its nodes, by its weights."""
     rubbed = field(pt.w.nodes.fields, FrictionalHeat)
     if rubbed is not None:
         (law, state), like = pt.law_and_state, pt.v[0]
@@ -114,9 +111,9 @@ def energy_of(mass, momentum):
 
 
 def warm(pt, v):
-    """Give a point as heat what it has lost on the way to the nodes and back.
+    """Heat a point by the energy it lost on the way to the nodes and back.
 
-    `v` is the velocity of the nodes at the point, before the update.
+    `v` is the nodal velocity at the point before the update.
     """
     if field(pt.w.nodes.fields, EnergyLoss) is not None:
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
@@ -134,9 +131,8 @@ def warm(pt, v):
 def in_company(pt, moment):
     """Return the part of `moment` that a point of a gas retains: none if it is alone.
 
-    Nodes of no other point return what it gave them: its moment would persist, driven by
-    its own pressure, and its volume grow without bounds, whatever the room around it. The energy of
-    the rest heats it.
+    Nodes of no other point return its own moment: driven by its pressure, its volume would grow
+    without bound. The energy of the rest heats it.
     """
     lost = field(pt.w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:
@@ -150,16 +146,16 @@ def in_company(pt, moment):
 
 
 def _heat(pt, gone):
-    """Give a point the energy per mass that is gone."""
+    """Heat a point by an energy per mass."""
     law, state = pt.law_and_state
     warmed = laws.warmed(law, pt.kin, state, gone / laws.specific_volume(law))
     store(pt.w.points.state, pt.p, warmed)
 
 
 def reflect(pt, term, k):
-    """Take `term`, the k-th of XPIC's series at a point, from what is not in the series yet.
+    """Subtract `term`, the k-th of XPIC's series, from the remainder at a point.
 
-    And add up the energy that this loses (see the head of the module).
+    Also sums the energy lost by that (see the module).
     """
     reflected = pt.of(Reflected)
     if reflected is not None:
@@ -185,18 +181,16 @@ def _spread(pt, term):
 
 
 def term_at(node, like):
-    """Return the present term of XPIC's series at a node."""
     return vector_at(node.kin, node.of(Series), node.i, 0, like)
 
 
 def _before(node, like):
-    """Return the velocity of a node before the update."""
     v, dv = node.v_star(like)
     return v - dv
 
 
 def _gone(pt, v, moment):
-    """Find the kinetic energy per mass that a point lost at the nodes and on the way back."""
+    """Return the kinetic energy per mass that a point lost on the way to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
     there, here = transfers.lost_shares(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)

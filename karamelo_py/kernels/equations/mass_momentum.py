@@ -11,36 +11,36 @@ from karamelo_py.points.transfers import affine_velocity, nodal_momentum
 
 
 class Normal(SummedField):
-    """Sum of m grad N at a node: it points out of a body, for contact between solids."""
+    """Sum of m grad N at a node, which points out of a body (contact)."""
 
     shape = vector
 
 
 class Centre(SummedField):
-    """Sum of mass times position at a node, for the gap between solids."""
+    """Sum of mass times position at a node, for gaps between solids."""
 
     shape = vector
 
 
 @eq.reads()
 def rigid_mass(pt):
-    """Mass of a rigid point with separate sums; () for others."""
+    """Mass of a rigid point with separate sums; else ()."""
     return (of_present(pt.p, pt.w.points.mass[pt.p]),) if eq.is_apart(pt.w) else ()
 
 
 @eq.reads()
 def place(pt):
-    """Position (d,) after the move, where a scene needs centres; else ()."""
+    """Position (d,) after the move, if centres are needed; else ()."""
     return () if field(pt.w.nodes.fields, Centre) is None else pt.y
 
 
 def momentum(pt, node):
-    """Momentum that a point gives to a node; in APIC and its kin affine around the point."""
+    """Momentum given to a node; affine around the point in APIC and its kin."""
     return nodal_momentum(node.transfer, pt, node)
 
 
 def affine_momentum(pt, w):
-    """Momentum at the point, and its gradient, where the transfer makes it affine."""
+    """Momentum at the point and its gradient, where it is affine."""
     at_point = pt.mass * pt.v
     if not len(pt.moment):
         return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())
@@ -49,7 +49,7 @@ def affine_momentum(pt, w):
 
 
 class MassMomentum(eq.NodalQuantity):
-    """Scatter mass and momentum; rigid points with separate sums scatter to these."""
+    """Scatter mass and momentum; of rigid points to their separate sums."""
 
     not_at_corners = ("moments", "loss")
     records = "sums"
@@ -70,9 +70,9 @@ class MassMomentum(eq.NodalQuantity):
 
 @eq.reads("moment")
 def moment_again(pt):
-    """Part of the moment that is mapped again after the move."""
+    """The part of the moment that is mapped again after the move."""
     own = eq.moment(pt)
-    # With weights that never change, all is mapped again.
+    # With constant weights, all is mapped again.
     return mapped_again(pt.w.basis, pt.w.grid, own) if len(own) and pt.w.frame.moves else own
 
 

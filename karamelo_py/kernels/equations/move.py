@@ -1,4 +1,4 @@
-"""Move: points take the velocity of the nodes, v_pic = sum_i N_i v*_i, and move with it."""
+"""Move: points take the nodal velocity, v_pic = sum_i N_i v*_i, and move with it."""
 
 from math import inf, nan
 
@@ -18,14 +18,14 @@ from karamelo_py.points.kinematics import dot
 
 
 class VelocityBefore(Field):
-    """Velocity before the last step; NaN where there was none, or it was reflected in it."""
+    """Velocity before the last step; NaN if there was none, or it was reflected."""
 
     shape = vector
     start = nan
 
 
 class Move(Task):
-    """Gather v* and its change; update velocity and new position."""
+    """Gather v* and its change; update velocity and position."""
 
     not_at_corners = ("moments",)
     records = "update"
@@ -54,7 +54,7 @@ class Move(Task):
         y = x + step
         force = pt.load(Force, old)
         if len(force) and not laws.moves_as_told(w.laws):
-            # With the mean nodal velocity in the step: stress and constraints act at the same time.
+            # With the mean nodal velocity of the step, which includes stress and constraints.
             work = w.kick * dot(force, v_pic - 0.5 * dv)
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
@@ -79,12 +79,12 @@ class Move(Task):
 
 
 def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
-    """Return True for a gather at domain corners that move with their velocity."""
+    """Return True if domain corners are gathered and move with their velocity."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 
 def _corners_carried(pt, new, corners):
-    """Return the place `new` with its corners moved, by the velocities `corners` if gathered."""
+    """Return the place `new` with moved corners, by their gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

@@ -1,4 +1,4 @@
-"""Tasks at the nodes between two visits of the points."""
+"""Tasks at nodes between two visits of the points."""
 
 from typing import NamedTuple
 
@@ -20,13 +20,13 @@ def node_task(tag: type) -> type:
 
 
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
-    """Return one over the mass of a node, 0 where it has none."""
+    """Return 1 / mass of a node, 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
 
 
 def unlimited(seen, n, mass, light):
-    """Return the fraction of its velocity change that a node shows: 1 unless it is light."""
+    """Return the fraction of its velocity change that a node shows: below 1 if it is light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -35,11 +35,11 @@ def unlimited(seen, n, mass, light):
 
 
 class SquaredMass(SummedField):
-    """Sum of N m^2 at a node: divided by the sum of N m, the mean mass of its points (USL)."""
+    """Sum of N m^2 at a node; over the sum of N m, the mean mass of its points (USL)."""
 
     @staticmethod
     def needed(basis):
-        """Return True if a basis makes light nodes that affect the gradient."""
+        """Return True if a basis has light nodes that affect the gradient."""
         return basis.traits.steep_edge
 
 
@@ -60,7 +60,7 @@ class NodalUpdate(NamedTuple):
 
 @node_task
 class MomentumToVelocity(NamedTuple):
-    """The momentum in the velocity array over the mass: the re-mapped velocity of MUSL."""
+    """Momentum in the velocity array over mass: the re-mapped velocity of MUSL."""
 
     says = "re-mapped velocity"
     goes_through = ("sums", "velocity", "velocity")
@@ -73,7 +73,7 @@ class MomentumToVelocity(NamedTuple):
 
 @node_task
 class SumsToVelocity(NamedTuple):
-    """Velocity from the momentum in the sums, before the update (USF)."""
+    """Velocity from momentum, before the update (USF)."""
 
     says = "nodal velocity"
     goes_through = ("sums", "velocity")
@@ -86,12 +86,11 @@ class SumsToVelocity(NamedTuple):
 
 @node_task
 class UpdateToVelocity(NamedTuple):
-    """The velocity whose gradient deforms the points is v*, limited at light nodes (USL).
+    """The deforming velocity is v*, limited at light nodes (USL).
 
-    A point of mass m that gives a node the fraction N of it gets back the strain of f dt / (N m)
-    from there: an oscillation that grows when (c dt / h)^2 > N, in d directions at once. Nodes
-    lighter than `light` = d (c dt / h)^2 times the mean mass of the points that they see, weighted
-    with what these give, count as such; the limit vanishes with the step.
+    A point of mass m that gives a node the fraction N of it gets back the strain of f dt / (N m):
+    an oscillation that grows if (c dt / h)^2 > N, in d directions at once. Nodes below `light` = d
+    (c dt / h)^2 times the mean mass of their points are limited; the limit vanishes with the step.
     """
 
     light: float
@@ -99,8 +98,7 @@ class UpdateToVelocity(NamedTuple):
     goes_through = ("sums", "update", "velocity")
 
     def at_node(task, kin, nodes, n, dt):
-        # The change of a light node's velocity enters the gradient by the fraction of its mass.
-        # Points take the whole change: momentum is conserved.
+        # Only the gradient is limited: points take the whole change, which conserves momentum.
         one = real(1, dt)
         share = unlimited(
             field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light

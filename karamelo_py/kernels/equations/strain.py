@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics import I, det, large, outer, zero
 
 
 class Strain(Task):
-    """Gather the gradient of the nodal velocity; update the state of the law."""
+    """Gather the velocity gradient; update the state of the law."""
 
     not_at_corners = ("moments",)
     records = "velocity"
@@ -30,9 +30,9 @@ class Strain(Task):
         return add_gradient(node, total[0]), fbar.gathered_ratio(node, total[1])
 
     def updated(task, pt, total, totals, fastest):
-        """Update the state of the law and the domain shape; report growth in cells, and rate."""
+        """Update state and domain; report growth of the domain in cells, and rate."""
         w, (gradient, ratio) = pt.w, total
-        if not len(gradient):  # the point stores it
+        if not len(gradient):  # gathered by `Move`
             gradient = totals[0][2]
         dl = increment(pt.dt, gradient)
         if isinstance(task, StrainOfLastStep):
@@ -57,33 +57,30 @@ class Strain(Task):
 
 
 class StrainOfLastStep(Strain):
-    """`Strain` with the velocity that led here, at the new positions."""
+    """`Strain` with the velocity of the last step, at the new positions."""
 
 
 class SecondStrain(Strain):
-    """`Strain` for the second of two strain increments of a step."""
+    """`Strain` for the second of two increments of a step."""
 
     records = ""
     says = "second half of the stress"
 
 
 class StrainOfLoadStep(Strain):
-    """`Strain` for large rotations in a step (:func:`~karamelo_py.points.kinematics.large`).
-
-    Used by implicit schemes.
-    """
+    """`Strain` for large rotations (implicit; :func:`~karamelo_py.points.kinematics.large`)."""
 
     records = ""
 
 
 class StrainInMove(Strain):
-    """`Strain` in one visit after `Move`, without gathering again."""
+    """`Strain` after `Move` in the same visit; it may reuse its gradient."""
 
     records = ""
 
 
 class TrialStrain(Strain):
-    """Gather the gradient; compute only the volume ratio that it would cause (F-bar)."""
+    """Gather the gradient; store only its volume ratio (F-bar)."""
 
     records = ""
     says = "trial volume"
@@ -110,22 +107,21 @@ class TrialStrainOfLastStep(TrialStrain):
 
 
 def _is_known(task, w):
-    """Return True for a gradient that the transfer may already have from v*."""
+    """Return True if the transfer may have gathered the gradient with v*."""
     return isinstance(task, StrainInMove) and not isinstance(w.averaging, fbar.FBar)
 
 
 def add_gradient(node, grad_v):
-    """Add the contribution of a node to the velocity gradient, if it is gathered."""
     return grad_v + outer(node.v, node.strain_N) if len(grad_v) else grad_v
 
 
 def increment(dt, grad_v):
-    """Return dl = dt grad v, as numbers: F + dl is a sum of two of them."""
+    """Return dl = dt grad v as numbers: F + dl is a sum of two of them."""
     return grad_v._make(dt * grad_v)
 
 
 def _deform_domain(task, pt, growth):
-    """Deform the domain of a point; return by how many cells it reaches further."""
+    """Deform the domain of a point; return its further reach in cells."""
     w = pt.w
     x = w.places.y if isinstance(task, SecondStrain) else w.places.x
     before = place_at(w.basis, w.kin, x, pt.p)
@@ -143,15 +139,14 @@ def further_reach(basis, kin, grid, before, after):
 def _fastest_wave(pt, material, fastest):
     """Return the larger of `fastest` and c + max |v_i - common_i| of a point.
 
-    `material` is law, state and F. The wave speed c is computed only for the few points that may be
-    faster than all before them.
+    `material` is law, state and F. c is computed only if a bound exceeds `fastest`.
     """
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter
     speed = (pt.v - w.common).largest()
     slack = fastest - speed
-    if all_lanes((slack >= 0) & (most <= slack * slack)):  # in this form, NaN is noticed too
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # notices NaN
         return fastest
     rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
     return where(fastest > rate, fastest, rate)

@@ -1,4 +1,4 @@
-"""XPIC: the terms w_k = (1 - S+ S)^k S+ v of its series, from the nodes to the points and back."""
+"""XPIC: the terms w_k = (1 - S+ S)^k S+ v of its series, from nodes to points and back."""
 
 from collections import namedtuple
 from typing import NamedTuple
@@ -38,7 +38,7 @@ def term(pt):
 
 
 class SeriesBack(eq.NodalQuantity):
-    """Scatter the term of the series, times mass, to the second vector of `Series`."""
+    """Scatter mass times the term to the second vector of `Series`."""
 
     says = "term of the series to the grid"
     takes = eq.of_point(mass=eq.mass, term=term)
@@ -52,7 +52,7 @@ class SeriesBack(eq.NodalQuantity):
 
 @node_task
 class StartSeries(NamedTuple):
-    """First term of the series: the velocity v; the new one as far as it is known."""
+    """First term of the series: v; also the first part of the new velocity."""
 
     goes_through = ("sums", "series", "update", "update")
 
@@ -66,7 +66,7 @@ class StartSeries(NamedTuple):
 
 @node_task
 class ExtendSeries(NamedTuple):
-    """Next term of the series, in the new velocity, too."""
+    """Next term of the series, added to the new velocity."""
 
     goes_through = ("sums", "series", "series", "update", "update")
 

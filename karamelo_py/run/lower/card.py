@@ -7,8 +7,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from karamelo_py.compiler.gpu import Counted, NoCard, card
+from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.hooks import CompiledHook
+from karamelo_py.kernels.step import untaken
 from karamelo_py.language import registry
 from karamelo_py.run.lower.build import PRECISIONS
 from karamelo_py.run.lower.memory import largest, least_bytes
@@ -96,6 +98,16 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
             hint=f"an explicit scheme (musl, usf, usl, usavg), or {WITHOUT}",
         )
         return
+    from karamelo_py.run.gpu import Card  # registers the rows that it takes
+
+    rows = scheme.rows if setup is None else table.plain(scheme.rows, setup)
+    for kind in untaken(rows, Card):
+        name = registry.name_of("scheme", type(scheme))
+        yield ScriptError(
+            f"a GPU does not take the row {kind} of scheme {name}",
+            place=hub.update.scheme_place,
+            hint=f"another scheme, take.on({kind}, Card) in its plug-in, or {WITHOUT}",
+        )
     for fix in hub.fixes.values():
         hooks = fix.hooks().items() if not fix.first_step_only else ()
         for name, hook in hooks:

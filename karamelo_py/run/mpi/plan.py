@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.arrays import NoHooks, Setup, Tiling, arrays_of
-from karamelo_py.kernels.step import step
+from karamelo_py.kernels.step import StepKind, step
 from karamelo_py.kernels.sums import arrays_given
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
 from karamelo_py.run.boxes import Boxes, chosen_of, no_nodes
@@ -41,7 +41,7 @@ class _Sums(NamedTuple):
 sweep_points.on(_Sums)(lambda mode, visit, s, block: None)
 
 
-sweep_nodes.on(_Sums)(lambda mode, task, kin, nodes, ranges, dt: None)
+sweep_nodes.on(_Sums)(lambda mode, task, s, dt: None)
 
 
 @sum_buffers.on(_Sums)
@@ -65,7 +65,7 @@ def bytes_of_node(simulation: Simulation) -> int:
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
-    step(simulation.hub.update.scheme, simulation.visits, sums, s, NoHooks(), True)
+    step(StepKind(simulation.hub.update.scheme, simulation.visits, sums), s, NoHooks(), True)
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
     for what, nodes in sums.found:
