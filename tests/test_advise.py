@@ -283,7 +283,7 @@ class Recorded:
     """In the place of a study: its runs are those of a table."""
 
     def __init__(self, rows, names=("refine", "basis"), known=()):
-        self.rows, self.names, self.known = rows, names, known
+        self.rows, self.names, self.known, self.folder = rows, names, known, Path()
         self.asked = []
 
     def knows(self, case):

@@ -76,7 +76,7 @@ def results(tmp_path, monkeypatch):
 def test_a_result_over_a_variable(results, monkeypatch, capsys):
     """Of any sign, in order of the variable, with a law and measured points; what failed is out."""
     drawn = []
-    monkeypatch.setattr("karamelo_py.app.studies.results.savefig", lambda f, p: drawn.append(f))
+    monkeypatch.setattr(pictures, "savefig", lambda figure, path: drawn.append(figure))
     words = ["-y", "runout", "-x", "a", "-law", "1.2*a", "-data", "seen.csv", "-o", "r.png"]
     assert main(["chart", "r.csv", *words]) == 0
     (figure,) = drawn
@@ -279,7 +279,7 @@ def test_curves_have_the_colours_of_their_methods_and_names_where_they_leave_the
     time = np.linspace(0, 1, 101)
     fallen = pictures.History(time, 10 ** (-20 * time), "PIC")
     kept = pictures.History(time, np.ones(101), "FLIP")
-    pictures.draw_histories([kept, fallen], None, ("time (s)", "energy (1)"), "", None)
+    pictures.draw_histories([kept, fallen], pictures.Sheet(None, "time (s)", "energy (1)"))
     axes = drawn[0].axes[0]
     curves = [line for line in axes.lines if len(line.get_xdata()) == 101]
     assert [line.get_color() for line in curves] == [
@@ -410,7 +410,7 @@ def test_small_errors_by_chance_are_hollow_and_off_the_front(monkeypatch):
     family = Family(Table(lucky_rows(), ["N", "kind"]), "err", "seconds")
     assert [[*line.lucky] for line in family.lines] == [[False, False, True, True], [False] * 4]
     assert [row["N"] + row["kind"] for row in family.front()] == ["10a", "20a", "80b"]
-    pictures.lines(family, None, ("", ""))
+    pictures.lines(family, pictures.Sheet(None))
     (axes,) = drawn[0].axes
     (hollow,) = [
         line for line in axes.lines
@@ -443,7 +443,7 @@ def test_a_triangle_shows_the_order_below_all_lines(monkeypatch, p, falls):
         }
         for x in (1, 2, 4, 8, 16)
     ]
-    pictures.lines(Family(Table(rows, ["x"]), "err", "seconds", along="x"), None, ("", ""))
+    pictures.lines(Family(Table(rows, ["x"]), "err", "seconds", along="x"), pictures.Sheet(None))
     (axes,) = drawn[0].axes
     (shape,) = axes.patches
     x, y = np.log(shape.get_xy()[:3]).T
@@ -477,7 +477,7 @@ def test_four_panels_make_a_square(table, monkeypatch):
         for b in "12"
         for c in "1234"
     ]
-    pictures.heat(Family(Table(rows, ["a", "b", "c"]), "err", "seconds"), "a", "b", None, ("", ""))
+    pictures.heat(Family(Table(rows, ["a", "b", "c"]), "err", "seconds"), "a", "b", pictures.Sheet(None))
     places = [axes.get_subplotspec().get_gridspec().get_geometry() for axes in drawn[0].axes[:4]]
     assert places == [(2, 2)] * 4
 

@@ -51,7 +51,7 @@ LOST = {"kind": "error", "text": "point 1"}
 )
 def test_what_goes_wrong_in_silence_is_named(tmp_path, values, status, notes, word, silent):
     log_of(tmp_path, values, notes)
-    kept = look_at({"folder": ".", "status": status}, tmp_path, "Time", "E", 0.1)
+    kept = look_at({"folder": ".", "status": status}, tmp_path, "Time", "E", within=0.1)
     assert (kept.word, kept.silent) == (word, silent)
     if GROWN in notes:
         assert kept.said[0] == "a cause"

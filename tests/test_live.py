@@ -480,7 +480,7 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     folder.mkdir()
     (folder / "err.txt").write_text("warning: much\n", encoding="utf-8")
     (folder / "log.mpm").write_text("Step Time Ek\n0 0 1\n1 0.5 0.25\n", encoding="utf-8")
-    page = StudyPage(tmp_path / "in.bar", ["N"], ["Ek"], beside=tmp_path)
+    page = StudyPage(tmp_path / "in.bar", ["N"], ["Ek"], base=tmp_path)
     address = page.server.address
     row = {"N": "10", "Ek": 0.5, "seconds": float("nan"), "status": "done", "reason": ""}
     row["folder"] = folder.name

@@ -176,7 +176,7 @@ def test_every_code_is_explained():
 
 
 def test_doubted_units_are_known_failures():
-    assert rules.code_of(f"{DOUBTED_UNITS}material 'm'") == "units-of-material"
+    assert rules.code_of("units of material 'm'") in DOUBTED_UNITS
 
 
 def test_a_known_failure_has_a_code(run_interpreted):

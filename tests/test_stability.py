@@ -233,7 +233,7 @@ def test_nothing_lies_between_words():
 
 def test_the_line_of_the_own_step_is_whole():
     """Steps in proportion to the first variable: 1.2 in rows with runs, whatever they reach."""
-    map = stability.Map(None, {"f": ["0.5", "1", "2"], "y": ["0", "1", "2"]}, ["f", "y"], "", 2.0)
+    map = stability.Map(None, {"f": ["0.5", "1", "2"], "y": ["0", "1", "2"]}, ["f", "y"])
     ends = {0: (0, 2), 1: (0, 1), 2: ()}
     steps = {0: 1.2, 1: 1.5}
     map.found = {
@@ -248,7 +248,7 @@ def test_the_line_of_the_own_step_is_whole():
 @pytest.mark.parametrize("drift", [0, 1e-15, 1e-3])
 def test_an_axis_that_scales_both_steps_has_no_line(drift):
     """Of a ratio that round-off alone, or next to nothing, turns: 1 is reached nowhere near."""
-    map = stability.Map(None, {"N": ["4", "8"]}, ["N"], "", 2.0)
+    map = stability.Map(None, {"N": ["4", "8"]}, ["N"])
     for ratio in (0.4, 2.5):
         map.found = {(i, 0): {"dt": ratio, "own_dt": 1 + drift * i} for i in range(2)}
         assert map.line("own_dt") == [None]

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pandas
@@ -333,7 +334,8 @@ def test_a_narrow_table_cuts_no_value_off(width):
     console = Console(width=width, record=True, file=io.StringIO())
     items = [records.Recorded("max:growth")]
     row = {**at, **facts, **end}
-    console.print(study.results_table([row], names, items, "in.long", console))
+    long = SimpleNamespace(names=names, items=items, title="in.long")
+    console.print(study.results_table([row], long, console))
     text = console.export_text()
     for word in (*names, *values, "max:growth", "1.500e+10", "failed:", "inside"):
         assert word in text, (word, text)
@@ -431,7 +433,7 @@ def test_a_warm_process_that_hangs_is_killed_and_its_run_starts_from_nothing(fol
     )
     processes = warm.WarmProcesses(case.environment())
     with (folder / "out.txt").open("wb") as out:
-        assert processes.start((), [], folder, out, out) is None
+        assert processes.start((), [], folder, (out, out)) is None
     assert len(begun) == warm.TRIES
     assert not any(os.path.exists(f"/proc/{process.pid}") for process in begun)
 

@@ -6,18 +6,20 @@ pressure falls by 10 to 35 % in each cell that stressed material moves through, 
 strain. GIMP and splines lose 0 to 0.3 %.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import exp
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice.basics import BasicFacts
 from karamelo_py.advice.bodies import sides
 from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import timestep
 from karamelo_py.run.body_motion import BodyMotion
+from karamelo_py.run.listening import when
 
 STRESSED = 0.1  # of the initial energy: less does not count as initial stress
 OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
@@ -32,7 +34,7 @@ class Crossing(NamedTuple):
 
     @property
     def lost(self) -> float:
-        """Return the fraction of the stress that is lost on the way."""
+        """Fraction of the stress that is lost on the way."""
         return 1 - exp(-PER_CELL * self.cells)
 
     @property
@@ -40,62 +42,58 @@ class Crossing(NamedTuple):
         return 100 * self.lost
 
 
-def loses(scene: Any) -> bool:
+def loses(facts: BasicFacts) -> bool:
     """Return True if stress is lost in the scene; gases and liquids have separate rules."""
-    laws = [solid.material.law for solid in scene.hub.solids.values()]
+    laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
-    explicit = not scene.scheme.traits.implicit
-    return explicit and scene.moves and scene.linear and not any(flows)
+    explicit = not facts.scheme.traits.implicit
+    return explicit and facts.moves and facts.linear and not any(flows)
 
 
-def expected(scene: Any) -> Crossing:
+def expected(facts: BasicFacts) -> Crossing:
     """Estimate the remaining path of material under impact or initial stress."""
     most = Crossing(0.0, 0.0)
-    if not (scene.waves > 0 and loses(scene)):
+    if not (facts.waves > 0 and loses(facts)):
         return most
-    spacing = float(scene.simulation.control.clock[0].spacing)
-    for speed, lasting in (*_struck(scene), *_stressed(scene)):
-        most = max(most, Crossing(speed * lasting / spacing, speed))
+    for speed, lasting in (*_struck(facts), *_stressed(facts)):
+        most = max(most, Crossing(speed * lasting / facts.spacing, speed))
     return most
 
 
-def _stressed(scene: Any) -> Any:
-    """Yield speed and duration of motions with an initial stress."""
-    points, step = scene.simulation.points, scene.simulation.step
+def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
+    """Yield speed and duration of the motion if there is initial stress."""
+    points = facts.simulation.points
     stored = points.total("stored")
-    if step or not stored > 0:
+    if facts.simulation.step or not stored > 0:
         return
-    speeds = [float(np.linalg.norm(one.velocity)) for one in scene.motions]
-    drift = sum(one.mass * v * v / 2 for one, v in zip(scene.motions, speeds, strict=True))
+    speeds = [float(np.linalg.norm(motion.velocity)) for motion in facts.motions]
+    drift = sum(m.mass * v * v / 2 for m, v in zip(facts.motions, speeds, strict=True))
     if stored > STRESSED * (stored + points.total("kinetic") - drift):
-        yield max(speeds), scene.duration
+        yield max(speeds), facts.duration
 
 
-def _struck(scene: Any) -> Any:
-    """Yield speed and duration of stressed material for each solid that meets others, at most.
+def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
+    """Yield the longest path, as speed and duration, of each solid that meets others.
 
-    From acoustic impedances (z = rho c) it moves at (z1 v1 + z2 v2)/(z1 + z2), until waves have
-    gone through the thinner solid and returned.
+    By acoustic impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until
+    waves have gone through the thinner solid and returned.
     """
-    solids = list(scene.hub.solids.values())
-    law_of = {number: solid.material.law for number, solid in enumerate(solids)}
-    bodies = [one for one in scene.motions if not can(law_of[one.number], constrained_velocity)]
+    bodies = [b for b in facts.bodies if not can(b.solid.material.law, constrained_velocity)]
     if not bodies:
         return
-    laws = [law_of[one.number] for one in bodies]
-    c = np.array([timestep.elastic_speed(scene.simulation, solids[o.number])[0] for o in bodies])
-    z = c / np.array([float(specific_volume(law)) for law in laws])
-    boxes = boxes_of(bodies)
-    lengths = np.array([sides(one, solids[one.number]) for one in bodies])
-    for a, one in enumerate(bodies):
-        begins = meetings(one, boxes, solids[one.number].h)
-        b, k = np.nonzero((begins < scene.duration) & (z[a] + z > 0)[:, None])
+    c = np.array([timestep.elastic_speed(facts.simulation, body.solid)[0] for body in bodies])
+    z = c / np.array([float(specific_volume(body.solid.material.law)) for body in bodies])
+    boxes = boxes_of([body.motion for body in bodies])
+    lengths = np.array([sides(body) for body in bodies])
+    for a, (motion, solid) in enumerate(bodies):
+        begins = meetings(motion, boxes, solid.h)
+        b, k = np.nonzero((begins < facts.duration) & (z[a] + z > 0)[:, None])
         if not len(b):
             continue
-        v = z[a] * one.velocity[k] + z[b] * boxes.velocity[b, k]
+        v = z[a] * motion.velocity[k] + z[b] * boxes.velocity[b, k]
         through = np.minimum(2 * lengths[a, k] / c[a], 2 * lengths[b, k] / c[b])
         speeds = np.abs(v) / (z[a] + z[b])
-        lasting = np.minimum(scene.duration - begins[b, k], through)
+        lasting = np.minimum(facts.duration - begins[b, k], through)
         longest = np.lexsort((speeds, speeds * lasting))[-1]
         yield float(speeds[longest]), float(lasting[longest])
 
@@ -109,22 +107,20 @@ class BodyBoxes(NamedTuple):
     high: np.ndarray
 
 
-def boxes_of(bodies: Sequence[BodyMotion]) -> BodyBoxes:
-    return BodyBoxes(
-        *(np.array([getattr(one, name) for one in bodies]) for name in BodyBoxes._fields)
-    )
+def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
+    return BodyBoxes(*(np.array([getattr(m, name) for m in motions]) for name in BodyBoxes._fields))
 
 
-def meetings(one: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
+def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
     """Return when a body meets each of the boxes ahead of it, (n, d): infinite if never."""
-    faster, gap = one.velocity - boxes.velocity, boxes.low - one.high - h
-    ahead = (faster > 0) & (boxes.centre > one.centre)
+    faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
+    ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)
     n, k = np.nonzero(ahead)
     time = np.maximum(gap[n, k], 0.0) / faster[n, k]
-    own_way, way = time[:, None] * one.velocity, time[:, None] * boxes.velocity[n]
+    way, other_way = time[:, None] * motion.velocity, time[:, None] * boxes.velocity[n]
     apart = np.maximum(
-        boxes.low[n] + way - one.high - own_way, one.low + own_way - boxes.high[n] - way
+        boxes.low[n] + other_way - motion.high - way, motion.low + way - boxes.high[n] - other_way
     )
     apart[np.arange(len(n)), k] = 0
     meets = ~(apart > 0).any(axis=1)
@@ -132,29 +128,31 @@ def meetings(one: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
     return times
 
 
-def measured(scene: Any) -> Crossing:
+def measured(facts: BasicFacts) -> Crossing:
     """Return the path measured by the watch so far, as a mean over the stressed material.
 
-    If loads do most of the work they maintain the stress, and losses are restored.
+    It is 0 if loads do most of the work: they maintain the stress and restore losses.
     """
-    clock = scene.simulation.control.clock[0]
-    matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(scene)
-    held = clock.supplied > LOADED * clock.largest_energy
-    return Crossing(float(clock.crossed) if matters and not held else 0.0, 0.0)
+    clock = facts.simulation.control.clock[0]
+    matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(facts)
+    loaded = clock.supplied > LOADED * clock.largest_energy
+    return Crossing(float(clock.crossed) if matters and not loaded else 0.0, 0.0)
 
 
-def words_at_end(scene: Any) -> dict[str, str]:
+def words_at_end(facts: BasicFacts) -> dict[str, str]:
     """Describe the lost stress at the end of a run, and warn of it unless already done."""
-    found, hub = measured(scene), scene.hub
-    if found.lost <= TOLD:
+    crossing, hub = measured(facts), facts.hub
+    if crossing.lost <= TOLD:
         return {}
-    words = f"{found.cells:.2g} cells of the grid while it was stressed"
-    much = f"some {found.percent:.0f} % of its pressure with a linear basis"
+    path = f"{crossing.cells:.2g} cells of the grid while it was stressed"
+    loss = f"some {crossing.percent:.0f} % of its pressure with a linear basis"
     if hub.update.first_time(CROSSING):
         hub.warn(
-            f"{CROSSING}: matter has moved through {words}, and lost {much}",
+            f"{CROSSING}: matter has moved through {path}, and lost {loss} "
+            f"({when(facts.simulation)})",
             place=hub.update.method.place,
             hint=CURE,
             code=code_of(CROSSING),
+            cause="points crossing cells: the gradient of a linear basis is discontinuous",
         )
-    return {"stress": f"matter moved through {words}: lost {much}"}
+    return {"stress": f"matter moved through {path}: lost {loss}"}

@@ -1,6 +1,4 @@
-"""The watch over a scene's energy: its limits, and the causes of a gain or loss."""
-
-from typing import Any
+"""Limits of a run's energy balance, and the causes of a gain or loss."""
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run import timestep
 from karamelo_py.run.energy import TOLD, has_grown, share_lost
 from karamelo_py.run.listening import Trouble, when
+from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
 LOSS = 0.05  # of the largest energy, at the end of a run: more gives a warning; WITHIN before
@@ -19,11 +18,11 @@ WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
 def not_watched(why: str) -> str:
-    return f"is not monitored: the work of {why} is not tracked"
+    return f"not monitored: the work of {why} is not tracked"
 
 
-def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
-    """Find the likely cause of a gain of energy (empty where none is known) and its fix."""
+def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
+    """Return the likely cause of an energy gain and its fix; an empty cause if none is known."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
@@ -43,7 +42,7 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
     courant, _ = timestep.own_step_of_waves(hub, still=False)
-    # For undeformed bodies: later they may be softer.
+    # Of undeformed bodies: later they may be softer.
     fastest = timestep.fastest_wave(simulation)
     across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
@@ -68,12 +67,12 @@ def cause_of_gain(hub: Hub, simulation: Any) -> tuple[str, str]:
             f"{share:.2g} x the stability limit",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
-    if moves and simulation.points.largest(swelling)[0] > 1.5:  # what a cell cannot hold
+    if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbours lose contact
         return "points more than a cell apart (numerical fracture)", WHOLE
-    said = SceneFacts(hub, simulation, simulation.time).advice("gain")
-    fed = max(said, key=lambda one: one.share, default=None)
-    if fed is not None and fed.share > 0:
-        return fed.reason, fed.cure
+    causes = SceneFacts(hub, simulation, simulation.time).advice("gain")
+    largest = max(causes, key=lambda advice: advice.share, default=None)
+    if largest is not None and largest.share > 0:
+        return largest.reason, largest.cure
     if moves and jumps:
         return f"points crossing cells: the gradient of {basis} is discontinuous", smooth
     if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
@@ -93,19 +92,19 @@ def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
     return "large strains or rotations within a step", smaller
 
 
-def _step_of(hub: Hub, simulation: Any, share: float) -> str:
+def _step_of(hub: Hub, simulation: Simulation, share: float) -> str:
     if hub.update.fixed_dt is not None:
         return f"set_dt({share * simulation.limit:.3g})"
     return f"dt_factor({share:g})"
 
 
 def swelling(points: PointTable) -> np.ndarray:
-    """Return the volumes (n,) relative to the initial volumes."""
+    """Return the volumes (n,) relative to the initial ones."""
     return points.particle("volume") / points.reference_volume
 
 
-def words_of_growth(hub: Hub, simulation: Any) -> Trouble | None:
-    """Describe a spurious gain of energy; None where there is none."""
+def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
+    """Describe a spurious energy gain; None without one."""
     clock = simulation.control.clock[0]
     if not has_grown(simulation):
         return None
@@ -122,23 +121,23 @@ def words_of_growth(hub: Hub, simulation: Any) -> Trouble | None:
 
 def taken_by(hub: Hub) -> list[str]:
     """Name the script's choices that dissipate energy without a record."""
-    found, transfer, scheme = [], hub.update.transfer, hub.update.scheme
+    takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
-        found.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
+        takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
     # Nodal velocities lack the part that the grid does not resolve.
     if flip_coefficient(transfer) < 1:
         share = f" {transfer.alpha:g}" if transfer.traits.retains else ""
-        found.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
+        takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
     if hub.update.method.fields_per_solid:
         # Contact reverses the motion that damping has reduced, within the step: nodes chatter, and
-        # the points are less affected than the nodes.
+        # points are damped less than nodes.
         braking = dict.fromkeys(fix.style for fix in hub.fixes.values() if fix.brakes)
-        found += [f"fix {style}" for style in braking]
-    return found
+        takers += [f"fix {style}" for style in braking]
+    return takers
 
 
-def words_of_loss(hub: Hub, simulation: Any, within: float) -> Trouble | None:
-    """Describe a loss above `within` that no chosen damping explains; else None."""
+def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | None:
+    """Describe a loss above the fraction `within` that no chosen damping explains; else None."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
@@ -154,13 +153,13 @@ def words_of_loss(hub: Hub, simulation: Any, within: float) -> Trouble | None:
 
 
 def cause_of_loss(hub: Hub) -> tuple[str, str]:
-    """Find the likely cause of a loss of energy and its fix."""
+    """Return the likely cause of an energy loss and its fix."""
     update, method = hub.update, hub.update.method
     if update.scheme.traits.damps:
         name = registry.name_of("scheme", type(update.scheme))
         return f"scheme {name} damps vibrations", "scheme(musl)"
-    if found := collides(hub):
-        return found
+    if collision := collides(hub):
+        return collision
     if method.frame.moves and method.basis.traits.gradient_jumps:
         return (
             f"points crossing cells (the gradient of a {method.basis_name} basis is "
@@ -182,7 +181,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Describe inelastic collisions, with their fix; None where there are none."""
+    """Return the cause and fix of inelastic collisions; None without contact."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
             "contact that removes penetrations within one step: the grid carries only the part of "
@@ -198,7 +197,7 @@ def collides(hub: Hub) -> tuple[str, str] | None:
 
 
 def words_of_change(hub: Hub, share: float) -> str:
-    """Describe an energy change in % for the end of a run, and known dissipation."""
+    """Describe an energy change of `share` % at the end of a run, and known dissipation."""
     takers, by = taken_by(hub), ""
     words = "the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:
@@ -208,6 +207,6 @@ def words_of_change(hub: Hub, share: float) -> str:
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
-    # Losses add up, and may exceed the largest energy at any time.
+    # Losses may add up to more than the largest energy at any time.
     much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
     return f"{much} {words}{by}"

@@ -1,32 +1,33 @@
-"""Troubles of a run: found and explained, with the formula that gives no number."""
+"""Troubles of a run: what went wrong, the likely cause and the fix."""
 
-from typing import Any
 
 import numpy as np
 
 from karamelo_py.advice import energy
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
+from karamelo_py.language.rules import code_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.points.laws import by_rates
 from karamelo_py.run.energy import has_grown
 from karamelo_py.run.listening import Trouble, when, where
 from karamelo_py.run.no_number import no_number
+from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
 
-DOUBTED_UNITS = "units of "  # begins the names of warnings that doubt them
-ABSURD = 10.0  # cells in one step: no smaller one mends that
+DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings
+ABSURD = 10.0  # cells in one step: no smaller step prevents that
 LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
 APART = "no other point of it within a cell"
 
 
-def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Trouble:
-    """Find what went wrong in a step.
+def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
+    """Explain the `status` of a failed step.
 
-    `smaller` says which step to take instead of one that was too large from the start of the run.
+    `smaller` is the step to take if the step was too large from the start of the run.
     """
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
@@ -34,36 +35,36 @@ def trouble(hub: Hub, simulation: Any, status: int, smaller: str = "") -> Troubl
         return _shrunk(hub, simulation)
     smaller, too_large = _smaller_step(hub, simulation, smaller), simulation.too_large
     if status in (GAINED, HEATED):
-        found = (_gained if status == GAINED else _heated)(hub, simulation)
-        found = found._replace(fix=smaller) if too_large else found
+        result = (_gained if status == GAINED else _heated)(hub, simulation)
+        result = result._replace(fix=smaller) if too_large else result
     elif simulation.implicit and simulation.load_steps.failure:
         message = f"{simulation.load_steps.failure} ({when(simulation, 1)})"
         fix = "smaller load steps; above the limit load there is no equilibrium"
         return Trouble(message, fix, "no-equilibrium")
     else:
-        found = _wrong_point(hub, simulation, smaller)
+        result = _wrong_point(hub, simulation, smaller)
         seen = f" after a spurious energy gain ({when(simulation, 1)})"
-        if found.place is None and has_grown(simulation):
+        if result.place is None and has_grown(simulation):
             cause, fix = energy.cause_of_gain(hub, simulation)
             fix = smaller if too_large else fix
-            found = found._replace(message=found.message + seen, fix=fix, cause=cause)
+            result = result._replace(message=result.message + seen, fix=fix, cause=cause)
         else:
-            found = found._replace(message=f"{found.message} ({when(simulation, 1)})")
-    if found.place is None and not found.cause and (too_large or simulation.above_limit()):
-        return found._replace(cause=_above_limit_as_cause(hub, simulation))
-    return found
+            result = result._replace(message=f"{result.message} ({when(simulation, 1)})")
+    if result.place is None and not result.cause and (too_large or simulation.above_limit()):
+        return result._replace(cause=_above_limit_as_cause(hub, simulation))
+    return result
 
 
-def _above_limit_as_cause(hub: Hub, simulation: Any) -> str:
+def _above_limit_as_cause(hub: Hub, simulation: Simulation) -> str:
     update = hub.update
     if step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of:
         return "time step above the stability limit (see the warning)"
-    # The limit of a state that went wrong says nothing of the step of a good one.
+    # The limit of the failed state is meaningless.
     here = "" if simulation.too_large else f" {simulation.limit:.4g}"
     return f"time step {simulation.dt:.4g} above the stability limit{here}"
 
 
-def _above_limit(hub: Hub, simulation: Any) -> Trouble:
+def _above_limit(hub: Hub, simulation: Simulation) -> Trouble:
     speed, fastest = simulation.points.largest(_speeds)
     message = (
         f"time step {simulation.dt:g} is above the stability limit, which has fallen to "
@@ -77,7 +78,7 @@ def _speeds(points: PointTable) -> np.ndarray:
     return np.abs(points.velocity).max(axis=1, initial=0.0)
 
 
-def _gained(hub: Hub, simulation: Any) -> Trouble:
+def _gained(hub: Hub, simulation: Simulation) -> Trouble:
     clock = simulation.control.clock[0]
     if not np.isfinite(clock.balance):
         _, first = simulation.points.largest(
@@ -100,7 +101,7 @@ def _gained(hub: Hub, simulation: Any) -> Trouble:
     return Trouble(message, fix, "energy-gain", cause)
 
 
-def _heated(hub: Hub, simulation: Any) -> Trouble:
+def _heated(hub: Hub, simulation: Simulation) -> Trouble:
     clock = simulation.control.clock[0]
     share = clock.last_dt / clock.heat_limit
     message = (
@@ -114,7 +115,7 @@ def _heated(hub: Hub, simulation: Any) -> Trouble:
     return Trouble(message, _smaller_step(hub, simulation), "temperature")
 
 
-def _shrunk(hub: Hub, simulation: Any) -> Trouble:
+def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
     (speed, fastest), (volume, widest) = map(simulation.points.largest, (_speeds, energy.swelling))
     message = (
         f"the stability limit of the time step has fallen to {simulation.limit:.3g}, less than a "
@@ -125,12 +126,12 @@ def _shrunk(hub: Hub, simulation: Any) -> Trouble:
     return Trouble(message, fix, "step-collapsed")
 
 
-def _first_wrong(simulation: Any) -> tuple | None:
-    """Find the first point that went wrong: number, positions before and after, velocity, grid."""
+def _first_wrong(simulation: Simulation) -> tuple | None:
+    """Find the failed point with the smallest id: id, old and new position, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
-        # The last sweep has found one a tile at most.
+        # The last sweep reports at most one point per tile.
         at = tiling.report[: max(int(tiling.count[0]), 1), 2]
         wrong += [(int(block.points.id[p]), block.points, p) for p in (at[at > 0] - 1).astype(int)]
     if not wrong:
@@ -140,24 +141,24 @@ def _first_wrong(simulation: Any) -> tuple | None:
     return number, old, new, points.v[:, p], int(points.grid[p])
 
 
-def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
-    """Find what is wrong with the first point that went wrong; `smaller` is a step to take."""
+def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
+    """Explain what is wrong with the first failed point; `smaller` is a step to take."""
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         hint = "check fixes that act on heat: a formula that gives NaN, or heat without bounds"
         return no_number(hub, simulation, "the temperature of a point is not a number", hint)
     if not wrong:
         return Trouble("a point went wrong", "a smaller time step", "point")
-    number, old, place, v, grid = min(wrong, key=lambda one: one[0])
+    number, old, position, v, grid = min(wrong, key=lambda one: one[0])
     d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
-    old, new = old[:d], place[:d]
+    old, new = old[:d], position[:d]
     if not np.isfinite(old).all():
         hint = f"look for a formula that gives NaN; else {smaller}"
         return no_number(hub, simulation, f"{name} has no position (NaN)", hint)
     if not np.isfinite(new).all() or not np.isfinite(v).all():
-        what = f"{name} at {where(old)} gets a velocity that is not a number"
+        seen = f"{name} at {where(old)} gets a velocity that is not a number"
         hint = f"look for a formula that gives NaN, such as a division by zero; else {smaller}"
-        return no_number(hub, simulation, what, hint)
+        return no_number(hub, simulation, seen, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     move = float(np.abs(new - old).max()) / h
     unstable = smaller
@@ -165,14 +166,14 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
         unstable = f"check loads, stresses and velocities, and their units; else {smaller}"
     if hub.update.method.frame.moves and ((new < lo).any() or (new > hi).any()):
         if move > ABSURD:
-            what = (
+            seen = (
                 f"{name} at {where(old)} moves by {move:.3g} cells in one step, out of the domain"
             )
-            return Trouble(what, unstable, "point-lost")
+            return Trouble(seen, unstable, "point-lost")
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
         if simulation.above_limit():
-            what = f"{name} at {where(old)} is thrown out of the domain"
-            return Trouble(what, smaller, "point-lost")
+            seen = f"{name} at {where(old)} is thrown out of the domain"
+            return Trouble(seen, smaller, "point-lost")
         loose = _loose(simulation, number, old, LOOSE * h)
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
         return Trouble(
@@ -184,9 +185,9 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
             f"point separated from its solid: numerical fracture ({APART})" if loose else "",
         )
     if move > 1:
-        what = f"{name} at {where(old)} moves by {move:.3g} cells in one step"
-        return Trouble(what, unstable, "moves-too-far")
-    if any(simulation.points.seen(_is_tangled, place, grid)):
+        seen = f"{name} at {where(old)} moves by {move:.3g} cells in one step"
+        return Trouble(seen, unstable, "moves-too-far")
+    if any(simulation.points.seen(_is_tangled, position, grid)):
         tangled, plain = type(hub.update.method.basis).__name__, "R4" if d == 2 else "R8"
         instead = f", {plain} instead of {tangled}" if tangled in ("Q4", "H8") else ""
         return Trouble(
@@ -203,36 +204,33 @@ def _wrong_point(hub: Hub, simulation: Any, smaller: str) -> Trouble:
     )
 
 
-def _loose(simulation: Any, number: int, x: np.ndarray, reach: float) -> bool:
-    """Tell whether a point has a solid of others, none of which is near."""
+def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
+    """Return True if no other point of the point's solid lies within `reach`."""
     solid = solid_with(simulation.hub, number)
 
-    def others(simulation: Any) -> tuple[int, int]:
-        found, near = 0, 0
-        for some in simulation.points.some(None):
-            own = (some.solid == solid.index) & (some.numbers != number)
-            apart = np.abs(some.position[own] - x).max(axis=1, initial=0.0)
-            found, near = found + len(apart), near + int(np.sum(~(apart > reach)))
-        return found, near
+    def others(simulation: Simulation) -> tuple[int, int]:
+        count, near = 0, 0
+        for table in simulation.points.some(None):
+            other = (table.solid == solid.index) & (table.numbers != number)
+            distances = np.abs(table.position[other] - x).max(axis=1, initial=0.0)
+            count, near = count + len(distances), near + int(np.sum(~(distances > reach)))
+        return count, near
 
-    found, near = np.sum(simulation.points.seen(others), axis=0)
-    return found > 0 and near == 0
+    count, near = np.sum(simulation.points.seen(others), axis=0)
+    return count > 0 and near == 0
 
 
-def _is_tangled(simulation: Any, place: np.ndarray, grid: int) -> bool:
-    """Tell whether the domain of a point, whose corners move, is folded over."""
+def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
+    """Return True if the domain of a point, whose corners move, is folded over."""
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
-    return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(place.tolist())))
+    return not np.isfinite(extent(s.basis, s.kin, record(s.grids, grid), tuple(x.tolist())))
 
 
-def _smaller_step(hub: Hub, simulation: Any, instead: str = "") -> str:
-    """Say how to take a smaller step, with the step to take `instead` where it is known.
-
-    Where units are doubted they come first: what follows from them no step mends.
-    """
-    if doubted := [name for name in hub.update.warned_of if name.startswith(DOUBTED_UNITS)]:
+def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
+    """Suggest a smaller step, `instead` where it is known; doubtful units come first."""
+    if doubted := [name for name in hub.update.warned_of if code_of(name) in DOUBTED_UNITS]:
         units = f"check the {doubted[0]} (see the warning)"
         return f"{units}, then {instead}" if instead else units
     if instead:

@@ -1,8 +1,7 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-Parts of the scene say them by their rules (`karamelo_py.language.rules`), by the name that the
-documentation has for the failure; here is what no part says. `karamelo-py check` tells them, and a
-run before its first step, once.
+Parts of a scene declare theirs as rules (`karamelo_py.language.rules`); this module has those that
+no single part knows. `karamelo-py check` reports them, and a run once, before its first step.
 """
 
 from collections.abc import Iterable, Iterator
@@ -11,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.advice.explain import DOUBTED_UNITS
-from karamelo_py.advice.facts import SceneFacts, is_zero
+from karamelo_py.advice.basics import is_zero
+from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
 from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
@@ -27,9 +26,9 @@ from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-LOOK = 100  # steps: shorter runs look at a scene
+LOOK = 100  # steps: shorter runs only inspect a scene
 ENDLESS = 1e8  # steps
-MIXED = 300  # times the stable step, from where on units are likelier wrong than a guess
+MIXED = 300  # step over the stable one, from which on wrong units are likelier than a bad guess
 DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
 IMPOSSIBLE = 30.0  # times the wave speed: mm/s instead of m/s give a factor of 1000
 SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
@@ -39,8 +38,8 @@ UNITS = (
 )
 
 
-def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
-    """Say so, once, where nothing can move in a run of `duration`."""
+def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
+    """Warn once if nothing can move in a run of `duration`."""
     if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
         hub.warn(
             "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
@@ -50,19 +49,19 @@ def warn_about_rest(hub: Hub, simulation: Any, duration: float) -> None:
         )
 
 
-def _rests(hub: Hub, simulation: Any) -> bool:
-    """Tell whether nothing can move, by the parts of this program: others may do anything."""
+def _rests(hub: Hub, simulation: Simulation) -> bool:
+    """Return True if nothing can move; False with parts of plug-ins, which may do anything."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
     parts += [kind for law in laws for kind in law_kind(law)]
-    own = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
+    built_in = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
     for fix in hub.fixes.values():
         formulas = fix.formulas
-        holds_at_zero = formulas and all(map(is_zero, formulas))  # walls, loads that are none
+        holds_at_zero = formulas and all(map(is_zero, formulas))  # walls and zero loads
         if fix.for_method or (fix.hooks() and not holds_at_zero):
             return False
-    if not own or update.thermal or any(can(law, constrained_velocity) for law in laws):
+    if not built_in or update.thermal or any(can(law, constrained_velocity) for law in laws):
         return False
 
     def stress(points: PointTable) -> np.ndarray:
@@ -71,8 +70,8 @@ def _rests(hub: Hub, simulation: Any) -> bool:
     return simulation.fastest() == 0 and simulation.points.largest(stress)[0] == 0
 
 
-def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
-    """Say so where a run to `end_time` takes more steps than anybody waits for."""
+def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None:
+    """Warn of a run to `end_time` that takes more than `ENDLESS` steps."""
     span = end_time - simulation.time
     if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
         return
@@ -89,8 +88,8 @@ def warn_about_length(hub: Hub, simulation: Any, end_time: float) -> None:
     hub.warn(f"{about} {end_time:.6g}" + (f": {why}" if why else ""), hint=hint, code="many-steps")
 
 
-def mixed_units(hub: Hub, simulation: Any) -> str:
-    """Doubt the units where a step does not fit the numbers of a scene by any means."""
+def mixed_units(hub: Hub, simulation: Simulation) -> str:
+    """Describe wave speed and cell size, for a step that does not fit them."""
     speed = timestep.fastest_wave(simulation)
     return (
         f"waves move at {speed:.3g} through cells of {hub.domain.h:g}. The units of densities, "
@@ -99,10 +98,10 @@ def mixed_units(hub: Hub, simulation: Any) -> str:
 
 
 class Step(NamedTuple):
-    """The step that a run has, where the script asks for it, and what its stable limit depends on.
+    """The step requested for a run, and the scene that its stable limit depends on.
 
-    `run` is the number of the run. `span` says how long it is, in time or in steps; infinite where
-    a condition ends it.
+    `run` is the number of the run, `span` its length in time and in steps, infinite if a condition
+    ends it.
     """
 
     run: int
@@ -115,7 +114,7 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """Return the step that a run asks for here, which goes back and halves it in trouble or not."""
+    """Return the step that the script asks for now; with `halves`, a run in trouble halves it."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
@@ -134,7 +133,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Say so once (or `again`) where this or a later step is above the stable limit."""
+    """Warn once (or `again`) of a step of this or a later run above the stable limit."""
     present, limit = step_of(hub, halves), simulation.limit_moving
     of_heat = float(simulation.control.clock[0].heat_limit)
     stable = timestep.stable_step(hub, simulation, limit)
@@ -170,7 +169,7 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
     solid = any(not any(law_traits(k).any_speed for k in law_kind(law)) for law in laws)
     if solid and s.speed > IMPOSSIBLE:
         yield Advice(
-            f"{DOUBTED_UNITS}velocities",
+            "units of velocities",
             f"points move at {s.fastest:.3g}, {s.speed:.3g} times the speed of waves "
             f"({s.waves:.3g}), which no solid sustains when it hits another or a wall. The units "
             "of velocities, densities and moduli may be mixed",
@@ -179,7 +178,7 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
 
 
 def _other_units(s: SceneFacts) -> Iterator[Advice]:
-    """Look for materials whose numbers are in others than those that `units` names."""
+    """Find materials whose numbers do not fit the units of the script."""
     units: Any = s.hub.output.units
     for solid in s.hub.solids.values() if units else ():
         law = solid.material.law
@@ -193,7 +192,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
             odd.append(f"speed of waves is {speed:.3g} m/s")
         if odd:
             yield Advice(
-                f"{DOUBTED_UNITS}material '{solid.material.id}'",
+                f"units of material '{solid.material.id}'",
                 f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}, such as no real "
                 "material has",
                 f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "
@@ -203,17 +202,21 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Tell what will go wrong in a run of `duration` and the next; each failure once."""
+    """Warn of what will go wrong in a run of `duration` and the runs after it; once each."""
     _warn_about_groups(hub, simulation)
     refuse_endless_speeds(hub, simulation)
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
-    one = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.limit)
-    if one and timestep.ruling_limit(simulation) == "end" and hub.update.first_time("one step"):
+    one_step = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.limit)
+    if (
+        one_step
+        and timestep.ruling_limit(simulation) == "end"
+        and hub.update.first_time("one step")
+    ):
         words = f"one step covers the whole run, where one of {simulation.limit:.3g} is stable"
         hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS, code="one-step")
     if scene.waves > 0 and timestep.blows_up(hub, simulation):
-        scene.duration = 0.0  # it never comes so far
+        scene.duration = 0.0  # the run ends before
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
     warn_about_rest(hub, simulation, duration)
@@ -221,9 +224,9 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 
 
 def warn_about_factor(hub: Hub) -> None:
-    """Tell, once, that implicit steps have no stable step to take a share of."""
+    """Warn once that dt_factor has no effect on implicit steps."""
     update = hub.update
-    # With set_dt, dt_factor has said so itself.
+    # With set_dt, dt_factor has warned already.
     idle = update.dt_factor is not None and update.fixed_dt is None
     if idle and update.first_time("dt_factor"):
         hub.warn(
@@ -235,18 +238,20 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:
-    """Tell, once, that loads which do not grow act at once, in the first of several load steps."""
+    """Warn once if constant loads act in the first of several load steps only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
-    given = {fix: list(formulas_of(tuple(vars(fix).values()))) for fix in acting}
-    change = any(not formula.is_constant for formulas in given.values() for formula in formulas)
+    formulas_by_fix = {fix: list(formulas_of(tuple(vars(fix).values()))) for fix in acting}
+    change = any(
+        not formula.is_constant for formulas in formulas_by_fix.values() for formula in formulas
+    )
     if hub.update.scheme.traits.inertia or hub.update.thermal or steps < 2 or change:
         return
     loads, moves = [], False
-    for fix, formulas in given.items():
-        some = not all(map(is_zero, formulas))
+    for fix, formulas in formulas_by_fix.items():
+        acts = not all(map(is_zero, formulas))
         if fix.prescribes_velocity or fix.leads_points:
-            moves |= some
-        elif some:
+            moves |= acts
+        elif acts:
             loads.append(fix)
     if loads and not moves and hub.update.first_time("loads at once"):
         hub.warn(
@@ -260,19 +265,19 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
 
 
 def warn_about_laws(hub: Hub, simulation: Simulation, duration: float) -> None:
-    """Tell what will go wrong with the laws of a run in implicit steps; each failure once."""
+    """Warn once of what will go wrong with the laws of a run with implicit steps."""
     _tell(hub, SceneFacts(hub, simulation, duration).advice("failure", of_laws=True))
 
 
-def _tell(hub: Hub, said: Iterable[Advice]) -> None:
-    for one in said:
-        if hub.update.first_time(one.name):
-            place = one.place or hub.update.method.place
-            hub.warn(f"{one.name}: {one.reason}", place=place, hint=one.cure, code=one.code)
+def _tell(hub: Hub, advice: Iterable[Advice]) -> None:
+    for each in advice:
+        if hub.update.first_time(each.name):
+            place = each.place or hub.update.method.place
+            hub.warn(f"{each.name}: {each.reason}", place=place, hint=each.cure, code=each.code)
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Sum the duration of the runs after the next one that have the same scene, if known."""
+    """Return the summed duration of later runs of the same scene, if known."""
     present = step_of(hub, False).scene
     later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -280,20 +285,20 @@ def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:
-    """Return the time that the solids have moved: since the last fix has come."""
+    """Return the time since the fixes of the scene last changed."""
     fixes, update = list(hub.fixes.values()), hub.update
-    known, since = update.moving
-    if any(all(fix is not other for other in known) for fix in fixes):
+    before, since = update.moving
+    if any(all(fix is not other for other in before) for fix in fixes):
         since = simulation.time
     update.moving = fixes, since
     return simulation.time - since
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Say so when single precision cannot hold what a step adds to a position.
+    """Warn if single precision cannot resolve the motion in a step.
 
-    Where nothing moves yet, by the size of cells: a block that falls at 50 000 cells from the
-    origin is wrong by 3.5 % of its way, and at 200 000 it does not move.
+    If nothing moves yet, compare with the cell size: a block that falls at 50 000 cells from the
+    origin is wrong by 3.5 % of its path, and at 200 000 it does not move.
     """
     if s.hub.settings.precision != "single":
         return
@@ -317,7 +322,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
 
 
 def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
-    """Tell whether no point lies within the reach of the nodes of a fix, seen as a box."""
+    """Return True if no point lies within reach of the nodes of a fix, taken as a box."""
     x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
     method, setup = hub.update.method, simulation.setup
     reach = (method.basis.traits.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)
@@ -331,17 +336,17 @@ def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
 
 
 def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
-    """Say so, once, where groups of nodes that were to have some, or a body, have none."""
+    """Warn once of groups of nodes without nodes, or out of reach of all points."""
     for fix in hub.fixes.values():
         of_mass = any(
             hook.uses_share or moment in HEAT_STAGES
             for moment, hook in fix.hooks().items()
             if isinstance(hook, CompiledHook) and hook.on_nodes
         )
-        far = (
+        unreached = (
             of_mass and not fix.group.all and len(fix.group) and _out_of_reach(hub, simulation, fix)
         )
-        if far and hub.update.first_time(f"out of reach {fix.id}"):
+        if unreached and hub.update.first_time(f"out of reach {fix.id}"):
             hub.warn(
                 f"fix {fix.style} '{fix.id}' acts on nodes that no point reaches: {NOTHING_THERE}",
                 place=fix.place,
@@ -352,5 +357,5 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
         if isinstance(group, NodeGroup) and group.awaits_solids and not len(group):
             group.awaits_solids = False
             hint = "nodes belong to the solids here: fix contact/surface makes walls next to them"
-            said = f"group '{group.id}' holds no nodes; {NOTHING_THERE}"
-            hub.warn(said, group.place, hint, code="no-nodes")
+            message = f"group '{group.id}' holds no nodes; {NOTHING_THERE}"
+            hub.warn(message, group.place, hint, code="no-nodes")

@@ -1,4 +1,4 @@
-"""Words about a run: banner, warnings before and within it, troubles, end."""
+"""Texts about a run: banner, warnings, troubles, closing table."""
 
 from math import inf
 from typing import Any
@@ -29,19 +29,21 @@ from karamelo_py.script.errors import render_message
 
 
 class Narrator(Listener):
-    """Listens to a run, and tells the user of it."""
+    """Listener that tells the user about a run."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
 
     def begun(self, run: RunLoop, simulation: Simulation, *, resumed: bool = False) -> None:
-        """Warn of what is known to go wrong in this run, and of one that is very long."""
+        """Warn of what is known to go wrong in this run, and of a very long one."""
         hub, halve = self.hub, run.rollback.point.halve
         self.smaller = ""
         if resumed:
             if run.ruined:
-                self.smaller = "a smaller time step"  # the state of the file may be spoilt
-            if not (run.rollback.point.halvings or simulation.implicit):  # else not the script's
+                self.smaller = "a smaller time step"  # the state in the file may be bad
+            if not (
+                run.rollback.point.halvings or simulation.implicit
+            ):  # otherwise the script has not chosen the step
                 known_failures.warn_about_steps(hub, simulation, halve, again=True)
             return
         steps = inf if run.steps is None else run.steps
@@ -55,9 +57,9 @@ class Narrator(Listener):
             known_failures.warn_about_length(hub, simulation, run.end_time)
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
-        """Begin the record of this run, and print it."""
+        """Start the record of this run, and print the banner."""
         hub, why = self.hub, unknown_work(self.hub)
-        # Said of the first state: a later one is ruined, and its limit with it.
+        # For the first state: a failed one has no meaningful limit.
         if simulation.too_large:
             self.smaller = self.smaller or own_step_instead(hub)
         facts: dict[str, Any] = {
@@ -84,13 +86,13 @@ class Narrator(Listener):
         }
         if not simulation.implicit:
             facts["stable_dt"] = shown["stable dt"] = stable_step(hub, simulation, simulation.limit)
-            facts["own_dt"] = own = own_step_instead_of(hub, simulation)
-            shown["own dt"] = words_of_own_step(hub, simulation, own) if own else None
+            facts["own_dt"] = dt = own_step_instead_of(hub, simulation)
+            shown["own dt"] = words_of_own_step(hub, simulation, dt) if dt else None
             facts["limited_by"] = simulation.ruling_limit
             self.limits, self.least = {facts["limited_by"]}, simulation.limit
             shown["limited by"] = f"{facts['limited_by']}; {words_of_share(hub)}"
         if why and simulation.moves:
-            facts["energy_unwatched"], shown["energy"] = why, energy.not_watched(why)
+            facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
         hub.record.begin(facts)
         if facts["processes"] > 1:
             alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
@@ -100,13 +102,13 @@ class Narrator(Listener):
         shown["units"] = hub.output.units and str(hub.output.units)
         hub.console.banner(
             f"Run, continued from step {simulation.step}" if resumed else "Run",
-            {name: of for name, of in shown.items() if of not in (None, "")},
+            {name: value for name, value in shown.items() if value not in (None, "")},
         )
 
     def stepped(self, simulation: Simulation) -> None:
         hub = self.hub
-        if not simulation.told_of_growth and (found := energy.words_of_growth(hub, simulation)):
-            hub.warn(found.message, hint=found.fix, code=found.code, cause=found.cause)
+        if not simulation.told_of_growth and (gain := energy.words_of_growth(hub, simulation)):
+            hub.warn(gain.message, hint=gain.fix, code=gain.code, cause=gain.cause)
             simulation.told_of_growth = True
         self._tell_of_loss(simulation, WITHIN)
         if simulation.step % simulation.states_every == 0 and not simulation.implicit:
@@ -114,7 +116,7 @@ class Narrator(Listener):
         boundary.tell_of_bounces(hub, simulation)
 
     def _tell_of_limit(self, simulation: Simulation) -> None:
-        """Tell of a limit of the step that rules for the first time, or has halved."""
+        """Note a limit of the step that rules for the first time, or has halved."""
         name, limit, before = simulation.ruling_limit, simulation.limit, self.least
         if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
             return
@@ -129,9 +131,9 @@ class Narrator(Listener):
     def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
         """Warn once of an energy loss above a fraction of the largest energy."""
         hub = self.hub
-        lost = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
-        if lost is not None:
-            hub.warn(lost.message, hint=lost.fix, code=lost.code, cause=lost.cause)
+        loss = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
+        if loss is not None:
+            hub.warn(loss.message, hint=loss.fix, code=loss.code, cause=loss.cause)
             simulation.told_of_loss = True
 
     def wrong(self, simulation: Simulation, status: int, too_large: bool) -> Trouble | None:
@@ -140,7 +142,7 @@ class Narrator(Listener):
         return explain.trouble(self.hub, simulation, status, self.smaller * too_large)
 
     def ended(self, run: RunLoop, simulation: Simulation, first_step: int, wall: float) -> None:
-        """Finish the record of this run, and print its end."""
+        """Complete the record of this run, and print the closing table."""
         self._tell_of_loss(simulation, energy.LOSS)
         steps = simulation.step - first_step
         stages = [(name, float(passed)) for name, (passed, _) in run.timings.on.items()]

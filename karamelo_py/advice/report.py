@@ -1,4 +1,4 @@
-"""karamelo-py check: what a scene needs, before it runs."""
+"""karamelo-py check: what a scene needs before it runs."""
 
 from collections.abc import Callable
 from math import inf
@@ -30,12 +30,12 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.solid import words_of_volumes
 
-LOADED = 24 << 20  # bytes of compiled loops and of what steps and output import, as measured
+LOADED = 24 << 20  # bytes of compiled loops and of modules imported by steps and output, measured
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
     """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
-    own = machine_memory.taken() - known(hub)
+    program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
     refuse_endless_speeds(hub, simulation)
@@ -76,18 +76,18 @@ def report(hub: Hub, end_time: float = inf) -> None:
                 say(f"               most of it for fix {most.style} '{most.id}'")
     if simulation.moves:
         why = unknown_work(hub)
-        say(f"energy         {not_watched(why) if why else 'is monitored'}")
+        say(f"energy         is {not_watched(why) if why else 'monitored'}")
     say(f"threads        {simulation.threads}")
     say(f"set-up         {set_up:.2g} s from the start of the program on, without compiling")
     say("")
     say(f"{'':<34}numbers     bytes")
     for block in s.blocks:
         say(f"fields of a point of {', '.join(m.words for m in materials(hub, block))}")
-        of_one = 0
+        point_bytes = 0
         for name, shape, size in point_fields(block):
             say(f"  {name:<30}  {shape:<10} {size:>6}")
-            of_one += size
-        say(f"  {'together':<30}  {'':<10} {of_one:>6}")
+            point_bytes += size
+        say(f"  {'together':<30}  {'':<10} {point_bytes:>6}")
     say("fields of a node")
     for name, array in node_fields(s):
         say(f"  {name:<30}  {array.shape[1]!s:<10} {array.itemsize * array.shape[1]:>6}")
@@ -95,9 +95,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
     memory = memory_of(simulation, s, tiles.box_bytes(s))
     say(f"memory         {_size(sum(memory))} in a run")
     say(f"               {_size(memory.copied)} of them are a copy of the last good state")
-    say(f"               {_size(sum(memory) + own + LOADED)} with the program itself")
-    if (there := machine_memory.machine_memory()) is not None:
-        free = _size(there.free)
+    say(f"               {_size(sum(memory) + program + LOADED)} with the program itself")
+    if (machine := machine_memory.machine_memory()) is not None:
+        free = _size(machine.free)
         say(f"               {free} are free on this machine, not counting what check has taken")
     if hub.settings.card:
         _say_of_gpu(say, simulation)
@@ -110,17 +110,17 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"stages of a step, {'one by one' if staged else 'fused'}")
     for stage in stages(hub, simulation):
         say(f"  {stage}")
-    found = suggestions(hub, simulation)
-    if found:
+    advice = suggestions(hub, simulation)
+    if advice:
         say("")
         say("could be left out")
-    for suggestion in found:
+    for suggestion in advice:
         say(f"  {suggestion.reason}")
         say(f"    instead: {suggestion.cure}")
 
 
 def _say_of_gpu(say: Callable, simulation: Simulation) -> None:
-    """Say which GPU there is, and what the scene takes there."""
+    """Print the GPU of this machine, and the memory of the scene on it."""
     try:
         here = card()
         free, whole = map(_size, here.memory())
@@ -138,20 +138,20 @@ def _size(count: float) -> str:
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
-    """List the materials of the points of a block: those in use whose laws are of its kind."""
+    """List the used materials whose laws are of the kind of a block's points."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
     kind = without_rate(law_kind(block.laws))
     return [material for material in used if law_kind(material.law) == kind]
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Say how many equations an implicit step solves, at most, and what memory their matrix takes.
+    """Print the number of unknowns of an implicit step, at most, and the memory of its matrix.
 
-    Nodes couple with those that a point of theirs sees, so far in each direction.
+    Nodes couple if a point sees both.
     """
     s = simulation.setup
-    d, beside = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
-    size = nodes * (2 * beside + 1) ** d * d * d * 8
+    d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
+    size = nodes * (2 * reach + 1) ** d * d * d * 8
     say(f"dt             {simulation.dt:.6g}")
     say(f"unknowns       {nodes * d} at most, and {size / 2**20:.3g} MiB of stiffness")
 

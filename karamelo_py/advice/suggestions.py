@@ -1,4 +1,4 @@
-"""Suggestions: what a scene pays for and could leave out, with the words to write instead."""
+"""Suggestions of check: what a scene pays for without need, and what to write instead."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -7,42 +7,45 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.advice.facts import SceneFacts, is_zero, script_text
+from karamelo_py.advice.basics import is_zero
+from karamelo_py.advice.facts import SceneFacts, script_text
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.points.laws import parameter
+from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
 
-Words = Iterator[tuple[str, str]]  # the cost, and what to write instead
+Words = Iterator[tuple[str, str]]  # cost, and what to write instead
 
 AXES = "xyz"
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from which a linear basis locks
-LARGE = 100_000  # points from where on their numbers are read from memory
-RESOLVED = 1000  # times the distance of neighbouring singles: what a step moves points by, at least
+LARGE = 100_000  # points from which on caches do not hold them
+RESOLVED = 1000  # least motion per step over the spacing of single-precision numbers
 # Seconds of a core (Intel Xeon): a point in a step with a linear basis, a line of the log, a
-# picture and the first one, a file of points and a number in it.
+# picture and the first one, a file of points, and a number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
-LONG = 0.5  # seconds of output that count
+LONG = 10.0  # seconds of output worth a suggestion
 
 
 def seconds_of_step(hub: Hub, count: int) -> float:
-    """Estimate the seconds of a core that a step takes at least."""
+    """Estimate the least seconds of a core per step."""
     return POINT * count + sum(fix.seconds() for fix in hub.fixes.values())
 
 
-def suggestions(hub: Hub, simulation: Any) -> list[Advice]:
-    """Find all that is known to be paid for without need, before anything has run."""
+def suggestions(hub: Hub, simulation: Simulation) -> list[Advice]:
+    """Find all suggestions for a scene before it runs."""
     rules = _unread, _of_parts, _averaging, _flat, _round, _mirrored, _precision, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
-def _of_parts(hub: Hub, simulation: Any) -> Words:
-    return ((one.reason, one.cure) for one in SceneFacts(hub, simulation, inf).advice("suggestion"))
+def _of_parts(hub: Hub, simulation: Simulation) -> Words:
+    advice = SceneFacts(hub, simulation, inf).advice("suggestion")
+    return ((each.reason, each.cure) for each in advice)
 
 
-def _unread(hub: Hub, simulation: Any) -> Words:
+def _unread(hub: Hub, simulation: Simulation) -> Words:
     text = script_text(hub)
     for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
         for ID, item in catalogue.items():
@@ -60,7 +63,7 @@ def _unread(hub: Hub, simulation: Any) -> Words:
                 )
 
 
-def _averaging(hub: Hub, simulation: Any) -> Words:
+def _averaging(hub: Hub, simulation: Simulation) -> Words:
     if not hub.update.anti_locking:
         return
     for solid in hub.solids.values():
@@ -83,7 +86,7 @@ def _acting(hub: Hub) -> list[Any]:
 
 
 def _given(fix: Any) -> tuple:
-    """Give its formulas by direction; of fixes without, that they may do anything."""
+    """Return the formulas of a fix by direction; NaN for one without, which may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 
@@ -96,27 +99,27 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether all points (or nodes) at places of one `key` are in the group, or none."""
+    """Return True if of points (or nodes) with equal `key`, all are in the group or none."""
     group = fix.group
     if group is None or group.all:
         return group is not None
     if isinstance(group, NodeGroup):
-        whole = [(lattice.first, lattice.positions()) for lattice in hub.lattices]
+        groups = [(lattice.first, lattice.positions()) for lattice in hub.lattices]
         members = fix.nodes
     else:
-        whole = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
+        groups = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
         members = group.members
-    for first, x in whole:
-        places = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
-        _, which = np.unique(places, axis=0, return_inverse=True)
-        found = np.bincount(which, np.isin(first + np.arange(len(x)), members))
-        if ((found > 0) & (found < np.bincount(which))).any():
+    for first, x in groups:
+        keys = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
+        _, cell = np.unique(keys, axis=0, return_inverse=True)
+        selected = np.bincount(cell, np.isin(first + np.arange(len(x)), members))
+        if ((selected > 0) & (selected < np.bincount(cell))).any():
             return False
     return True
 
 
-def _flat(hub: Hub, simulation: Any) -> Words:
-    """Find solids that are the same all along a direction in which nothing moves."""
+def _flat(hub: Hub, simulation: Simulation) -> Words:
+    """Suggest fewer dimensions if all is the same along a direction in which nothing moves."""
     domain = hub.domain
     d = domain.dimension
     if d == 1 or domain.axisymmetric or len(hub.lattices) > 1:
@@ -125,31 +128,31 @@ def _flat(hub: Hub, simulation: Any) -> Words:
         rest = [axis for axis in range(d) if axis != k]
         layers = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else 0
         if layers and _acts_alike(hub, rest):
-            given = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
-            kept = " and ".join(AXES[axis] for axis in rest)
-            named = "" if k == d - 1 else f", with {kept} called {' and '.join(AXES[: d - 1])}"
+            ends = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
+            axes = " and ".join(AXES[axis] for axis in rest)
+            renamed = "" if k == d - 1 else f", with {axes} called {' and '.join(AXES[: d - 1])}"
             yield (
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}, which has the forces and "
                 f"energies of a {'thickness' if d == 3 else 'cross-section'} of 1",
-                f"dimension({d - 1}, {', '.join(given)}, {domain.h:g}){named}",
+                f"dimension({d - 1}, {', '.join(ends)}, {domain.h:g}){renamed}",
             )
             return
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Tell whether fixes say nothing that is not 0 along direction k, nor depends on it."""
+    """Return True if fixes act with 0 along direction k, and do not depend on it."""
     for fix in _acting(hub):
-        given = _given(fix)
-        if len(given) <= len(rest) or not is_zero(given[k]):
+        formulas = _given(fix)
+        if len(formulas) <= len(rest) or not is_zero(formulas[k]):
             return False
-        if any(_depends(act, AXES[k]) for act in (*(given[j] for j in rest), fix.wall_friction)):
+        if any(_depends(act, AXES[k]) for act in (*(formulas[j] for j in rest), fix.wall_friction)):
             return False
     return True
 
 
 def _acts_alike(hub: Hub, rest: list[int]) -> bool:
-    """Tell whether fixes act on all that lies at one place in the directions `rest`, or none."""
+    """Return True if fixes act alike on all points with equal coordinates `rest`."""
     for fix in _acting(hub):
         smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
         if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
@@ -158,15 +161,15 @@ def _acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def _layers(hub: Hub, k: int, rest: list[int]) -> int:
-    """Count the equal layers of solids across direction k, between faces that are held; or 0."""
+    """Count the equal layers of solids across direction k, between held faces; 0 if unequal."""
     most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:
             continue
-        places = np.rint(solid.x0 * (1e6 / solid.h)).astype(np.int64)
-        across, counts = np.unique(places[:, k], return_counts=True)
-        columns = np.unique(places[:, rest], axis=0)
-        if len(set(counts)) > 1 or len(columns) * len(across) != len(places):
+        cells = np.rint(solid.x0 * (1e6 / solid.h)).astype(np.int64)
+        across, counts = np.unique(cells[:, k], return_counts=True)
+        columns = np.unique(cells[:, rest], axis=0)
+        if len(set(counts)) > 1 or len(columns) * len(across) != len(cells):
             return 0
         most = max(most, len(across))
         first, last = solid.x0[:, k].min(), solid.x0[:, k].max()
@@ -177,24 +180,24 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Tell whether no node of the planes at `low` and `high` (in cells) moves along k."""
+    """Return True if no node of the planes at `low` and `high` (in cells) moves along k."""
     lattice = hub.lattices[0]
-    held = np.zeros(lattice.shape, np.bool_)
+    fixed = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
         if fix.prescribes_velocity and len(fix.formulas) > k and fix.formulas[k] is not None:
-            held.ravel()[fix.nodes - lattice.first] = is_zero(fix.formulas[k])
-    if held.all():
+            fixed.ravel()[fix.nodes - lattice.first] = is_zero(fix.formulas[k])
+    if fixed.all():
         return True
     planes = [(end * lattice.h - lattice.lo[k]) / lattice.spacing for end in (low, high)]
     if any(abs(plane - round(plane)) > 1e-4 for plane in planes):
         return False
     numbers = [round(plane) for plane in planes]
     inside = all(0 <= number < lattice.shape[k] for number in numbers)
-    return inside and bool(held.take(numbers, axis=k).all())
+    return inside and bool(fixed.take(numbers, axis=k).all())
 
 
-def _round(hub: Hub, simulation: Any) -> Words:
-    """Find cylinders about one axis, along which all acts."""
+def _round(hub: Hub, simulation: Simulation) -> Words:
+    """Suggest axisymmetry for cylinders about one axis, along which all acts."""
     if hub.domain.dimension != 3:
         return
     regions = [solid.region for solid in hub.solids.values() if solid.region is not None]
@@ -229,13 +232,13 @@ def _round(hub: Hub, simulation: Any) -> Words:
     )
 
 
-def _mirrored(hub: Hub, simulation: Any) -> Words:
-    """Find scenes that are the same on both sides of a plane across an axis."""
+def _mirrored(hub: Hub, simulation: Simulation) -> Words:
+    """Suggest half of a scene that is mirrored at a plane of nodes."""
     domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
     if len(hub.lattices) > 1 or not _acting(hub):
         return
     if not all(solid.region for solid in solids):
-        return  # they may come with velocities
+        return  # they may have velocities
     for k in range(1 if domain.axisymmetric else 0, domain.dimension):
         ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
@@ -262,23 +265,23 @@ def _mirrored(hub: Hub, simulation: Any) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Tell of each fix whether it does nothing along direction k, and depends on no place there."""
+    """Return for each fix True if it does nothing along direction k and does not depend on it."""
     for fix in _acting(hub):
-        given = _given(fix)
-        others = [given[j] for j in rest if j < len(given)]
-        yield (len(given) <= k or is_zero(given[k])) and not any(
-            _depends(act, AXES[k]) for act in (*others, fix.wall_friction)
+        formulas = _given(fix)
+        rest_formulas = [formulas[j] for j in rest if j < len(formulas)]
+        yield (len(formulas) <= k or is_zero(formulas[k])) and not any(
+            _depends(act, AXES[k]) for act in (*rest_formulas, fix.wall_friction)
         )
 
 
 def _both_sides(solid: Any, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Tell whether each point of a solid has one on the other side."""
-    places = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
-    return bool((np.unique(places, axis=0, return_counts=True)[1] == 2).all())
+    """Return True if each point of a solid has a mirror image."""
+    cells = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
+    return bool((np.unique(cells, axis=0, return_counts=True)[1] == 2).all())
 
 
-def _precision(hub: Hub, simulation: Any) -> Words:
-    """Find large scenes whose steps are long enough for single precision."""
+def _precision(hub: Hub, simulation: Simulation) -> Words:
+    """Suggest single precision for large scenes whose steps are long enough."""
     if (
         sum(solid.count for solid in hub.solids.values()) < LARGE
         or hub.settings.precision != "double"
@@ -294,8 +297,8 @@ def _precision(hub: Hub, simulation: Any) -> Words:
         )
 
 
-def _output(hub: Hub, simulation: Any) -> Words:
-    """Find output that takes longer than the steps, by rough times of one core."""
+def _output(hub: Hub, simulation: Simulation) -> Words:
+    """Find output that takes seconds, and longer than the steps."""
     span = simulation.control.clock[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):

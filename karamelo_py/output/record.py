@@ -98,6 +98,7 @@ class RunRecord:
         self.content["status"] = status
         if isinstance(error, ScriptError):
             fields = {"code": error.code, "cause": error.cause, "resume": error.resume}
+            fields["rendered"] = error.render()
             self._note("error", error.sentence, error.place, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")

@@ -87,7 +87,7 @@ class RunPage(Rhythmic, Listener):
         known = clock.watch_energy and clock.looks >= FEW  # a mean over this many
         gain = -100 * share_lost(simulation) if known else None
         why = unknown_work(hub)
-        self._unwatched = f"energy {energy.not_watched(why)}" if why else ""
+        self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""
         limit = "load steps" if simulation.implicit else ruling_limit(simulation)
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
         self.frames.add(self._taken())

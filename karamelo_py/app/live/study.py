@@ -32,21 +32,17 @@ class StudyPage:
         Names of the values recorded for each run.
     axes
         Initial axes of the chart; empty: chosen from the names.
-    beside
+    base
         The folder that folders of rows are relative to.
     """
 
     def __init__(
-        self,
-        script: Path,
-        names: Sequence[str],
-        recorded: Sequence[str],
-        axes: Sequence[str] = (),
-        beside: Path = Path(),
-    ):
+        self, script: Path, names: Sequence[str], recorded: Sequence[str], *,
+        axes: Sequence[str] = (), base: Path = Path(),
+    ):  # fmt: skip
         self.stopped = threading.Event()
         self._judged: Callable[[Mapping[str, Any]], Mapping[str, Any]] = dict
-        self._script, self._names, self._beside = script, [*names], beside
+        self._script, self._names, self._base = script, [*names], base
         self._about = {
             "title": str(script), "names": self._names, "recorded": [*recorded],
             "facts": [name for name in COLUMNS if name != "seconds_spread"], "axes": [*axes],
@@ -80,12 +76,12 @@ class StudyPage:
         running: Sequence[tuple[Mapping[str, str], Path, float]],
         **progress: Any,
     ) -> None:
-        """Update rows of finished runs, and cases with their folders."""
+        """Update the rows of finished runs, and cases with their folders."""
         for row in rows[len(self._rows) :]:
             case = {name: row[name] for name in self._names}
             self._rows.append({**self._judged(row), "title": worded(case)})
             self._cases[worded(case)] = case
-            self._folders[worded(case)] = self._beside / row["folder"]
+            self._folders[worded(case)] = self._base / row["folder"]
         for case, folder in (*waiting, *((case, folder) for case, folder, _ in running)):
             self._folders[worded(case)] = folder
             self._cases[worded(case)] = dict(case)
@@ -94,36 +90,34 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """Report new rows and cases; cases without a row that do not run are waiting."""
+        """Return new rows and cases; cases without a row that do not run are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
-        told = {
+        news = {
             "running": self._running, "cases": dict(cases),
             "rows": [{name: plain(value) for name, value in row.items()} for row in rows],
             **self._progress,
         }  # fmt: skip
         if not seen:
-            told["about"] = self._about
-        return (first_row + len(rows), first_case + len(cases)), told
+            news["about"] = self._about
+        return (first_row + len(rows), first_case + len(cases)), news
 
     def _run(self, words: Mapping[str, str]) -> dict | None:
-        """Report one run: its last lines of output, and the columns of its log."""
+        """Return the last lines of a run's output, and the columns of its log."""
         folder = self._folders.get(words.get("title", ""))
         if folder is None:
             return None
-        said = [
-            *said_in(folder / "err.txt").splitlines(),
-            *said_in(folder / "out.txt").splitlines(),
-        ]
+        lines = [line for name in ("err.txt", "out.txt") for line in
+                 said_in(folder / name).splitlines()]  # fmt: skip
         columns = {
             name: [plain(float(value)) for value in values[_some(len(values))]]
             for name, values in read_log(folder).items()
             if np.issubdtype(values.dtype, np.number)
         }
         command = command_of(self._script, self._cases[words["title"]])
-        return {"said": said[-LINES:], "columns": columns, "command": command}
+        return {"said": lines[-LINES:], "columns": columns, "command": command}
 
 
 def _some(count: int) -> np.ndarray:
-    """Choose rows of a log to draw, including the first and the last."""
+    """Choose rows of a log to draw, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(int))

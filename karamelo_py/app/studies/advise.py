@@ -1,7 +1,7 @@
 """karamelo-py advise: the cheapest variant of a script that is accurate enough."""
 
 import subprocess
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, prod
@@ -33,7 +33,7 @@ from karamelo_py.app.studies.curves import (
     sizes,
     usable,
 )
-from karamelo_py.app.studies.study import Study, live_page, plain_table, shown, terminal
+from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
 from karamelo_py.kernels.clock import STILL
 from karamelo_py.output.files import read_json
 from karamelo_py.script.errors import ScriptError, plural
@@ -54,16 +54,16 @@ the basis, or a finer run is worse; finer runs are made to check. With -run the 
 checked against the target."""
 
 
-# Bases with gradients that jump between cells, and methods whose points cross these.
+# Bases with gradients that jump between cells, and methods whose points cross them.
 JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
 ALONE = "no finer run is known"
 UNFOLLOWED = f"{ALONE}, whose points may cross cells"
-SECOND = 2.0  # the order that all methods here may reach
+SECOND = 2.0  # order that all methods may reach
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """Forecast of a run that has not been made: its error, between which bounds, and its cost."""
+    """Expected error of a run, its bounds, and its cost."""
 
     error: float
     low: float
@@ -75,27 +75,27 @@ def forecast(
     x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str,
     highest: float = 4.0,
 ) -> Forecast | None:  # fmt: skip
-    """Expect a run at `x` from the runs at `xs`, coarse ones first.
+    """Forecast a run at `x` from the runs at `xs`, coarse ones first; None if impossible.
 
-    The error continues with the order between the last two. Its bounds follow from the least and
-    the largest order so far, at least a third of the expected order above and half of it below; an
-    order that has fallen may fall by as much again, and one that has not yet reached 2 may. Errors
-    that chance has made small count as large as they may be (`credible`, with the order `highest`
-    of the functions). The time is steps times (a + b points), fitted to the runs; any other cost
-    continues as between the last two. None where fewer than two runs have an error, or the last one
-    got worse.
+    The error continues with the order between the last two runs. Its bounds follow from the least
+    and the largest order so far, at least a third of the expected order above and half of it below;
+    an order that has fallen may fall by as much again, and one that has not yet reached 2 may.
+    Errors that are small by chance count as large as they may be (`credible`, with the order
+    `highest` of the basis). The time is steps times (a + b points), fitted to the runs; any other
+    cost continues as between the last two. Impossible with fewer than two runs that have an error,
+    or if the last one got worse.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
     good = np.isfinite(error) & (error > 0) & (signed != 0)
     if good.sum() < 2 or not good[-1]:
         return None
-    xs, error, own = xs[good], error[good], np.abs(signed[good])
+    xs, error, signed_size = xs[good], error[good], np.abs(signed[good])
     rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
-    # Ways are positive towards what is finer. An error that counts for more than it is makes the
-    # next one fall too steeply.
+    # Positive towards finer runs. An error that counts for more than it is would make the next one
+    # fall too steeply.
     way, ways = abs(np.log(x / xs[-1])), np.abs(np.diff(np.log(xs)))
-    fall = np.fmax(np.diff(np.log(error)), np.fmin(np.diff(np.log(own)), 0.0)) / ways
+    fall = np.fmax(np.diff(np.log(error)), np.fmin(np.diff(np.log(signed_size)), 0.0)) / ways
     if fall[-1] >= 0:
         return None
     expected = -fall[-1]
@@ -112,7 +112,7 @@ def _cost(x: float, xs: np.ndarray, rows: Sequence[Mapping[str, Any]], cost: str
     values = column(rows, cost)
     if cost == "seconds" and all(usable(a) for a in values):
         steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
-        # Relative errors count alike; neither part of the time can be negative.
+        # Relative errors count alike; both parts of the time are at least 0.
         matrix = np.stack([steps, steps * points], axis=1) / values[:, None]
         parts = np.linalg.lstsq(matrix, np.ones(len(values)), rcond=None)[0]
         if (parts < 0).any():
@@ -125,42 +125,40 @@ def _cost(x: float, xs: np.ndarray, rows: Sequence[Mapping[str, Any]], cost: str
 
 
 def _power(x: float, xs: np.ndarray, values: np.ndarray) -> float:
-    """A power law through the last two values."""
     exponent = order(xs[-2:], values[-2:]).exponent
     return float(values[-1] * (x / xs[-1]) ** (exponent if np.isfinite(exponent) else 0.0))
 
 
 @dataclass
 class ChoiceRuns:
-    """A choice of words and what is known of its runs, coarse ones first."""
+    """A choice of words and its runs, coarse ones first."""
 
     values: dict[str, str]
     rows: list[Mapping[str, Any]] = field(default_factory=list)
-    words: frozenset[str] = frozenset()  # of its method, as its runs tell
+    words: frozenset[str] = frozenset()  # of its method
     warnings: tuple[str, ...] = ()  # of its finest run
 
     @property
     def label(self) -> str:
-        """The choice in words."""
         return worded(self.values) or "the script"
 
     @property
     def kind(self) -> set[str]:
-        """Its functions, and whether they move with the body: what decides where errors end."""
+        """Words of the basis and the method, which decide where errors end."""
         return {*self.values.values(), *self.words} & {*REACHED, *look.FAMILIES[2]}
 
     @property
     def highest(self) -> float:
-        """The order of its functions."""
+        """Order of its basis."""
         return reached(self.kind)
 
     def look(self, folder: Path) -> None:
-        """Read what its finest run has said."""
+        """Read method and warnings of its finest run."""
         place = folder / self.rows[-1]["folder"]
         record = record_of(place)
         self.words = frozenset(record["runs"][0]["method"].split() if record.get("runs") else ())
-        said = record.get("messages", [])
-        self.warnings = tuple(note["text"] for note in said if note["kind"] == "warning")
+        notes = record.get("messages", [])
+        self.warnings = tuple(note["text"] for note in notes if note["kind"] == "warning")
 
 
 @dataclass
@@ -172,14 +170,14 @@ class Candidate:
     cost: float
     error: float
     forecast: Forecast | None = None
-    chance: str = ""  # why it may meet the target by chance alone
+    chance: str = ""  # why it may be chance
 
 
 class Adviser:
     """Looks for the cheapest variant whose error is at most `target`.
 
-    `along` is the variable that makes a scene finer, with its values, coarse ones first; `accuracy`
-    and `cost` are columns of the table.
+    `along` is the variable that refines a scene, with its values, coarse ones first; `accuracy` and
+    `cost` are columns of the table.
     """
 
     def __init__(
@@ -189,24 +187,20 @@ class Adviser:
         self.study = study
         self.name, self.values = along
         self.xs = [float(value) for value in self.values]
-        self.folder = getattr(study, "folder", Path()).parent
         self.choices = choices
         self.accuracy, self.cost, self.target = accuracy, cost, target
 
     def go_on(self, choice: ChoiceRuns) -> None:
         """Run the next finer variant of a choice."""
         choice.rows += self.study.run([self._next(choice)])
-        choice.look(self.folder)
+        choice.look(self.study.folder.parent)
 
     def _next(self, choice: ChoiceRuns) -> dict[str, str]:
         case = {**choice.values, self.name: self.values[len(choice.rows)]}
         return {name: case[name] for name in self.study.names}
 
     def pilot(self, count: int) -> None:
-        """Run the coarsest variants of all choices, but none beyond the target.
-
-        What an earlier study has run is known as well.
-        """
+        """Run the coarsest variants of all choices, up to the target, and read earlier runs."""
         for _ in range(min(count, len(self.values))):
             for choice in self.choices:
                 if not self._met(choice):
@@ -216,63 +210,63 @@ class Adviser:
                 self.go_on(choice)
 
     def _met(self, choice: ChoiceRuns) -> list[Candidate]:
-        """Find the runs of it that meet the target."""
+        """List the runs of a choice that meet the target."""
         signed = errors(choice.rows, self.accuracy)
         costs = column(choice.rows, self.cost)
-        why = by_chance(self.xs[: len(signed)], signed, choice.highest)
-        if len(why) == 1 < len(self.values):
-            why = [ALONE]
-        elif 0 < len(why) < len(self.values):
-            if self._crosses(choice, len(why)):
-                why[-1] = why[-1] or UNFOLLOWED
-        else:  # Nothing is finer that misses the target.
+        chances = by_chance(self.xs[: len(signed)], signed, choice.highest)
+        if len(chances) == 1 < len(self.values):
+            chances = [ALONE]
+        elif 0 < len(chances) < len(self.values):
+            if self._crosses(choice, len(chances)):
+                chances[-1] = chances[-1] or UNFOLLOWED
+        else:  # No finer run misses the target.
             meets = np.logical_and.accumulate(np.abs(signed[::-1]) <= self.target)[::-1]
-            why[:-1] = ["" if ok else w for w, ok in zip(why, meets[:-1], strict=False)]
+            chances[:-1] = ["" if ok else w for w, ok in zip(chances, meets[:-1], strict=False)]
         return [
             Candidate(choice, k, cost, abs(error), None, chance)
-            for k, (cost, error, chance) in enumerate(zip(costs, signed, why, strict=True))
+            for k, (cost, error, chance) in enumerate(zip(costs, signed, chances, strict=True))
             if abs(error) <= self.target
         ]
 
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
-        """Tell whether gradients of its functions jump, and points may cross cells at a step."""
+        """Return True if the gradients of its basis jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
-        stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN: unknown
+        stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN if unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
 
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
     ) -> Candidate | None:
-        """Find the cheapest variant of a choice that meets the target, known or expected.
+        """Return the cheapest variant of a choice that meets the target, known or expected.
 
-        With `hope` by the lower bound of the error; if `lucky`, one that may do so by chance.
+        With `hope`, by the lower bound of the error; with `lucky`, one that may meet it by chance.
         """
-        met = [found for found in self._met(choice) if lucky or not found.chance]
+        met = [run for run in self._met(choice) if lucky or not run.chance]
         if met or lucky:
             return met[0] if met else None
         known = self.xs[: len(choice.rows)]
         for step in range(len(known), len(self.xs)):
-            found = forecast(
+            run = forecast(
                 self.xs[step], known, choice.rows, self.accuracy, self.cost, choice.highest
             )
-            if found is None:
+            if run is None:
                 break
-            if (found.low if hope else found.error) <= self.target:
-                return Candidate(choice, step, found.cost, found.error, found)
+            if (run.low if hope else run.error) <= self.target:
+                return Candidate(choice, step, run.cost, run.error, run)
         return None
 
     def lucky(self) -> Candidate | None:
-        """Find the cheapest variant of all that meets the target, if only by chance."""
-        found = filter(None, (self.candidate(choice, lucky=True) for choice in self.choices))
-        return min(found, key=lambda c: c.cost, default=None)
+        """Return the cheapest variant of all that meets the target, if only by chance."""
+        candidates = filter(None, (self.candidate(choice, lucky=True) for choice in self.choices))
+        return min(candidates, key=lambda c: c.cost, default=None)
 
     def candidates(self, hope: bool = False) -> list[Candidate]:
-        """Find the runs of all choices that meet it, the cheapest first."""
-        found = filter(None, (self.candidate(choice, hope) for choice in self.choices))
-        return sorted(found, key=lambda c: c.cost)
+        """Return the candidates of all choices, the cheapest first."""
+        chosen = filter(None, (self.candidate(choice, hope) for choice in self.choices))
+        return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """Find the cheapest candidate, after running what lies in between as far as it pays.
+        """Return the cheapest candidate, after runs that may change it.
 
         A choice that could become the cheapest is followed until its candidate is the next finer
         variant, so that its order is known where it matters.
@@ -293,7 +287,7 @@ class Adviser:
             self.go_on(follow)
 
     def _doubted(self, limit: float) -> ChoiceRuns | None:
-        """Find a choice whose finest run meets the target below a cost, if only by chance."""
+        """Return a choice whose finest run meets the target below a cost, if only by chance."""
         for choice in self.choices:
             finest = len(choice.rows) - 1
             for last in self._met(choice)[-1:] if finest < len(self.values) - 1 else ():
@@ -302,7 +296,7 @@ class Adviser:
         return None
 
     def _risen(self, limit: float) -> ChoiceRuns | None:
-        """Find a choice whose last error alone has grown, and whose next run costs less."""
+        """Return a choice whose last error alone has grown, and whose next run costs less."""
         for choice in self.choices:
             count = len(choice.rows)
             fell = np.diff(sizes(choice.rows, self.accuracy)) < 0
@@ -313,10 +307,10 @@ class Adviser:
         return None
 
     def doubts(self, best: Candidate) -> list[str]:
-        """Tell what the error of a forecast may end at: what is known of its kind."""
-        found = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
+        """List reasons why the error of a forecast may stop falling."""
+        reasons = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
         if self._crosses(best.choice, best.step):
-            found.append(
+            reasons.append(
                 f"gradients of the basis {', '.join(best.choice.kind & {*JUMPING})} jump between "
                 "cells: errors grow once points cross them, and on finer grids they cross more"
             )
@@ -327,25 +321,22 @@ class Adviser:
             sizes = np.abs(signed)
             floor = np.nanmin(credible(self.xs[: len(sizes)], signed, other.highest))
             if sizes[-1] > WORSE * np.nanmin(sizes) and floor > best.forecast.low:
-                said = f"{other.label} did not stay below {floor:.3g}"
-                found.append(f"finer runs of the same functions turned round: {said}")
-        return found
+                text = f"{other.label} did not stay below {floor:.3g}"
+                reasons.append(f"finer runs of the same functions turned round: {text}")
+        return reasons
 
     def hopeful(self) -> Candidate | None:
-        """Find the cheapest variant that may meet the target though none is expected to."""
+        """Return the cheapest variant that may meet the target though none is expected to."""
         return next((c for c in self.candidates(hope=True) if c.forecast), None)
 
     def label(self, choice: ChoiceRuns, step: int) -> str:
-        """Write a variant in words."""
         return worded({**choice.values, **self.at(step)})
 
     def at(self, step: int) -> dict[str, str]:
-        """Give the value of the variable that makes the scene finer."""
         return {self.name: self.values[step]}
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
     variables.add_family(parser)
     variables.add_combinations(parser)
     parser.add_argument(
@@ -360,12 +351,12 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-o", type=Path, default=Path("advise.csv"), help="table (advise.csv)")
 
 
-def run(options: Any) -> int:
-    """Do what the command line says; returns the exit status."""
+def run(options: Namespace) -> int:
     out = variables.out_file(options.o, ".csv")
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
-    values, script, launch, jobs = variables.family(options, timed=timed)
-    items = records.recorded(options.accuracy, script, values)
+    plan = variables.family(options, timed=timed)
+    values = plan.values
+    items = records.recorded(options.accuracy, plan.script, values)
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
@@ -388,9 +379,8 @@ def run(options: Any) -> int:
     combined = variables.cases(others, together, options.where) if others else [{}]
     choices = [ChoiceRuns(case) for case in combined]
     most = len(choices) * len(values[name])
-    study = Study(launch, out, list(values), items, jobs, options.again, strict=True, most=most)
-    study.page = live_page(options, study)
-    study.describe(variables=values, record=[items[0].text], timed=timed, repeat=1)
+    facts = {"record": [items[0].text], "timed": timed, "repeat": 1}
+    study = open_study(options, plan, out, items, strict=True, most=most, facts=facts)
     ordered = values[name]
     if len(ordered) > 1:
         ordered = coarse_first(options.script, name, ordered, choices[0].values)
@@ -408,7 +398,7 @@ def run(options: Any) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Put values in the order of the work they make: `karamelo-py check` measures the ends."""
+    """Sort values by the work they cause, which `karamelo-py check` measures at the ends."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
@@ -433,11 +423,11 @@ def tell(adviser: Adviser) -> None:
     for choice in adviser.choices:
         signed = errors(choice.rows, adviser.accuracy)
         last, count = choice.rows[-1], len(choice.rows)
-        found = adviser.candidate(choice) or adviser.candidate(choice, lucky=True)
+        candidate = adviser.candidate(choice) or adviser.candidate(choice, lucky=True)
         where = cost = error = "–"
-        if found is not None:
-            where = adviser.values[found.step] + " by chance" * bool(found.chance)
-            cost = "about " * bool(found.forecast) + shown(float(found.cost))
+        if candidate is not None:
+            where = adviser.values[candidate.step] + " by chance" * bool(candidate.chance)
+            cost = "about " * bool(candidate.forecast) + shown(float(candidate.cost))
         fit = f"{last['status']}: {last['reason']}"[:60]
         if np.isfinite(signed[-1]):
             xs = adviser.xs[:count]
@@ -447,7 +437,7 @@ def tell(adviser: Adviser) -> None:
 
 
 def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
-    """Say what to write, and how sure it is."""
+    """Print what to write, and how sure it is."""
     values = {**best.choice.values, adviser.name: adviser.values[best.step]}
     print(f"\nfor {adviser.accuracy} <= {adviser.target:g} at the least {adviser.cost}:")
     for name, value in values.items():
@@ -460,44 +450,47 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
 
 
 def by_luck(adviser: Adviser, lucky: Candidate) -> str:
-    """Tell of a run that meets the target, if only by chance."""
-    said = f"{adviser.accuracy} {lucky.error:.3g}, {adviser.cost} {lucky.cost:.3g}"
-    return f"{adviser.label(lucky.choice, lucky.step)} ({said}): {lucky.chance}"
+    numbers = f"{adviser.accuracy} {lucky.error:.3g}, {adviser.cost} {lucky.cost:.3g}"
+    return f"{adviser.label(lucky.choice, lucky.step)} ({numbers}): {lucky.chance}"
 
 
 def sureness(adviser: Adviser, best: Candidate) -> str:
-    """Say how sure a candidate is."""
-    said = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
+    numbers = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
     if best.forecast is None:
         alone = ", and whether finer runs are as good is not known" * (len(adviser.values) == 1)
-        return f"sure: it was run ({said}){alone}"
-    # What is known of its kind may end the fall: its orders tell no bound then.
+        return f"sure: it was run ({numbers}){alone}"
+    # These may end the fall: the orders give no bound then.
     if doubts := adviser.doubts(best):
-        return "\n  ".join([f"not sure: expected {said}, if the error continues to fall", *doubts])
+        return "\n  ".join(
+            [f"not sure: expected {numbers}, if the error continues to fall", *doubts]
+        )
     low, high = best.forecast.low, best.forecast.high
     word = "almost sure"
     if high > adviser.target:
-        near = adviser.target**2 < best.error * high  # nearer to what is expected than to the bound
+        # Nearer to the expected error than to the bound.
+        near = adviser.target**2 < best.error * high
         word = "uncertain" if near else "likely"
-    return f"{word}: expected {said}; by its orders the error lies between {low:.3g} and {high:.3g}"
+    return (
+        f"{word}: expected {numbers}; by its orders the error lies between {low:.3g} and {high:.3g}"
+    )
 
 
 def _nothing(adviser: Adviser) -> int:
-    """Say that no variant meets the target, and what comes nearest."""
+    """Print that no variant meets the target, and which comes nearest; return the exit status."""
     lucky = adviser.lucky()
     luck = ", unless by chance" * (lucky is not None)
     print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}{luck}")
-    found = [
+    sizes = [
         (abs(error), adviser.label(choice, k))
         for choice in adviser.choices
         for k, error in enumerate(errors(choice.rows, adviser.accuracy)) if np.isfinite(error)
     ]  # fmt: skip
     if lucky is not None:
         print(f"reaches it only by chance: {by_luck(adviser, lucky)}")
-    elif found:
-        error, label = min(found, key=lambda item: item[0])
-        others = f"finer values of {adviser.name} or other choices may do"
-        print(f"nearest: {label} with {error:.3g}; {others}")
+    elif sizes:
+        error, label = min(sizes, key=lambda item: item[0])
+        further = f"finer values of {adviser.name} or other choices may do"
+        print(f"nearest: {label} with {error:.3g}; {further}")
     hope = adviser.hopeful()
     if hope is not None:
         print(
@@ -511,7 +504,7 @@ def _nothing(adviser: Adviser) -> int:
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
     """Run what is advised; if it misses the target, continue with the new result.
 
-    Where nothing is expected to meet it, what may is tried.
+    If no variant is expected to meet it, try one that may.
     """
     best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
@@ -519,9 +512,9 @@ def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
         adviser.go_on(best.choice)
         row = best.choice.rows[-1]
         error = abs(errors([row], adviser.accuracy)[0])
-        word = "met" if error <= adviser.target else "missed" if advised else "not yet met"
-        said = adviser.label(best.choice, len(best.choice.rows) - 1)
-        print(f"\nrun: {said}: {adviser.accuracy} {error:.4g}, the target is {word}")
+        state = "met" if error <= adviser.target else "missed" if advised else "not yet met"
+        label = adviser.label(best.choice, len(best.choice.rows) - 1)
+        print(f"\nrun: {label}: {adviser.accuracy} {error:.4g}, the target is {state}")
         if row["reason"]:
             print(f"{row['status']}: {row['reason']}")
         best = adviser.best()

@@ -1,4 +1,4 @@
-"""karamelo-py atlas: makes again what a page shows, each picture by commands for everybody."""
+"""karamelo-py atlas: makes the pictures and tables of a page again, by commands of the program."""
 
 import hashlib
 import json
@@ -9,10 +9,9 @@ import shutil
 import subprocess
 import time
 import tomllib
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import karamelo_py
 from karamelo_py.app.plot import read_text
@@ -48,8 +47,8 @@ An entry has a name, a text, and commands that run in a separate folder; {inputs
 
 Runs that do not end well are named, and the exit status is 1, unless the entry says ends_early =
 true: that they do is what it shows."""
-KEPT = "entry.json"
-SAID = "said.txt"
+RECORD = "entry.json"
+TRANSCRIPT = "said.txt"
 PICTURES = (".png", ".svg")
 
 
@@ -57,14 +56,14 @@ PICTURES = (".png", ".svg")
 class Entry:
     """A picture or a table, and the commands that make it."""
 
-    name: str  # its folder; a part before a slash is what -only can name as well
+    name: str  # its folder; a part before a slash is its group
     text: str = ""  # what it shows
-    commands: list[str] = field(default_factory=list)  # of karamelo-py, without that word
+    commands: list[str] = field(default_factory=list)  # without the word karamelo-py
     # Values of the words in braces.
     whole: dict[str, str] = field(default_factory=dict)
     small: dict[str, str] = field(default_factory=dict)
-    interpreted: bool = False  # its scenes are so small that this takes less time than to compile
-    page: bool = True  # has a part of the page
+    interpreted: bool = False  # its scenes are too small to be worth compiling
+    page: bool = True  # is on the page
     ends_early: bool = False  # shows runs that do not end well
 
     @property
@@ -72,7 +71,7 @@ class Entry:
         return self.name.partition("/")[0]
 
     def lines(self, inputs: str, *, small: bool) -> list[str]:
-        """Fill values into the commands."""
+        """Insert values into the commands."""
         words = {"inputs": inputs, **self.whole, **(self.small if small else {})}
         try:
             return [command.format(**words) for command in self.commands]
@@ -86,13 +85,13 @@ class Entry:
 def read(path: Path) -> tuple[list[Entry], Path]:
     """Read the entries of an atlas, and its folder of scripts."""
     try:
-        found = tomllib.loads(read_text(path))
+        content = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
         raise ScriptError(f"{path} is not TOML: {error}") from None
     entries = []
-    for each in found.get("entry", []):
+    for table in content.get("entry", []):
         try:
-            entries.append(Entry(**each))
+            entries.append(Entry(**table))
         except TypeError as error:
             raise ScriptError(
                 f"{path}: an entry with {str(error).split(') ')[-1]}",
@@ -100,11 +99,10 @@ def read(path: Path) -> tuple[list[Entry], Path]:
             ) from None
     if not entries:
         raise ScriptError(f"{path} has no entries", expected="[[entry]] with name and commands")
-    return entries, (path.parent / found.get("inputs", "inputs")).resolve()
+    return entries, (path.parent / content.get("inputs", "inputs")).resolve()
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
     parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
     parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups: NAME,NAME")
     parser.add_argument("-small", action="store_true", help="use the smaller values of the entries")
@@ -118,14 +116,13 @@ def add_options(parser: ArgumentParser) -> None:
     )
 
 
-def run(options: Any) -> int:
-    """Do what the command line says; returns the exit status."""
+def run(options: Namespace) -> int:
     entries, inputs = read(options.atlas)
     asked = names(options.only)
-    known = [*{entry.group for entry in entries}, *(entry.name for entry in entries)]
+    names_of_all = [*{entry.group for entry in entries}, *(entry.name for entry in entries)]
     for name in asked:
-        if name not in known:
-            raise unknown(f"-only {name}: no such entry (-list shows all)", name, known)
+        if name not in names_of_all:
+            raise unknown(f"-only {name}: no such entry (-list shows all)", name, names_of_all)
     chosen = [e for e in entries if not asked or e.name in asked or e.group in asked]
     if options.list:
         for entry in chosen:
@@ -135,11 +132,11 @@ def run(options: Any) -> int:
     folder = options.o / "small" if options.small else options.o
     failed: dict[str, str] = {}
     for k, entry in enumerate(chosen, 1):
-        said = f"{k} of {len(chosen)}: {entry.name}"
+        label = f"{k} of {len(chosen)}: {entry.name}"
         begun = time.perf_counter()
-        place = folder / entry.name
-        state = make(entry, place, inputs, small=options.small, again=options.again)
-        bad, count = ended(place)
+        folder_of_entry = folder / entry.name
+        state = make(entry, folder_of_entry, inputs, small=options.small, again=options.again)
+        bad, count = ended(folder_of_entry)
         if state == "failed":
             failed[entry.name] = ""
         elif bad:
@@ -147,7 +144,7 @@ def run(options: Any) -> int:
             if not entry.ends_early:
                 more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
                 failed[entry.name] = f" ({', '.join(bad[:3])}{more})"
-        print(f"{said} {state} ({duration(time.perf_counter() - begun)})", flush=True)
+        print(f"{label} {state} ({duration(time.perf_counter() - begun)})", flush=True)
     if options.page and not options.small:
         write_page(options.page, entries, folder, inputs)
     if failed:
@@ -164,48 +161,49 @@ def ended(place: Path) -> tuple[list[str], int]:
 
 
 def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:
-    """Run the commands of an entry in its folder; ``done``, ``known`` or ``failed``."""
+    """Run the commands of an entry in its folder; return ``done``, ``known`` or ``failed``."""
     lines = entry.lines(str(inputs), small=small)
     key = key_of(lines)
-    record = place / KEPT
-    if not again and read_json(record).get("key") == key:
+    record = place / RECORD
+    stored = read_json(record)
+    if not again and stored.get("key") == key and "said" in stored:
         return "known"
     with reported(place):
         place.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
     for path in [*place.glob("*.png"), *place.glob("*.svg")]:
-        path.unlink()  # of other commands, maybe
+        path.unlink()  # may be of other commands
     more = {"NUMBA_DISABLE_JIT": "1"} if entry.interpreted else {}
-    told = []
+    transcript = []
     for line in lines:
         done = subprocess.run(
             [*PROGRAM, *shlex.split(line)],
             cwd=place, env={**environment(), **more}, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
         )  # fmt: skip
-        told.append(f"$ karamelo-py {line}\n{done.stdout}")
-        write_whole(place / SAID, "\n".join(told))
+        transcript.append(f"$ karamelo-py {line}\n{done.stdout}")
+        write_whole(place / TRANSCRIPT, "\n".join(transcript))
         if done.returncode:
             print(done.stdout, end="")
             return "failed"
-    made = {"key": key, "commands": lines, **surroundings()}
+    made = {"key": key, "commands": lines, "said": done.stdout, **surroundings()}
     write_whole(record, json.dumps(made, indent=1))
     return "done"
 
 
 def key_of(lines: list[str]) -> str:
-    """Hash what a result belongs to: the commands, the scripts they name, the version."""
-    said = [karamelo_py.__version__, *lines]
+    """Hash all that a result depends on: the commands, the scripts they name, the version."""
+    parts = [karamelo_py.__version__, *lines]
     for word in {word for line in lines for word in shlex.split(line)}:
         if os.path.isabs(word) and Path(word).is_file():
-            said.append(Path(word).read_text(encoding="utf-8", errors="replace"))
-    return hashlib.sha256("\0".join(said).encode()).hexdigest()
+            parts.append(Path(word).read_text(encoding="utf-8", errors="replace"))
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
 def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
-    """Write a page of the entries that are done; what it says of others stays."""
+    """Write the page of the entries that are done; parts of the others stay."""
     before = page.read_text(encoding="utf-8") if page.exists() else ""
-    kept = {
+    before_by_name = {
         part.partition("\n")[0]: part.rstrip() for part in re.split("^##+ ", before, flags=re.M)
     }
     shown = page.parent / "_static" / "atlas"
@@ -215,9 +213,9 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     ]
     group = ""
     for entry in entries:
-        done = (folder / entry.name / KEPT).exists()
+        done = (folder / entry.name / RECORD).exists()
         part = part_of_page(entry, folder / entry.name, shown, inputs) if done else None
-        part = part or kept.get(entry.name)
+        part = part or before_by_name.get(entry.name)
         if not part or not entry.page:
             continue
         if entry.group != group:
@@ -237,17 +235,10 @@ def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, target)
         parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})")
-    said = (place / SAID).read_text(encoding="utf-8").replace(str(inputs), "inputs")
-    made = read_json(place / KEPT)
+    made = read_json(place / RECORD)
+    printed = [line.rstrip() for line in made["said"].rstrip().splitlines()]
+    text = "\n".join([*(f"$ karamelo-py {line}" for line in made["commands"]), *printed])
     version = made.get("versions", {}).get("karamelo-py", karamelo_py.__version__)
     with_what = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]
     made_with = "*" + ", ".join(filter(None, with_what)) + "*"
-    return "\n\n".join([*parts, f"```text\n{abridged(said)}\n```", made_with])
-
-
-def abridged(said: str) -> str:
-    """Return all commands, and what the last one printed: orders, edges, the table of a machine."""
-    lines = [line.rstrip() for line in said.rstrip().splitlines()]
-    commands = [line for line in lines if line.startswith("$ ")]
-    last = max(k for k, line in enumerate(lines) if line.startswith("$ "))
-    return "\n".join([*commands, *lines[last + 1 :]])
+    return "\n\n".join([*parts, f"```text\n{text.replace(str(inputs), 'inputs')}\n```", made_with])

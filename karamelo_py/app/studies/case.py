@@ -1,4 +1,4 @@
-"""One run of a study: a separate process in a separate folder, and the facts read from it."""
+"""A run of a study: a separate process in a separate folder, and the facts in its run.json."""
 
 import hashlib
 import json
@@ -28,10 +28,10 @@ from karamelo_py.script.terms import number_of
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Before the first step as well, and no mistake of a script: larger scenes, longer steps, a fault of
-# the program, another run in the folder.
+# Codes of errors before the first step that are no mistake of the script: larger scenes, longer
+# steps; a fault of the program, another run in the folder.
 _NOT_OF_SCRIPT = ("memory", "step-above-limit")
-_NOT_ITS_OWN = ("internal", "busy")
+_NOT_OF_RUN = ("internal", "busy")
 
 
 @dataclass
@@ -43,14 +43,14 @@ class CaseOutcome:
     """
 
     status: str
-    reason: str = ""  # of what did not end well: the message of the program
-    facts: dict[str, float] = field(default_factory=dict)  # numbers of the run, see `COLUMNS`
+    reason: str = ""  # message of the program, unless done
+    facts: dict[str, float] = field(default_factory=dict)  # see `COLUMNS`
     folder: Path = Path()
     code: str = ""  # of the error that ended it
 
     @property
     def complaint(self) -> str:
-        """All that the program said of what went wrong."""
+        """Standard error of the run."""
         return said_in(self.folder / "err.txt")
 
 
@@ -58,30 +58,29 @@ class CaseOutcome:
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
     "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
-    "seconds_spread": "spread of that time over repetitions (s)",  # largest less smallest
+    "seconds_spread": "spread of that time over repetitions (s)",  # largest minus smallest
     "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
     "node_visits": "steps times points times nodes of a point",
     "steps": "steps",  # of all runs of the script
     "points": "points",  # at the beginning
     "dt": "first step (time of the script)",
-    "stable_dt": "stable step (time of the script)",  # the largest stable step at the beginning
-    # The first of the program's own choice, where the script chose another.
+    "stable_dt": "stable step (time of the script)",  # at the beginning
+    # The program's own choice of the first step, if the script chose another.
     "own_dt": "the program's own step (time of the script)",
-    "path": "path of the fastest points (cells)",  # the farthest that one may have gone
-    "bytes_per_particle": "bytes per particle",  # of all fields, the mean over points
+    "path": "path of the fastest points (cells)",  # upper bound
+    "bytes_per_particle": "bytes per particle",  # all fields, mean over points
     "peak_memory_mib": "peak memory (MiB)",
     "wall_s": "time of the process (s)",
 }
 
 
 def worded(case: Mapping[str, Any]) -> str:
-    """Write the values of a case in words."""
     return ", ".join(f"{name} = {value}" for name, value in case.items())
 
 
 def said_in(file: Path) -> str:
-    """Read what a run has said; nothing where that is gone."""
+    """Read the output of a run; empty if the file cannot be read."""
     try:
         return file.read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -89,59 +88,53 @@ def said_in(file: Path) -> str:
 
 
 class Refused(ScriptError):
-    """A variant that the program refuses by a mistake of its script, told in the program's words.
-
-    The values of its variables follow the whole message.
-    """
+    """A variant refused for a mistake of its script; shows the message and the values."""
 
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
-        lines = outcome.complaint.rstrip().splitlines()
-        text = error_of(record_of(outcome.folder)).get("text") or outcome.reason
-        first = next((k for k, line in enumerate(lines) if text in line), 0)
-        self._whole = "\n".join([*lines[first:], f"this is the script with {worded(case)}"])
+        message = error_of(record_of(outcome.folder)).get("rendered", outcome.complaint.rstrip())
+        self._whole = f"{message}\nthis is the script with {worded(case)}"
 
     def render(self) -> str:
         return self._whole
 
 
 class Stop(Exception):
-    """The study is to end now; what runs is taken down."""
+    """The study is to end now, with its runs."""
 
 
 @dataclass
 class Launch:
-    """Run the cases of a study."""
+    """How the cases of a study are run."""
 
     script: Path
     threads: int = 1  # of each run
     repeat: int = 1  # runs of each case; the time is their median
-    limit: float | None = None  # seconds after which a run is given up
-    texts: tuple[str, ...] = ()  # of the script and those that it includes
-    stop: threading.Event = field(default_factory=threading.Event)  # set when the study is to end
+    limit: float | None = None  # seconds after which a run is stopped
+    texts: tuple[str, ...] = ()  # of the script and its includes
+    stop: threading.Event = field(default_factory=threading.Event)  # set to end the study
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
-        """Hash what a result belongs to: it is used again only for the very same."""
-        said = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
-        said += [f"{name}={value}" for name, value in case.items()]
-        said.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
-        return hashlib.sha256("\0".join(said).encode()).hexdigest()
+        """Hash all that a result depends on; earlier results are used again by this hash."""
+        parts = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
+        parts += [f"{name}={value}" for name, value in case.items()]
+        parts.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """Read the outcome of this case in an earlier study, if the same was run in this folder."""
-        found = read_json(folder / KEPT)
-        if found.get("key") != self.key(case):
+        """Read the outcome of this case from an earlier study; None if it has to be run again."""
+        stored = read_json(folder / KEPT)
+        if stored.get("key") != self.key(case):
             return None
-        # Somebody else's doing, which the next time may not come, or a file that was missing.
-        if found["status"] in ("killed", "refused") or found.get("code") in _NOT_ITS_OWN:
+        # These outcomes may differ next time.
+        if stored["status"] in ("killed", "refused") or stored.get("code") in _NOT_OF_RUN:
             return None
-        # A run that was given up is tried again when it may take longer.
-        if found["status"] == "too long" and (self.limit or 1e300) > found["facts"]["wall_s"]:
+        # A stopped run is repeated if it may take longer now.
+        if stored["status"] == "too long" and (self.limit or 1e300) > stored["facts"]["wall_s"]:
             return None
-        return CaseOutcome(
-            found["status"], found["reason"], found["facts"], folder, found.get("code", "")
-        )
+        status, reason, facts = (stored[name] for name in ("status", "reason", "facts"))
+        return CaseOutcome(status, reason, facts, folder, stored.get("code", ""))
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         """Run a case and store its outcome."""
@@ -162,8 +155,8 @@ class Launch:
                 facts["seconds_spread"] = max(seconds) - min(seconds)
         if "particle_steps" in facts and facts["seconds"] > 0:
             facts["particle_steps_per_s"] = facts["particle_steps"] / facts["seconds"]
-        kept = {"status": outcome.status, "reason": outcome.reason, "code": outcome.code}
-        record = {"key": self.key(case), "variables": dict(case), **kept, "facts": facts}
+        end = {"status": outcome.status, "reason": outcome.reason, "code": outcome.code}
+        record = {"key": self.key(case), "variables": dict(case), **end, "facts": facts}
         write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome
 
@@ -174,7 +167,7 @@ class Launch:
             (folder / name).unlink(missing_ok=True)
         begun = time.perf_counter()
         with (folder / "out.txt").open("wb") as out, (folder / "err.txt").open("wb") as err:
-            pid = self.warm.start(kind_of(case.values()), words, folder, out, err)
+            pid = self.warm.start(kind_of(case.values()), words, folder, (out, err))
             process: Any = SimpleNamespace(pid=pid, returncode=None)
             if process.pid is None:
                 process = subprocess.Popen(
@@ -199,13 +192,13 @@ class Launch:
             outcome.reason = error.get("text") or [*last, "ended without a message"][0].strip()
             if "cause" in error:
                 outcome.reason += f"; likely cause: {error['cause']}"
-            if "points" not in facts and outcome.code not in _NOT_ITS_OWN + _NOT_OF_SCRIPT:
+            if "points" not in facts and outcome.code not in _NOT_OF_RUN + _NOT_OF_SCRIPT:
                 outcome.status = "refused"
                 outcome.reason += f"; {error['hint']}" if "hint" in error else ""
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
-        """Wait for the end; tells the peak memory in MiB, where known, and whether it was late."""
+        """Wait for the end; return the peak memory in MiB (or None) and whether it was stopped."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
@@ -229,42 +222,39 @@ class Launch:
 
 
 def kind_of(values: Iterable[str]) -> tuple[str, ...]:
-    """Pick what the loops of a case are compiled for, as far as variables tell: its words."""
+    """Return the words among the values of a case, which decide what is compiled."""
     return tuple(value for value in values if number_of(value) is None)
 
 
 def options_of(case: Mapping[str, str]) -> list[str]:
-    """Write the options of a command line that set the variables of a case."""
     return [word for name, value in case.items() for word in ("-var", name, value)]
 
 
 def command_of(script: Any, case: Mapping[str, str]) -> str:
-    """Write the command of a case for a shell, such that each value stays one word."""
+    """Format the shell command of a case; each value stays one word."""
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
 
 def environment() -> dict[str, str]:
-    """Give the environment of a run: it runs this very program, wherever it starts."""
+    """Return the environment of a run: it imports this very program from any folder."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}
 
 
 def record_of(folder: Path) -> dict[str, Any]:
-    """Read the record of the runs in a folder; nothing where it was not written."""
+    """Read run.json in a folder; empty if there is none."""
     return read_json(folder / NAME)
 
 
 def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
-    """Find the numbers of the runs of a script: of all runs, or of the first, see `COLUMNS`."""
+    """Return the numbers of a script's runs, of all or of the first, by the names in `COLUMNS`."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
-    names = {"points": "points", "nodes": "nodes", "nodes_per_point": "nodes_per_point",
-             "bytes_per_particle": "bytes_per_point", "dt": "dt", "stable_dt": "stable_dt",
-             "own_dt": "own_dt"}  # fmt: skip
-    facts = {
-        ours: float(first[name]) for ours, name in names.items() if first.get(name) is not None
-    }
+    names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")
+    facts = {name: float(first[name]) for name in names if first.get(name) is not None}
+    if "bytes_per_point" in facts:
+        facts["bytes_per_particle"] = facts.pop("bytes_per_point")
     ended = [run for run in runs if "steps" in run]
     if ended and ended[-1]["path_cells"] is not None:
         facts["path"] = ended[-1]["path_cells"]
@@ -281,15 +271,15 @@ def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
 
 
 def error_of(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Find the error that ended a script; nothing where none did."""
+    """Return the error that ended a script; empty if none did."""
     errors = [note for note in record.get("messages", []) if note["kind"] == "error"]
     return errors[-1] if errors else {}
 
 
 def folder_name(case: Mapping[str, Any]) -> str:
-    """Name a folder for a case after its values."""
-    said = ",".join(f"{name}={value}" for name, value in case.items())
-    plain = re.sub(r"[^\w.,=+-]", "_", said)
-    if plain == said and len(plain) < 100:
+    """Return a folder name for the values of a case."""
+    text = ",".join(f"{name}={value}" for name, value in case.items())
+    plain = re.sub(r"[^\w.,=+-]", "_", text)
+    if plain == text and len(plain) < 100:
         return plain
-    return f"{plain[:80]}-{hashlib.sha256(said.encode()).hexdigest()[:8]}"
+    return f"{plain[:80]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"

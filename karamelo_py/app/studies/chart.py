@@ -1,10 +1,10 @@
-"""karamelo-py chart: what accuracy costs, how errors fall, where two variables lead."""
+"""karamelo-py chart: errors over cost, convergence, maps over two variables, curves of logs."""
 
 import base64
 import html
 import io
 import json
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
@@ -38,7 +38,6 @@ SUFFIXES = (*pictures.SUFFIXES, ".html")
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
     parser.add_argument(
         "tables", type=Path, nargs="+", metavar="table",
         help="what karamelo-py sweep has written; several with -versus",
@@ -77,8 +76,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
 
 
-def run(options: Any) -> int:
-    """Do what the command line says; returns the exit status."""
+def run(options: Namespace) -> int:
     costs = bool(options.cost) or not options.x
     options.cost = options.cost or "seconds"
     if options.axes and (options.keeps or not (options.o or options.curve)):
@@ -101,7 +99,7 @@ def run(options: Any) -> int:
         return curves(options, table, by or table.variables)
     if options.y:
         return results.draw(options, table, by)
-    family = Family(table, options.accuracy, options.cost, by, options.x)
+    family = Family(table, options.accuracy, options.cost, by=by, along=options.x)
     if len(family.without) == len(table.rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
     out = out_file(options.o, *SUFFIXES) if options.o else None
@@ -115,18 +113,16 @@ def run(options: Any) -> int:
     if not options.x and not axes and not any(line.shown.any() for line in family.lines):
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else table.label(family.cost)
-    words = along(options, *(axes or (first, family.error_label)))
-    # First the picture: who reads the table may close the pipe.
-    if out is None:
-        pass
-    elif out.suffix.lower() == ".html":
-        if axes:
+    labels = along(options, *(axes or (first, family.error_label)))
+    # The picture first: a reader of the table may close the pipe.
+    if out is not None:
+        sheet = pictures.Sheet(out, *labels, title)
+        if out.suffix.lower() != ".html":
+            pictures.heat(family, *axes, sheet) if axes else pictures.lines(family, sheet)
+        elif axes:
             raise ScriptError("-heat is a picture", expected="-o heat.png, .svg or .pdf")
-        write_page(family, out, words, title or "runs")
-    elif axes:
-        pictures.heat(family, *axes, out, words, title)
-    else:
-        pictures.lines(family, out, words, title)
+        else:
+            write_page(family, sheet)
     tell(family, costs=costs)
     if out is not None:
         print(f"drawn: {out}")
@@ -150,67 +146,71 @@ def read(path: Path, where: Sequence[str]) -> Table:
     return Table(rows, variables, path, made)
 
 
-def side_by_side(options: Any) -> int:
+def side_by_side(options: Namespace) -> int:
     """Draw two values of a variable side by side, for the scenes of all tables."""
     if not options.accuracy:
         raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
     out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
-    found, known = [], []
+    pairs, values = [], []
     for path in options.tables:
         table = read(path, options.where)
-        some, values = pictures.pairs(table, options.versus, options.accuracy, options.cost)
-        if known and values != known:
-            expected = ", ".join(known) + ", as in the first table"
-            raise ScriptError(f"{path}: {options.versus} is {', '.join(values)}", expected=expected)
-        known = values
-        found += some
+        more, two = pictures.pairs(table, options.versus, options.accuracy, options.cost)
+        if values and two != values:
+            expected = ", ".join(values) + ", as in the first table"
+            raise ScriptError(f"{path}: {options.versus} is {', '.join(two)}", expected=expected)
+        values = two
+        pairs += more
     if out is not None:
         cost = look.label(options.cost).removesuffix(" (s)")
-        words = along(
-            options, look.label(options.accuracy), f"{cost},\n{known[1]} over {known[0]} (1)"
+        labels = along(
+            options, look.label(options.accuracy), f"{cost},\n{values[1]} over {values[0]} (1)"
         )
-        pictures.draw_pairs(found, known, out, words, options.accuracy, options.title or "")
-    pictures.tell_pairs(found, known, options.accuracy, options.cost)
+        sheet = pictures.Sheet(out, *labels, options.title or "")
+        pictures.draw_pairs(pairs, values, options.accuracy, sheet)
+    pictures.tell_pairs(pairs, values, options.accuracy, options.cost)
     if out is not None:
         print(f"drawn: {out}")
     return 0
 
 
-def curves(options: Any, table: Table, by: list[str]) -> int:
+def curves(options: Namespace, table: Table, by: list[str]) -> int:
     """Draw a column of the logs, a curve for each run."""
     out = out_file(options.o or Path("curves.png"), *pictures.SUFFIXES)
     differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
 
     def read(column: str) -> list[pictures.History]:
-        return pictures.histories(table, differing, options.log, over, column, names(options.names))
+        given = {"log": options.log, "names": names(options.names)}
+        return pictures.histories(table, differing, over, column, **given)
 
     exact = None
     if options.exact:
         whole = max(read(options.exact), key=lambda each: len(each.x))
         exact = whole._replace(label=options.exact)
     title = table.script if options.title is None else options.title
-    found = read(options.curve)
-    words = along(options, table.label(over), table.label(options.curve))
-    pictures.draw_histories(found, out, words, title, exact)
-    for each in found:
+    histories = read(options.curve)
+    labels = along(options, table.label(over), table.label(options.curve))
+    pictures.draw_histories(histories, pictures.Sheet(out, *labels, title), exact)
+    for each in histories:
         print(f"{each.label}: {options.curve} {shown(float(each.y[-1]))} at the end")
     print(f"drawn: {out}")
     return 0
 
 
-def keeps(options: Any, table: Table, by: list[str]) -> int:
-    """Show whether a log column stays what it was, and which runs fail without a known cause."""
+def keeps(options: Namespace, table: Table, by: list[str]) -> int:
+    """Show whether a log column stays constant, and which runs fail silently."""
     out = out_file(options.o, ".md") if options.o else None
     require("-by", by, table.variables)
-    what = options.x or "Time", options.keeps, keeping.WITHIN, table.made.get("computes", ())
-    kept = [keeping.look_at(row, table.path.parent, *what) for row in table.rows]
-    text, silent = keeping.verdicts(table, kept, by)
+    over, parts, folder = options.x or "Time", table.made.get("computes", ()), table.path.parent
+    verdicts = [
+        keeping.look_at(row, folder, over, options.keeps, parts=parts) for row in table.rows
+    ]
+    text, silent = keeping.verdicts(table, verdicts, by)
     if out:
         write_whole(out, text)
     print(text)
-    for word in dict.fromkeys(one.word for one in kept):
-        print(f"{word}: {sum(one.word == word for one in kept)} of {len(kept)}")
+    for word in dict.fromkeys(verdict.word for verdict in verdicts):
+        print(f"{word}: {sum(verdict.word == word for verdict in verdicts)} of {len(verdicts)}")
     for line in silent:
         print(f"nothing says why: {line}")
     if out:
@@ -250,7 +250,7 @@ def tell(family: Family, *, costs: bool) -> None:
             fits = []
             for x, y in pairs.values():
                 fit = order(getattr(line, x), getattr(line, y))
-                # Errors fall where costs grow.
+                # Errors fall as costs grow.
                 turned = line.rises or x == "cost" if y == "error" else not line.rises
                 fits.append(fit.of_fall if turned else fit)
             orders.add_row(line.label, *map(str, fits))
@@ -270,8 +270,8 @@ _WIDEST = 480  # pixels of a picture in the page
 _MOST = 60  # pictures in a page
 
 
-def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -> None:
-    """Write the page with Plotly; `words` label the axes."""
+def write_page(family: Family, sheet: pictures.Sheet) -> None:
+    """Write the page with Plotly."""
     from plotly import graph_objects
     from plotly import io as plotly_io
 
@@ -307,8 +307,8 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
     }  # fmt: skip
     figure.update_layout(
         template="plotly_white", margin={"l": 70, "r": 20, "t": 20, "b": 60}, hovermode="closest",
-        xaxis={**usual, "title": words[0], "type": "linear" if family.linear else "log"},
-        yaxis={**usual, "title": words[1], "type": "log"},
+        xaxis={**usual, "title": sheet.x, "type": "linear" if family.linear else "log"},
+        yaxis={**usual, "title": sheet.y, "type": "log"},
         legend={"orientation": "h", "y": -0.15},
     )  # fmt: skip
     for axis, numbers in (("xaxis", "across"), ("yaxis", "error"))[family.linear :]:
@@ -332,14 +332,14 @@ def write_page(family: Family, path: Path, words: tuple[str, str], title: str) -
     about = filter(None, [made.get("processor"), threads, versions, made.get("date")])
     template = Template(Path(__file__).with_name("page.html").read_text(encoding="utf-8"))
     page = template.substitute(
-        title=html.escape(title), chart=chart, failures=_failures(family, number_of),
-        footer=html.escape("; ".join(about)), runs=text, first=first,
+        title=html.escape(sheet.title or "runs"), chart=chart, runs=text, first=first,
+        failures=_failures(family, number_of), footer=html.escape("; ".join(about)),
     )  # fmt: skip
-    write_whole(path, page)
+    write_whole(sheet.path, page)
 
 
 def in_html(lead: str, exponent: int) -> str:
-    """Write a number times a power of ten for a page; no lead is 1."""
+    """Write a number times a power of ten in HTML; without a lead, the power alone."""
     return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
 
 
@@ -366,7 +366,7 @@ def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict
 
 
 def _picture(folder: Path) -> str | None:
-    """Read the newest picture of a run, small enough for a page, as a data URL."""
+    """Return the newest picture of a run as a data URL, reduced for the page; None without one."""
     pictures = sorted(folder.glob("*.png"), key=lambda p: p.stat().st_mtime)
     if not pictures:
         return None

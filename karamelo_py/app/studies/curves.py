@@ -1,4 +1,4 @@
-"""A table of runs as lines of ever finer runs, their orders, and the Pareto front."""
+"""Runs of a table as lines of increasing refinement, their orders, and the Pareto front."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
-NONE = "mechanical"  # what a script says where a method has no such word
+NONE = "mechanical"  # word of a method without a word here
 
 
 class Order(NamedTuple):
@@ -27,11 +27,11 @@ class Order(NamedTuple):
 
     @property
     def of_fall(self) -> "Order":
-        """The order by which y falls while x grows, a positive number."""
+        """Order by which y falls while x grows, a positive number."""
         return Order(-self.exponent, -self.highest, -self.lowest)
 
     def towards(self, x: Sequence[float]) -> "Order":
-        """The order by which errors fall from the first to the last of `x`."""
+        """Order by which errors fall from the first to the last of `x`."""
         return self.of_fall if x[-1] > x[0] else self
 
     def __str__(self) -> str:
@@ -43,7 +43,7 @@ class Order(NamedTuple):
 
 
 def order(x: Sequence[float], y: Sequence[float]) -> Order:
-    """Fit the order of y in x; points that have no logarithm are left out."""
+    """Fit the order of y in x, without points that have no logarithm."""
     pairs = sorted((a, b) for a, b in zip(x, y, strict=True) if usable(a) and usable(b))
     logs = np.log(np.array(pairs).reshape(-1, 2))
     if len(np.unique(logs[:, 0])) < 2:
@@ -54,8 +54,7 @@ def order(x: Sequence[float], y: Sequence[float]) -> Order:
     return Order(float(slope), float(local.min()), float(local.max()))
 
 
-# Orders that functions reach where they are smooth (p + 1 of polynomials of order p); other words
-# do not tell.
+# Orders of smooth solutions (p + 1 for polynomials of order p); other words do not matter.
 REACHED = {
     "linear": 2, "ugimp": 2, "cpgimp": 2, "quadratic-spline": 3, "Bernstein-quadratic": 3,
     "cubic-spline": 4,
@@ -66,44 +65,44 @@ CHANCES = {
     "coarser": "a coarser run is better",
     "finer": "a finer run is worse",
 }
-BEYOND = 0.5  # of an order, until a fall is too steep for the functions
-WORSE = 1.1  # times a value: one that is worse, and not as good
+BEYOND = 0.5  # margin of an order before a fall is too steep
+WORSE = 1.1  # ratio of a worse error
 
 
 def reached(words: Iterable[str]) -> float:
-    """Find the highest order to expect of a choice of words."""
+    """Return the highest order to expect of a choice of words."""
     return min((REACHED[word] for word in words if word in REACHED), default=4)
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """Tell of runs, coarse ones first, why their small errors are chance; empty where they are not.
+    """Return why small errors of runs, coarse ones first, are chance; empty where they are not.
 
-    `values` are errors at `x`, signed where the sign is known. A small error is chance where a
-    finer run is worse; and where the sign has changed, it fell by more than `highest`, the order of
-    the functions, or it has grown, as long as no finer run is as good.
+    `values` are errors at `x`, signed where the sign is known. A small error is chance if a finer
+    run is worse; and, as long as no finer run is as good, if the sign has changed, the error fell
+    faster than by `highest`, the order of the basis, or it has grown.
     """
-    found, size = [], np.abs(np.asarray(values, float))
-    for k, own in enumerate(size):
-        why, finer = "", size[k + 1 :]
-        if k and not (finer[:1] <= WORSE * own).any():
+    reasons, size = [], np.abs(np.asarray(values, float))
+    for k, error in enumerate(size):
+        reason, finer = "", size[k + 1 :]
+        if k and not (finer[:1] <= WORSE * error).any():
             ratio = abs(np.log(x[k] / x[k - 1]))
             if values[k] * values[k - 1] < 0:
-                why = CHANCES["sign"]
-            elif own > 0 and np.log(size[k - 1] / own) > (highest + BEYOND) * ratio:
-                why = CHANCES["falls"]
-            elif (WORSE * size[:k] < own).any():
-                why = CHANCES["coarser"]
-        if (finer > WORSE * own).any():
-            why = CHANCES["finer"]
-        found.append(why if np.isfinite(own) else "")
-    return found
+                reason = CHANCES["sign"]
+            elif error > 0 and np.log(size[k - 1] / error) > (highest + BEYOND) * ratio:
+                reason = CHANCES["falls"]
+            elif (WORSE * size[:k] < error).any():
+                reason = CHANCES["coarser"]
+        if (finer > WORSE * error).any():
+            reason = CHANCES["finer"]
+        reasons.append(reason if np.isfinite(error) else "")
+    return reasons
 
 
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
-    """Find sizes of errors that a forecast may begin with: never less than chance lets them be.
+    """Return the sizes of errors that a forecast may start from, without reductions by chance.
 
-    An error is at least what the step from the one before it leaves with the order `highest`, and
-    at least each finer run's.
+    An error is at least the change from the run before over the reduction by the order `highest`,
+    and no less than the error of each finer run.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -115,7 +114,7 @@ def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.
 
 
 def usable(a: float | None) -> bool:
-    """Tell whether a number has a place on a logarithmic axis."""
+    """Return True if a number has a logarithm."""
     return a is not None and 0 < a < inf
 
 
@@ -129,11 +128,10 @@ class Table(NamedTuple):
 
     @property
     def script(self) -> str:
-        """The name of the script."""
         return Path(self.made.get("script", "")).name
 
     def label(self, name: str) -> str:
-        """Give the title of an axis: of a column of the table, or of the logs with its unit."""
+        """Return the axis title of a column of the table, or of the logs with its unit."""
         path = Path(self.made.get("script", ""))
         return labelled(look.label(name), ScriptFiles(path).unit(name) if path.is_file() else "")
 
@@ -144,42 +142,41 @@ class GroupedRuns:
 
     choice: dict[str, str]  # values of the other variables that differ between lines
     rows: list[Mapping[str, str]]
-    # Numbers of each, NaN where there is none.
+    # NaN where missing.
     x: np.ndarray
     cost: np.ndarray
     error: np.ndarray
-    across: np.ndarray  # one of the first two: what errors are drawn over
-    linear: bool = False  # along an axis that shows zero and what is below
+    across: np.ndarray  # `x` or `cost`: the abscissa of errors
+    linear: bool = False  # on a linear axis
     chance: Sequence[str] = ()  # why errors are small by chance (`by_chance`)
 
     @property
     def lucky(self) -> np.ndarray:
-        """Choose the members whose errors are small by chance."""
+        """Mask of the runs whose errors are small by chance."""
         return np.array([*map(bool, self.chance)], bool)
 
     @property
     def rises(self) -> bool:
-        """Tell whether the variable along the line grows as runs get finer: as costs do.
+        """True if the variable along the line grows with refinement, as costs do.
 
-        Times of short runs tell less of that than what they have done.
+        Particle-steps decide where known: times of short runs are noisy.
         """
         done = column(self.rows, "particle_steps")
         return not order(self.x, done if np.isfinite(done).all() else self.cost).exponent < 0
 
     @property
     def label(self) -> str:
-        """Write the choice in words."""
         return label(self.choice) or "all"
 
     @property
     def shown(self) -> np.ndarray:
-        """Choose the members that have a place in a diagram of errors."""
+        """Mask of the runs that a diagram of errors can show."""
         good = np.isfinite(self.error) & (self.error > 0)
         return good & np.isfinite(self.across) & (self.linear | (self.across > 0))
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Write a choice in words; what says nothing alone says what it is the value of."""
+    """Write a choice in words: a value that means nothing alone with its variable."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -188,13 +185,12 @@ def label(choice: Mapping[str, str]) -> str:
 class Family:
     """A table of runs as lines.
 
-    `accuracy` and `cost` are the columns to compare. Variables `by` tell the lines apart; others
-    that differ are added. `along` differs along a line: by default the number with the most values.
-    What the sweep has recorded is shown as a formula where it is one.
+    `accuracy` and `cost` are the columns to compare. Variables `by` distinguish lines; others that
+    differ are added. `along` differs along a line: by default the number with the most values.
     """
 
     def __init__(
-        self, table: Table, accuracy: str, cost: str, by: Sequence[str] = (),
+        self, table: Table, accuracy: str, cost: str, *, by: Sequence[str] = (),
         along: str | None = None,
     ):  # fmt: skip
         self.table, self.accuracy, self.cost = table, accuracy, cost
@@ -203,7 +199,7 @@ class Family:
         require("-cost", [cost], rows[0])
         require("-by", by, variables)
         require("-x", [along] if along else [], variables)
-        self.convergence = bool(along)  # errors over that variable, not over cost
+        self.convergence = bool(along)  # errors over `along`, not over cost
         values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
         differing = [name for name in variables if len(values[name]) > 1]
         numbers = [
@@ -213,8 +209,8 @@ class Family:
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
         ends = values[along] if along else []
-        self.words = ends if any(number_of(v) is None for v in ends) else []  # side by side
-        # A logarithmic axis has no place for zero.
+        self.words = ends if any(number_of(v) is None for v in ends) else []  # drawn side by side
+        # A logarithmic axis has no zero.
         self.linear = bool(self.words or any(number_of(v) <= 0 for v in ends))
         groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
         for row in rows:
@@ -236,7 +232,7 @@ class Family:
         return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
 
     def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
-        """Tell of chance in a line whose runs have ever more points, or ever fewer."""
+        """Judge chance in a line whose number of points only rises or only falls."""
         points = column(rows, "points")
         rise = np.diff(points[np.isfinite(points)])
         if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):
@@ -246,13 +242,13 @@ class Family:
         return by_chance(x[::way], signed[::way], highest)[::way]
 
     def place(self, row: Mapping[str, str]) -> float:
-        """Find the place of a run along its line: the number, or which of the words it is."""
+        """Return the position of a run along its line: the number, or the index of the word."""
         end = row[self.along]
         return self.words.index(end) if self.words else number_of(end)
 
     @property
     def error_label(self) -> str:
-        """Name the error for an axis."""
+        """Axis title of the error: the formula of the sweep where there is one."""
         words = (word.partition("=") for word in self.table.made.get("record", ()))
         formula = {name: formula for name, _, formula in words}.get(self.accuracy)
         if not formula:
@@ -261,9 +257,9 @@ class Family:
         return f"{self.accuracy} = {f'abs({formula})' if signed else formula}"
 
     def front(self) -> list[Mapping[str, str]]:
-        """Find the Pareto front: runs that none beats in both cost and error, cheapest first.
+        """Return the Pareto front: runs that none beats in both cost and error, cheapest first.
 
-        Runs whose errors are small by chance are not on it.
+        Errors that are small by chance do not count.
         """
         members = [
             (c, e, k, row)
@@ -273,38 +269,37 @@ class Family:
             )
             if usable(c) and usable(e) and not lucky
         ]
-        best, found = inf, []
+        best, front = inf, []
         for _, error, _, row in sorted(members, key=lambda m: m[:3]):
             if error < best:
                 best = error
-                found.append(row)
-        return found
+                front.append(row)
+        return front
 
 
 def errors(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Read errors, with their signs where they are known, NaN where there is none."""
+    """Read errors, with their signs where they are known; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
 def sizes(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Read the sizes of errors, NaN where there is none."""
+    """Read the absolute values of a column, NaN where missing."""
     return np.abs(column(rows, name))
 
 
 def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Read the numbers of a column, NaN where there is none."""
-    found = [value(row, name) for row in rows]
-    return np.array([np.nan if a is None else a for a in found], float)
+    """Read the numbers of a column, NaN where missing."""
+    numbers = [value(row, name) for row in rows]
+    return np.array([np.nan if a is None else a for a in numbers], float)
 
 
-def require(option: str, names: Iterable[str], known: Iterable[str]) -> None:
-    """See that a table has columns, or variables."""
+def require(option: str, names: Iterable[str], names_of_table: Iterable[str]) -> None:
+    """Check that a table has columns, or variables."""
     for name in names:
-        if name not in known:
-            raise missing(option, name, list(known))
+        if name not in names_of_table:
+            raise missing(option, name, list(names_of_table))
 
 
 def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:
-    """Make the error for a column or a variable that a table does not have."""
     return unknown(f"{option}: {place} has no '{name}'", name, known)

@@ -1,6 +1,6 @@
 """karamelo-py fit: values of a script's variables that bring its log nearest to measurements."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -14,7 +14,7 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import command_of, folder_name, worded
 from karamelo_py.app.studies.records import recorded
-from karamelo_py.app.studies.study import Study, live_page, plain_table, shown, terminal
+from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
 from karamelo_py.scene.tables import read_table
 from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
@@ -34,17 +34,17 @@ differences that remain are independent. There is no +- where the three searches
 value at the end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # of each range
-# Of a range, for derivatives and to look around an end. Waves and points that cross cells make
+# Fraction of a range, for derivatives and around an end. Waves and points that cross cells make
 # curves rough: derivatives over 0.01 of a range read the roughness and end in a local minimum.
 STEP = 0.04
-NEAR = 0.01  # of a range: at its end; ends of searches that are one
-ENOUGH = 1e-3  # relative change of the misfit, or of the values, at which the search ends
-AGAIN = 3  # searches from a lower point near the end, at most
-ALIKE = 0.99  # correlation from which on variables are not told apart
+NEAR = 0.01  # fraction of a range: at its end; distance of equal ends
+ENOUGH = 1e-3  # relative change of the misfit or of the values that ends a search
+AGAIN = 3  # searches from a lower point near the end
+ALIKE = 0.99  # correlation of indistinguishable variables
 
 
 class Observation:
-    """Hold a measurement: a number of the log, or a log column over time."""
+    """A measurement: a number of the log, or a log column over time."""
 
     def __init__(self, text: str, script: variables.ScriptFiles, values: Mapping[str, list[str]]):
         word, _, what = (part.strip() for part in text.partition("="))
@@ -69,19 +69,19 @@ class Observation:
             self.times, self.wanted = next(iter(table.values())), table[column]
 
     def differences(self, log: Mapping[str, np.ndarray], case: Mapping[str, str]) -> np.ndarray:
-        """Compare a log with what is measured: (n,), over the largest measured value."""
+        """Return log minus measurement (n,), over the largest measured value."""
         if self.times is None:
-            found = np.array([self.item.of(log, case)])
+            values = np.array([self.item.of(log, case)])
         elif log["Time"][-1] < self.times[-1] * (1 - 1e-9):
             ends = f"{log['Time'][-1]:g}, the measurement at {self.times[-1]:g}"
             raise ScriptError(f"the run ends at {ends}", hint="a longer run, or a shorter file")
         else:
-            found = np.interp(self.times, log["Time"], log[self.item.columns()[0]])
-        return (found - self.wanted) / (abs(self.wanted).max() or 1.0)
+            values = np.interp(self.times, log["Time"], log[self.item.columns()[0]])
+        return (values - self.wanted) / (abs(self.wanted).max() or 1.0)
 
 
 class NoDerivatives(ScriptError):
-    """No derivative: runs on both sides failed."""
+    """Runs on both sides of a point failed."""
 
 
 @dataclass
@@ -94,7 +94,7 @@ class End:
 
     @property
     def left(self) -> float:
-        """The mean difference (root of the mean square)."""
+        """Root of the mean square difference."""
         return float(np.sqrt(np.mean(self.off**2)))
 
 
@@ -103,28 +103,28 @@ class Search:
 
     def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
-        self.failed: dict[str, ScriptError] = {}  # by the folders of runs
-        self.fixed = {name: given[0] for name, given in values.items()}
-        self.names = [name for name, given in values.items() if given[1:]]
-        numbers: list[Any] = [[number_of(value) for value in values[name]] for name in self.names]
-        if not numbers or any(None in given for given in numbers):
+        self.failed: dict[str, ScriptError] = {}  # by folder
+        self.fixed = {name: words[0] for name, words in values.items()}
+        self.names = [name for name, words in values.items() if words[1:]]
+        numbers: list[Any] = [[number_of(word) for word in values[name]] for name in self.names]
+        if not numbers or any(None in ends for ends in numbers):
             expected = "two numbers for each variable that is searched: -var E=1e6,1e8"
             raise ScriptError("there is no range to search", expected=expected)
-        self.low, self.high = (np.array([end(given) for given in numbers]) for end in (min, max))
+        self.low, self.high = (np.array([end(ends) for ends in numbers]) for end in (min, max))
 
     def case(self, share: np.ndarray) -> dict[str, str]:
-        """Return the values at these positions in the ranges."""
+        """Return the values of the variables at these positions."""
         at = self.low + share * (self.high - self.low)
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *shares: np.ndarray) -> list[np.ndarray]:
-        """Compare the logs of runs at these positions with measurements; inf if one failed."""
-        cases, found = [self.case(share) for share in shares], []
+        """Return the differences of runs at these positions; inf if a run failed."""
+        cases, results = [self.case(share) for share in shares], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:
                 if row["status"] != "done":
-                    said = f"the run with {worded(case)} is not done: {row['reason']}"
-                    raise ScriptError(said, hint="narrower ranges of the variables")
+                    message = f"the run with {worded(case)} is not done: {row['reason']}"
+                    raise ScriptError(message, hint="narrower ranges of the variables")
                 log = read_log(self.study.folder / folder_name(case))
                 off = np.concatenate([one.differences(log, case) for one in self.measured])
                 if not np.isfinite(off).all():
@@ -132,13 +132,13 @@ class Search:
             except ScriptError as error:
                 self.failed[folder_name(case)] = error
                 off = np.full(sum(len(one.wanted) for one in self.measured), np.inf)
-            found.append(off)
-        return found
+            results.append(off)
+        return results
 
     def slopes(self, share: np.ndarray, both: bool = False) -> np.ndarray:
-        """Derivatives (n, variables) by differences: towards the middle, or over `both` sides.
+        """Return derivatives (n, variables): towards the middle, or over `both` sides.
 
-        NoDerivatives where the runs on both sides fail.
+        NoDerivatives is raised if the runs on both sides fail.
         """
         moves = np.diag(np.where(share < 0.5, STEP, -STEP))
         first, *ahead = self.differences(share, *(share + moves))
@@ -156,39 +156,38 @@ class Search:
         return np.column_stack(columns)
 
     def down(self, start: np.ndarray, most: int) -> End | None:
-        """Search from a start on; None where the runs there fail."""
+        """Search by least squares from a start; None if runs fail there."""
         from scipy.optimize import least_squares
 
         if not np.isfinite(self.differences(start)[0]).all():
             return None
         try:
-            found = least_squares(
+            result = least_squares(
                 lambda share: self.differences(share)[0], start, jac=self.slopes,
                 bounds=(0, 1), max_nfev=most, ftol=ENOUGH, xtol=ENOUGH,
             )  # fmt: skip
         except NoDerivatives:
             return None
-        return End(found.x, found.fun, found.jac)
+        return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """Look around an end, along the variables and along what is determined least; the lowest.
+        """Return the lowest point near an end, along variables and the weakest direction.
 
-        Its slopes become those over both sides.
+        The slopes of `end` become those over both sides.
         """
 
-        def beside(*moves: np.ndarray) -> list[End]:
+        def nearby(*moves: np.ndarray) -> list[End]:
             near = [np.clip(end.share + s * move, 0, 1) for move in moves for s in (1, -1)]
-            found = self.differences(*near)
-            return [End(at, off, end.slopes) for at, off in zip(near, found, strict=True)]
+            results = self.differences(*near)
+            return [End(at, off, end.slopes) for at, off in zip(near, results, strict=True)]
 
-        ends = beside(*np.diag([STEP] * len(end.share)))
+        ends = nearby(*np.diag([STEP] * len(end.share)))
         end.slopes = self.slopes(end.share, both=True)
         weak = STEP * np.linalg.eigh(end.slopes.T @ end.slopes)[1][:, 0]
-        return min([end, *ends, *beside(weak, 2 * weak)], key=lambda one: one.left)
+        return min([end, *ends, *nearby(weak, 2 * weak)], key=lambda one: one.left)
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
     variables.add_family(parser)
     parser.add_argument(
         "-match", action="append", required=True, metavar="COLUMN=VALUE",
@@ -199,21 +198,19 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-o", type=Path, default=Path("fit.csv"), help="table of runs (fit.csv)")
 
 
-def run(options: Any) -> int:
-    """Do what the command line says; returns the exit status."""
+def run(options: Namespace) -> int:
     if find_spec("scipy") is None:
         hint = "pip install '.[implicit]' in the folder of karamelo-py"
         raise ScriptError("karamelo-py fit needs SciPy", hint=hint)
     out = variables.out_file(options.o, ".csv")
-    values, script, launch, jobs = variables.family(options)
-    measured = [Observation(text, script, values) for text in options.match]
+    plan = variables.family(options)
+    measured = [Observation(text, plan.script, plan.values) for text in options.match]
     items = [one.item for one in measured if one.times is None]
-    study = Study(launch, out, list(values), items, jobs, options.again, strict=True)
-    search = Search(study, values, measured)
-    count = len(search.names)
-    study.most = (len(STARTS) * (count + 1) + AGAIN * (3 * count + 5)) * options.most
-    study.page = live_page(options, study)
-    study.describe(variables=values, match=options.match)
+    count = sum(len(numbers) > 1 for numbers in plan.values.values())
+    most = (len(STARTS) * (count + 1) + AGAIN * (3 * count + 5)) * options.most
+    facts = {"match": options.match}
+    study = open_study(options, plan, out, items, strict=True, most=most, facts=facts)
+    search = Search(study, plan.values, measured)
     ends = [search.down(np.full(count, start), options.most) for start in STARTS]
     best, others = settled(search, [end for end in ends if end], options.most)
     half, alike = certainty(best.slopes, best.off)
@@ -251,7 +248,7 @@ def run(options: Any) -> int:
 
 
 def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[End]]:
-    """Give the lowest end after a look around it, and the other ends of searches."""
+    """Return the lowest end after a look around it, and the other ends."""
     if not ends:
         raise next(iter(search.failed.values()))
     best, *others = sorted(ends, key=lambda end: end.left)
@@ -265,29 +262,29 @@ def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[E
 
 
 def disagree(best: End, other: End, half: np.ndarray) -> bool:
-    """Tell whether ends differ by more than both ranges of 95 %, in variables that matter."""
+    """Return True if ends differ by more than both 95 % ranges, in variables that matter."""
     off = abs(best.share - other.share)
     wide = np.maximum(np.where(np.isnan(half), 0, 2 * half), NEAR)
     return bool((off > wide)[best.slopes.any(axis=0)].any())
 
 
 def tell_apart(search: Search, ends: Sequence[End]) -> None:
-    """Say where searches ended that disagree, why that may be, and what to do."""
+    """Print the ends of searches that disagree, the likely cause, and a fix."""
     print("The searches end at different values, so that there is no +-:")
     for end in ends:
         values = search.case(end.share)
-        said = ", ".join(f"{name} = {shown(float(values[name]))}" for name in search.names)
-        print(f"  {said}: what remains is {end.left:.3g}")
+        text = ", ".join(f"{name} = {shown(float(values[name]))}" for name in search.names)
+        print(f"  {text}: what remains is {end.left:.3g}")
     print("  Likely cause: a rough curve. Inertia makes curves rough: waves run through the body.")
     print("  Fix: load slowly, or add fix local_damping. If both values match: measure more.")
 
 
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Half the ranges of 95 %, and pairs of variables that are not told apart.
+    """Return half the 95 % ranges, and pairs of variables that cannot be told apart.
 
-    NaN for a variable that changes nothing, and for all without more measurements than variables;
-    inf where measurements determine a combination only. Of the covariance s^2 (J^T J)^-1, s^2 from
-    the n - p differences `off` that remain (Seber & Wild 2003, Nonlinear Regression, section 2.1).
+    NaN for a variable without effect, and for all without more measurements than variables; inf if
+    only a combination is determined. From the covariance s^2 (J^T J)^-1, with s^2 from the n - p
+    remaining differences `off` (Seber & Wild 2003, Nonlinear Regression, section 2.1).
     """
     from scipy.stats import t
 
@@ -295,14 +292,14 @@ def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tup
     scaled = slopes / np.where(size > 0, size, 1)
     pairs = [(a, b) for a in range(len(size)) for b in range(a)]
     alike = [(a, b) for a, b in pairs if abs(scaled[:, a] @ scaled[:, b]) > ALIKE]
-    half, known = np.full(len(size), np.nan), size > 0
-    seen = scaled[:, known]
-    free = len(seen) - known.sum()
-    if not known.any():
+    half, matters = np.full(len(size), np.nan), size > 0
+    columns = scaled[:, matters]
+    free = len(columns) - matters.sum()
+    if not matters.any():
         return half, alike
-    if np.linalg.matrix_rank(seen, 1e-6) < known.sum():
-        half[known] = np.inf
+    if np.linalg.matrix_rank(columns, 1e-6) < matters.sum():
+        half[matters] = np.inf
     elif free > 0:
-        spread = np.sqrt(np.diag(np.linalg.inv(seen.T @ seen))) / size[known]
-        half[known] = t.ppf(0.975, free) * np.sqrt(off @ off / free) * spread
+        spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns))) / size[matters]
+        half[matters] = t.ppf(0.975, free) * np.sqrt(off @ off / free) * spread
     return half, alike

@@ -12,7 +12,7 @@ from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 from karamelo_py.script.errors import codes
 
-SHARE = 0.2  # of the run: means over its first and its last part are compared
+SHARE = 0.2  # fraction of the run at both ends whose means are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
 
@@ -20,47 +20,44 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 class Kept(NamedTuple):
     """Verdict on the column in a run.
 
-    Its word is ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped on its way),
-    ``refused`` (it made no step), or ``unknown`` (given up or killed). What is a part of the energy
-    ``falls`` or ``grows``: whether the whole is lost or gained it does not tell.
+    Its word is ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped), ``refused`` (no
+    step was made), or ``unknown`` (given up or killed). A part of the energy ``falls`` or
+    ``grows``, which says nothing about the total.
     """
 
     word: str
-    number: float  # mean of the last part over the mean of the first; for a run that breaks, when
-    said: tuple[str, ...]  # warnings, and the error that ended it: known causes where it named them
-    warned: bool  # or the error that ended it names a known cause
+    number: float  # mean of the last part over the first; for a run that breaks, its end
+    said: tuple[str, ...]  # causes or titles of warnings and of the error
+    warned: bool  # or its error names a cause
 
     @property
     def silent(self) -> bool:
-        """Tell whether it went wrong and nothing says why."""
+        """True if the run went wrong and no message says why."""
         return self.word in WRONG and not self.warned
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """Find the word for a column `y` over `x`, and its mean over the last part over that at first.
-
-    The parts are fractions of the range of `x`.
-    """
+    """Return the word for a column `y` over `x`, and its mean over the last part over the first."""
     span = SHARE * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:
         return "gains", np.nan
     share, ratio = growth(first, last, first), last / first
-    if not share <= within:  # nor for NaN
+    if not share <= within:  # also NaN
         return "gains", ratio
     return ("damps" if share < -within else "keeps"), ratio
 
 
 def look_at(
-    row: Mapping[str, str], folder: Path, over: str, column: str, within: float,
+    row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Judge a column in a run; a value of one of the computes `parts` is no whole."""
-    place = folder / row["folder"]
-    said = record_of(place).get("messages", [])
-    causes = tuple(dict.fromkeys(_general(note) for note in said))
-    warned = any(note["kind"] == "warning" for note in said)
-    log = read_log(place)
+    """Judge a column in a run; values of the computes `parts` are parts of a total."""
+    run_folder = folder / row["folder"]
+    messages = record_of(run_folder).get("messages", [])
+    causes = tuple(dict.fromkeys(_general(note) for note in messages))
+    warned = any(note["kind"] == "warning" for note in messages)
+    log = read_log(run_folder)
     if not log or row["status"] in ("too long", "killed"):
         word = "refused" if row["status"] in ("refused", "failed") else "unknown"
         return Kept(word, np.nan, causes, warned)
@@ -69,7 +66,7 @@ def look_at(
             raise missing("-keeps" if name == column else "-x", name, list(log), "the log")
     if row["status"] == "failed":
         word, number = "breaks", float(log[over][-1])
-        warned = warned or any("cause" in note for note in said)
+        warned = warned or any("cause" in note for note in messages)
     else:
         word, number = judge(log[over], log[column], within)
         if column in parts or column.rpartition("_")[0] in parts:
@@ -78,16 +75,16 @@ def look_at(
 
 
 def _general(note: Mapping[str, str]) -> str:
-    """The known cause in a warning or an error; else what its kind means, else its text."""
+    """Return the cause in a message, else the title of its code, else its text."""
     title = codes().get(note.get("code", ""), {}).get("title")
     return note.get("cause") or title or note["text"]
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
-    """Write runs as Markdown: a row for each value of the variables `by`, columns for the others.
+    """Write a Markdown table: rows for the values of variables `by`, columns for the others.
 
-    The messages of runs follow, by the numbers in brackets. Variables that go in step with those of
-    the rows are left out. Also names the runs that go wrong silently.
+    Messages of runs follow, numbered as in brackets. Variables in step with row variables are
+    left out. Also returns the runs that went wrong silently.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]
@@ -101,16 +98,18 @@ def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str
     notes: list[str] = []
     cells: dict[tuple, str] = {}
     silent = []
-    for key, row, one in zip(keys, rows, kept, strict=True):
-        notes += [text for text in one.said if text not in notes]
-        marks = ", ".join(str(notes.index(text) + 1) for text in one.said)
-        number = f" {one.number:.3g}" if np.isfinite(one.number) else ""
-        if one.word == "breaks":
+    for key, row, verdict in zip(keys, rows, kept, strict=True):
+        notes += [text for text in verdict.said if text not in notes]
+        marks = ", ".join(str(notes.index(text) + 1) for text in verdict.said)
+        number = f" {verdict.number:.3g}" if np.isfinite(verdict.number) else ""
+        if verdict.word == "breaks":
             number = f" at{number}"
         marks = f" [{marks}]" if marks else ""
-        place = tuple(row[name] for name in across)
-        cells[key, place] = one.word + number + marks + (" (silent)" if one.silent else "")
-        if one.silent:
+        values_across = tuple(row[name] for name in across)
+        cells[key, values_across] = (
+            verdict.word + number + marks + (" (silent)" if verdict.silent else "")
+        )
+        if verdict.silent:
             silent.append(worded({name: row[name] for name in (*by, *across)}))
     headings = [worded(dict(zip(across, values, strict=True))) for values in columns]
     lines = [
@@ -119,5 +118,5 @@ def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str
         *([*key, *(cells.get((key, c), "") for c in columns)] for key in dict.fromkeys(keys)),
     ]
     text = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-    said = "\n".join(f"{k}. {note}" for k, note in enumerate(notes, 1))
-    return f"{text}\n\n{said}".rstrip() + "\n", silent
+    footnotes = "\n".join(f"{k}. {note}" for k, note in enumerate(notes, 1))
+    return f"{text}\n\n{footnotes}".rstrip() + "\n", silent

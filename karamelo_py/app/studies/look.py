@@ -1,4 +1,4 @@
-"""Looks of charts: the same colour for the same method everywhere, also in grey."""
+"""Colours, markers, axes and labels of charts; a method has the same colour everywhere."""
 
 import hashlib
 from collections.abc import Sequence
@@ -11,8 +11,7 @@ from karamelo_py.app.studies.case import COLUMNS
 from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.terms import number_of
 
-# After Okabe & Ito, for eyes that see colours differently; each has its marker, so that a
-# chart printed in grey can still be read.
+# Okabe & Ito, for colour-blind readers; each has a marker, for prints in grey.
 PALETTE = (
     "#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a",
     "#7a7a7a",
@@ -27,7 +26,7 @@ PLOTLY_MARKERS = (
     "triangle-left", "triangle-right",
 )  # fmt: skip
 NEAR = 0.02  # fraction of the axes within which line ends coincide
-PART = 0.105  # of a logarithmic axis, that a number of six digits covers
+PART = 0.105  # fraction of a logarithmic axis that a number of six digits covers
 FAMILIES = (
     ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),
     ("FLIP", "APIC", "PIC", "MLS", "TPIC", "TFLIP", "AFLIP", "ASFLIP", "XPIC"),
@@ -37,12 +36,12 @@ FAMILIES = (
 
 
 def known(word: str) -> bool:
-    """Tell whether a word has a fixed colour and marker."""
+    """Return True if a word has a fixed colour and marker."""
     return any(word in family for family in FAMILIES)
 
 
 def place(word: str, others: Sequence[str] = ()) -> int:
-    """Number the colour and marker of a word: fixed for methods, else in the order of values."""
+    """Return the number of the colour and marker of a word: fixed for methods, else by order."""
     for family in FAMILIES:
         if word in family:
             return family.index(word) % len(PALETTE)
@@ -52,10 +51,10 @@ def place(word: str, others: Sequence[str] = ()) -> int:
 
 
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
-    """Colour, number of the marker and number of the dashes of each line of a chart.
+    """Return colour, marker number and dash number of each line of a chart.
 
     The first variable gives colour and marker, the others the dashes: fixed ones for known words,
-    or the next that no line of this colour has.
+    or the next that is free in this colour.
     """
     names = list(choices[0]) if choices else []
     if not names:
@@ -64,21 +63,21 @@ def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
     heads = values[names[0]]
     numbers = len(heads) > 1 and all(number_of(v) is not None for v in heads)
     taken: dict[str, dict[tuple, int]] = {}
-    found = []
+    looks = []
     for choice in choices:
         head, *rest = (choice[name] for name in names)
         k = place(head, heads)
         colour = _in_order(head, heads) if numbers else PALETTE[k]
-        mine = taken.setdefault(head, {})
+        dashes = taken.setdefault(head, {})
         wanted = sum(place(v, values[n]) for n, v in zip(names[1:], rest, strict=True))
         tries = [(wanted + j) % len(DASHES) for j in range(len(DASHES))]
-        free = [j for j in tries if j not in mine.values()]
-        found.append((colour, k, mine.setdefault(tuple(rest), (free or tries)[0])))
-    return found
+        free = [j for j in tries if j not in dashes.values()]
+        looks.append((colour, k, dashes.setdefault(tuple(rest), (free or tries)[0])))
+    return looks
 
 
 def _in_order(value: str, values: Sequence[str]) -> str:
-    """The colour of a number among others: dark to light."""
+    """Return the colour of a number among others: dark to light."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -87,7 +86,7 @@ def _in_order(value: str, values: Sequence[str]) -> str:
 
 
 def readable(colour: str) -> str:
-    """Darken a colour until letters of it can be read on white: a contrast of 4.5 to 1 (WCAG 2)."""
+    """Darken a colour to a contrast of 4.5 to 1 on white (WCAG 2), so that text is legible."""
     from matplotlib.colors import to_hex, to_rgb
 
     rgb = np.array(to_rgb(colour))
@@ -97,22 +96,21 @@ def readable(colour: str) -> str:
 
 
 def contrast(rgb: Any) -> float:
-    """Contrast of white to a colour (sRGB, 0 to 1) as defined by WCAG 2.1."""
+    """Return the contrast of white to a colour (sRGB, 0 to 1), WCAG 2.1."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
 
 
 def label(name: str) -> str:
-    """Give the title of an axis."""
     return COLUMNS.get(name, name)
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Round numbers on a logarithmic axis: at 1, 2 and 5, at 1, or at every few decades.
+    """Return round ticks of a logarithmic axis: at 1, 2 and 5, at 1, or at every few decades.
 
-    At more leading digits where a short axis would have fewer than three; never so near to each
-    other that their numbers would touch.
+    More leading digits if a short axis would have fewer than three; never so near that labels
+    touch.
     """
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
@@ -123,23 +121,23 @@ def log_ticks(low: float, high: float) -> list[float]:
     ):  # fmt: skip
         ticks = [lead * 10.0**k for k in exponents if k % every == 0 for lead in leads]
         inside = [tick for tick in ticks if low * (1 - 1e-9) <= tick <= high * (1 + 1e-9)]
-        found = _thinned(inside, low, high)
-        if len(found) >= 3:
+        chosen = _thinned(inside, low, high)
+        if len(chosen) >= 3:
             break
-    return found
+    return chosen
 
 
 def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
     """Select ascending ticks at least a `PART` of a logarithmic axis apart."""
-    found: list[float] = []
+    chosen: list[float] = []
     for tick in ticks:
-        if not found or tick >= found[-1] * (high / low) ** PART:
-            found.append(tick)
-    return found
+        if not chosen or tick >= chosen[-1] * (high / low) ** PART:
+            chosen.append(tick)
+    return chosen
 
 
 def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:
-    """Make an axis logarithmic, with real numbers at its ticks; `values` if they are few."""
+    """Make an axis logarithmic, with plain numbers at its ticks: at `values` if they are few."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     axes = axis.axes
@@ -184,48 +182,47 @@ def slope(axes: Any, lines: Sequence[tuple[Any, Any]], exponent: float) -> None:
 
 
 def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:
-    """Places near the wanted ones, in the same order, none nearer to another than `gap`.
-
-    Between `low` and `high` as long as there is room.
-    """
+    """Move values apart to a distance of `gap`, in the same order, within `low` and `high`."""
     rank = np.argsort(wanted, kind="stable")
     count = max(len(rank) - 1, 1)
     steps = min(gap, (high - low) / count) * np.arange(len(rank))
-    # Less what lies between them at least, places only have to rise.
-    places = np.maximum.accumulate(np.asarray(wanted, float)[rank] - steps)
-    places = np.maximum(np.minimum(places, high - steps[-1]), low)
-    found = np.empty(len(places))
-    found[rank] = places + steps
-    return found
+    # With the least distances subtracted, positions only have to rise.
+    shifted = np.maximum.accumulate(np.asarray(wanted, float)[rank] - steps)
+    shifted = np.maximum(np.minimum(shifted, high - steps[-1]), low)
+    result = np.empty(len(shifted))
+    result[rank] = shifted + steps
+    return result
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
     """Write names of lines next to the axes, by x and y of their ends, names and colours.
 
-    Lines of a colour that end at one place get one name: "linear, usf / usavg".
+    Lines of one colour with one end have one name: "linear, usf / usavg".
     """
     if not ends:
         return
-    axes.autoscale_view()  # limits are known from here on
+    axes.autoscale_view()  # limits are final from here on
     to_axes = axes.transData + axes.transAxes.inverted()
     names: dict[tuple[str, str, int, int], list[str]] = {}
-    found: dict[tuple[str, str, int, int], Any] = {}
+    positions: dict[tuple[str, str, int, int], Any] = {}
     for x, y, name, colour in ends:
-        place = to_axes.transform((x, y))
+        position = to_axes.transform((x, y))
         head, _, rest = name.partition(", ")
-        key = (head, colour, *np.rint(place / NEAR).astype(int).tolist())
+        key = (head, colour, *np.rint(position / NEAR).astype(int).tolist())
         names.setdefault(key, []).append(rest)
-        found.setdefault(key, place)
-    at = np.array(list(found.values()))
+        positions.setdefault(key, position)
+    at = np.array(list(positions.values()))
     size = 9 if len(at) <= 16 else 7
     places = apart(at[:, 1], 0.0052 * size, 0.0, 1.0)
-    for ((head, colour, *_), rests), (x, y), place in zip(names.items(), at, places, strict=True):
+    for ((head, colour, *_), rests), (x, y), position in zip(
+        names.items(), at, places, strict=True
+    ):
         name = ", ".join(filter(None, (head, " / ".join(dict.fromkeys(rests)))))
         axes.plot(
-            [x, 1.0, 1.03], [y, place, place], transform=axes.transAxes, clip_on=False,
+            [x, 1.0, 1.03], [y, position, position], transform=axes.transAxes, clip_on=False,
             color=colour, linewidth=0.6, alpha=0.6, zorder=1,
         )  # fmt: skip
         axes.text(
-            1.04, place, name, transform=axes.transAxes, color=readable(colour), fontsize=size,
+            1.04, position, name, transform=axes.transAxes, color=readable(colour), fontsize=size,
             va="center",
         )  # fmt: skip

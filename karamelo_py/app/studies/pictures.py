@@ -1,9 +1,9 @@
-"""Charts of studies as pictures (PNG, SVG, PDF), by Matplotlib; `words` label their axes."""
+"""Charts of studies as pictures (PNG, SVG, PDF), by Matplotlib."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,11 +26,35 @@ from karamelo_py.output.plots import blank_figure, tick_texts, tidy
 from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 SUFFIXES = (".png", ".svg", ".pdf")
-DECADES = 1e4  # curves that reach over more are drawn on a logarithmic axis
+Curve = tuple[float, float, str, str]  # x and y of its end, name, colour
 
 
-def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -> None:
+class Sheet(NamedTuple):
+    """File and labels of a picture."""
+
+    path: Path
+    x: str = ""  # labels of the axes
+    y: str = ""
+    title: str = ""
+
+    def finish(self, figure: "Figure", axes: "Axes", ends: Sequence[Curve]) -> None:
+        """Label axes and curves, and write the file."""
+        axes.set(xlabel=self.x, ylabel=self.y)
+        axes.set_title(self.title, loc="left", fontsize=10)
+        tidy(axes)
+        look.direct_labels(axes, ends)
+        savefig(figure, self.path)
+
+
+DECADES = 1e4  # ratio of values from which a curve gets a logarithmic axis
+
+
+def lines(family: Family, sheet: Sheet) -> None:
     """Draw errors over costs with the Pareto front, or over the variable along lines."""
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
@@ -71,22 +95,18 @@ def lines(family: Family, path: Path, words: tuple[str, str], title: str = "") -
     _gone(axes, [(x, style[0]) for style, gone in zip(styles, failed, strict=True) for x in gone])
     if convergence and not family.linear:
         _slope(axes, family)
-    look.direct_labels(axes, ends)
-    axes.set(xlabel=words[0], ylabel=words[1])
-    axes.set_title(title, loc="left", fontsize=10)
-    tidy(axes)
     _footnote(figure, family)
-    savefig(figure, path)
+    sheet.finish(figure, axes, ends)
 
 
 def _bars(family: Family, line: GroupedRuns) -> np.ndarray:
-    """Half the spread of repeated costs, 0 where there is none."""
+    """Return half the spread of repeated costs, 0 without repetitions."""
     spread = column(line.rows, f"{family.cost}_spread")
     return np.zeros(len(spread)) if family.convergence else np.nan_to_num(spread) / 2
 
 
-def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
-    """Draw a cross at the top for each run without a value, side by side at one place."""
+def _gone(axes: "Axes", marks: Sequence[tuple[float, str]]) -> None:
+    """Draw a cross at the top for each run without a value, side by side at one abscissa."""
     for at in {x for x, _ in marks}:
         colours = [colour for x, colour in marks if x == at]
         for k, colour in enumerate(colours):
@@ -97,8 +117,8 @@ def _gone(axes: Any, marks: Sequence[tuple[float, str]]) -> None:
             )  # fmt: skip
 
 
-def _slope(axes: Any, family: Family) -> None:
-    """Draw a triangle with the order that is the middle one of all lines, in halves."""
+def _slope(axes: "Axes", family: Family) -> None:
+    """Draw a triangle with the median order of all lines, rounded to halves."""
     lines = [line for line in family.lines if len(set(line.x[line.shown])) > 1]
     sure = [line for line in lines if not line.lucky.any()] or lines
     fits = [order(line.x[line.shown], line.error[line.shown]).exponent for line in sure]
@@ -111,7 +131,7 @@ def _ends(values: np.ndarray) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _front(axes: Any, family: Family) -> None:
+def _front(axes: "Axes", family: Family) -> None:
     front = family.front()
     cost, error = column(front, family.cost), sizes(front, family.accuracy)
     if len(front) > 1:
@@ -119,7 +139,7 @@ def _front(axes: Any, family: Family) -> None:
     axes.plot(cost, error, "o", color="0.8", markersize=13, zorder=1)
 
 
-def _footnote(figure: Any, family: Family) -> None:
+def _footnote(figure: "Figure", family: Family) -> None:
     said = []
     if not family.convergence and family.front():
         said.append("grey band: Pareto front, no run is both cheaper and more accurate")
@@ -132,9 +152,7 @@ def _footnote(figure: Any, family: Family) -> None:
         figure.supxlabel("; ".join(said), fontsize=8, color="0.35", x=0.02, ha="left")
 
 
-def heat(
-    family: Family, x: str, y: str, path: Path, words: tuple[str, str], title: str = ""
-) -> None:
+def heat(family: Family, x: str, y: str, sheet: Sheet) -> None:
     """Draw a column of the table over two variables, as coloured cells with their numbers."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
@@ -166,10 +184,10 @@ def heat(
         for (k, m), text in np.ndenumerate(ends):
             if not text:
                 continue
-            known = np.isfinite(cells[k, m])
-            bright = np.dot(colours(norm(cells[k, m]))[:3], (0.3, 0.59, 0.11)) if known else 1.0
+            has_value = np.isfinite(cells[k, m])
+            bright = np.dot(colours(norm(cells[k, m]))[:3], (0.3, 0.59, 0.11)) if has_value else 1.0
             axes.text(
-                m + 0.5, k + 0.5, text if known else "×\n" + text, ha="center", va="center",
+                m + 0.5, k + 0.5, text if has_value else "×\n" + text, ha="center", va="center",
                 fontsize=7, color="black" if bright > 0.45 else "white",
             )  # fmt: skip
         axes.set_xticks(np.arange(len(across)) + 0.5, across)
@@ -178,19 +196,21 @@ def heat(
         axes.set_title(label(dict(zip(others, key, strict=True))), fontsize=9)
     for axes in all_axes[len(panels) :]:
         axes.set_visible(False)
-    figure.supxlabel(words[0], fontsize=10)
-    figure.supylabel(words[1], fontsize=10)
+    figure.supxlabel(sheet.x, fontsize=10)
+    figure.supylabel(sheet.y, fontsize=10)
     ticks = look.log_ticks(float(norm.vmin), float(norm.vmax))
     bar = figure.colorbar(mesh, ax=list(all_axes), label=family.error_label)
     bar.set_ticks(ticks, labels=tick_texts(ticks))
     bar.minorticks_off()
-    figure.suptitle(title, fontsize=10, x=0.02, ha="left")
-    savefig(figure, path)
+    figure.suptitle(sheet.title, fontsize=10, x=0.02, ha="left")
+    savefig(figure, sheet.path)
 
 
-def _sorted(rows: Sequence[Any], name: str) -> list[str]:
-    found = list(dict.fromkeys(row[name] for row in rows))
-    return sorted(found, key=number_of) if all(number_of(v) is not None for v in found) else found
+def _sorted(rows: Sequence[Mapping[str, str]], name: str) -> list[str]:
+    values = list(dict.fromkeys(row[name] for row in rows))
+    return (
+        sorted(values, key=number_of) if all(number_of(v) is not None for v in values) else values
+    )
 
 
 # ---- columns of logs, a curve for each run -------------------------------------------------------
@@ -201,18 +221,19 @@ class History(NamedTuple):
 
     x: np.ndarray
     y: np.ndarray
-    label: str  # what the run was chosen to be
+    label: str  # choice of the run
     stopped: bool = False  # before its end
 
 
 def histories(
-    table: Table, by: Sequence[str], log: str, over: str, curve: str, names: Sequence[str] = ()
+    table: Table, by: Sequence[str], over: str, curve: str, *, log: str, names: Sequence[str]
 ) -> list[History]:
-    """Read the curves of all runs whose logs there are: one column `over` another.
+    """Read one column `over` another from the logs of all runs that have them.
 
-    Runs are called by their values of the variables `by`, or by `names` in the order of the table.
+    Runs are labelled by `names` in the order of the table, else by their values of the variables
+    `by`.
     """
-    found = []
+    curves = []
     for k, row in enumerate(table.rows):
         columns = read_log(table.path.parent / row["folder"], log)
         if not columns:
@@ -222,18 +243,18 @@ def histories(
                 raise unknown(f"{log} has no column '{name}'", name, columns)
         called = names[k] if k < len(names) else label({name: row[name] for name in by}) or "all"
         stopped = row.get("status", "done") != "done"
-        kept = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
-        found.append(History(columns[over][kept], columns[curve][kept], called, stopped))
-    if not found:
+        rows = forward(columns["Time"], stopped) if "Time" in columns else slice(None)
+        curves.append(History(columns[over][rows], columns[curve][rows], called, stopped))
+    if not curves:
         raise ScriptError(f"no run has left a {log}", expected="the folders of the sweep")
-    return found
+    return curves
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Choose the rows (n,) of a log that belong to one way forward.
+    """Select the rows (n,) of a log with increasing time.
 
-    A run that was stopped ends with its last good state, which came before; one that went back and
-    on with smaller steps has rows of what it gave up.
+    A run that was stopped ends with its last good state, which is earlier; one that went back and
+    continued with smaller steps has rows of the discarded state.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)
@@ -241,17 +262,15 @@ def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     return time < after
 
 
-def draw_histories(
-    found: Sequence[History], path: Path, words: Sequence[str], title: str, exact: History | None
-) -> None:
-    """Draw curves with their names at their ends; a cross where a run was stopped."""
+def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | None = None) -> None:
+    """Draw curves with their names at the ends; a cross where a run was stopped."""
     figure = blank_figure(7.2, 4.0)
     axes = figure.subplots()
-    ys = np.concatenate([each.y for each in found])
+    ys = np.concatenate([each.y for each in curves])
     positive = ys[np.isfinite(ys) & (ys > 0)]
     low = -np.inf
     if not (ys < 0).any() and len(positive) and positive.max() > DECADES * positive.min():
-        # What is zero but for round-off stays below the axis.
+        # Values that are zero up to round-off stay below the axis.
         top = float(positive.max())
         low = max(float(positive.min()), 1e-16 * top)
         look.log_axis(axes.yaxis, low, top)
@@ -259,9 +278,9 @@ def draw_histories(
     if exact is not None:
         axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
         ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
-    known = [look.place(each.label) for each in found if look.known(each.label)]
-    places = known if len(known) == len(found) else range(1 + (len(found) > 1), len(found) + 2)
-    for k, each in enumerate(found):
+    fixed = [look.place(each.label) for each in curves if look.known(each.label)]
+    places = fixed if len(fixed) == len(curves) else range(1 + (len(curves) > 1), len(curves) + 2)
+    for k, each in enumerate(curves):
         colour = look.PALETTE[places[k] % len(look.PALETTE)]
         axes.plot(
             each.x, each.y, color=colour, linestyle=look.DASHES[k % len(look.DASHES)],
@@ -271,14 +290,10 @@ def draw_histories(
         if each.stopped:
             axes.plot(each.x[-1], each.y[-1], "X", color=colour, markersize=9, zorder=4)
             name += " (stopped)"
-        # What falls below the axis ends where it leaves.
+        # Curves end where they leave the axis.
         last = max(np.flatnonzero(each.y >= low), default=-1)
         ends.append((each.x[last], max(each.y[last], low), name, colour))
-    axes.set(xlabel=words[0], ylabel=words[1])
-    axes.set_title(title, loc="left", fontsize=10)
-    tidy(axes)
-    look.direct_labels(axes, ends)
-    savefig(figure, path)
+    sheet.finish(figure, axes, ends)
 
 
 # ---- two values of a variable side by side, scene by scene ---------------------------------------
@@ -288,19 +303,19 @@ def draw_histories(
 class Pair:
     """The runs of a scene for two values of one variable, with numbers of both, or NaN."""
 
-    label: str  # the scene, and what else was chosen
+    label: str  # the scene, and other choices
     error: tuple[float, float]
     cost: tuple[float, float]
     bytes: tuple[float, float]
 
     @property
     def cost_ratio(self) -> float:
-        """Ratio of the second's cost to the first's."""
+        """Cost of the second over the cost of the first."""
         return self.cost[1] / self.cost[0]
 
 
 def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair], list[str]]:
-    """Find the pairs of a table, and the two values in their order."""
+    """Return the pairs of a table, and the two values in their order."""
     rows, variables = table.rows, table.variables
     require("-accuracy", [accuracy], rows[0])
     require("-cost", [cost], rows[0])
@@ -317,70 +332,66 @@ def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair]
         cases.setdefault(tuple(row[n] for n in others), {})[row[name]] = row
     differing = [n for k, n in enumerate(others) if len({case[k] for case in cases}) > 1]
     scene = table.script or table.path.name
-    found = []
+    compared = []
     for case, two in cases.items():
         if len(two) < 2:
             continue
-        said = dict(zip(others, case, strict=True))
-        parts = filter(None, [scene, label({name: said[name] for name in differing})])
+        values_of = dict(zip(others, case, strict=True))
+        parts = filter(None, [scene, label({name: values_of[name] for name in differing})])
         numbers = [
             tuple(_number(two[word], column) for word in values)
             for column in (accuracy, cost, "bytes_per_particle")
         ]
-        found.append(Pair(", ".join(parts), *numbers))
-    return found, values
+        compared.append(Pair(", ".join(parts), *numbers))
+    return compared, values
 
 
 def _number(row: Mapping[str, str], column: str) -> float:
-    (found,) = sizes([row], column)
-    return found if usable(found) else np.nan
+    (number,) = sizes([row], column)
+    return number if usable(number) else np.nan
 
 
-def tell_pairs(found: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str) -> None:
-    """Print the pairs as a table."""
+def tell_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str) -> None:
     ratio = f"{values[1]}/{values[0]}"
-    headings = [f"{what}, {word}" for what in (accuracy, cost) for word in values]
+    headings = [f"{column}, {word}" for column in (accuracy, cost) for word in values]
     table = plain_table([""], [*headings, f"{cost}, {ratio}", f"bytes, {ratio}"])
-    for pair in found:
+    for pair in pairs:
         numbers = [*pair.error, *pair.cost, pair.cost_ratio, pair.bytes[1] / pair.bytes[0]]
         table.add_row(pair.label, *(shown(float(f"{a:.3g}")) for a in numbers))
     terminal().print(table)
 
 
-def draw_pairs(
-    found: Sequence[Pair], values: Sequence[str], path: Path, words: Sequence[str], accuracy: str,
-    title: str,
-) -> None:  # fmt: skip
+def draw_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, sheet: Sheet) -> None:
     """Draw errors of both values on the left, and the ratio of their costs on the right."""
-    figure = blank_figure(9.0, 1.1 + 0.3 * len(found))
+    figure = blank_figure(9.0, 1.1 + 0.3 * len(pairs))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
-    errors = np.array([pair.error for pair in found])
+    errors = np.array([pair.error for pair in pairs])
     good = errors[np.isfinite(errors)]
     if not len(good):
         raise ScriptError(f"no run has a value of '{accuracy}' above 0")
     look.log_axis(left.xaxis, float(good.min()), float(good.max()))
-    up = np.arange(len(found))[::-1]
+    up = np.arange(len(pairs))[::-1]
     for k, (word, filled) in enumerate(zip(values, (True, False), strict=True)):
         colour = look.PALETTE[1 + k]
         left.plot(
             errors[:, k], up, look.MARKERS[k], color=colour, label=word, markersize=9 - 2 * k,
             markerfacecolor=colour if filled else "white", markeredgewidth=1.6, zorder=3 + k,
         )  # fmt: skip
-    ratios = np.array([pair.cost_ratio for pair in found])
+    ratios = np.array([pair.cost_ratio for pair in pairs])
     right.barh(up, np.nan_to_num(ratios), height=0.55, color="0.7", zorder=2)
     for at, a in zip(up, ratios, strict=True):
         if np.isfinite(a):
             right.text(0.04, at, f"{a:.2f}", va="center", fontsize=8, zorder=4)
     right.axvline(1.0, color="0.3", linewidth=1, linestyle=look.DASHES[1], zorder=3)
     right.set_xlim(0, 1.15 * max(1.0, float(np.nanmax(ratios, initial=1.0))))
-    left.set_yticks(up, [pair.label for pair in found])
-    left.set_ylim(-0.7, len(found) - 0.3)
-    left.set_xlabel(words[0])
-    right.set_xlabel(words[1])
-    left.set_title(title, loc="left", fontsize=10)
+    left.set_yticks(up, [pair.label for pair in pairs])
+    left.set_ylim(-0.7, len(pairs) - 0.3)
+    left.set_xlabel(sheet.x)
+    right.set_xlabel(sheet.y)
+    left.set_title(sheet.title, loc="left", fontsize=10)
     # Above the axes: within them it would hide points.
     left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=9)
     for axes in (left, right):
         tidy(axes)
         axes.tick_params(axis="y", length=0)
-    savefig(figure, path)
+    savefig(figure, sheet.path)

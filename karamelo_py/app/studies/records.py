@@ -1,4 +1,4 @@
-"""The table of a study: one row per run, as CSV, and next to it a file about its origin."""
+"""The table of a study: one row per run, as CSV."""
 
 import csv
 import io
@@ -32,34 +32,34 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _PART = re.compile(rf"\b([^\W\d]\w*):([^\W\d]\w*)(?::({_NUMBER}))?")
 _NAME = re.compile(r"\b([^\W\d]\w*)\b(?!\s*\()")
 _SIZE = re.compile(r"\s*abs\s*\((.*)\)\s*", re.DOTALL)
-SIGNED = "_signed"  # suffix of a magnitude: the column of its signed value
+SIGNED = "_signed"  # suffix of the column with the signed value
 
 
 class Reduction:
-    """A number of a log column: its last value, ``max`` and so on, ``when`` it reaches a value."""
+    """A number from a log column: last, first, max, min, mean, or the time when it has a value."""
 
     def __init__(self, reduction: str, column: str, level: str | None, word: str):
         column = "".join(column.split())
         self.reduction, self.column = reduction, KEYWORDS.get(column, column)
         self.level = None if level is None else number_of(level)
-        known = [*REDUCTIONS, "when"]
-        if reduction not in known:
-            close = nearest(reduction, known)
+        reductions = [*REDUCTIONS, "when"]
+        if reduction not in reductions:
+            close = nearest(reduction, reductions)
             hint = f"did you mean '{close}:{self.column}'?" if close else None
-            said = f"-record {word}: unknown word '{reduction}'"
-            raise ScriptError(said, expected=_WORDS, hint=hint)
+            message = f"-record {word}: unknown word '{reduction}'"
+            raise ScriptError(message, expected=_WORDS, hint=hint)
         if not column or (reduction == "when") == (self.level is None):
             incomplete = f"-record {word}: '{reduction}:{column}' is not complete"
             raise ScriptError(incomplete, expected=_WORDS)
 
     def of(self, log: Mapping[str, np.ndarray]) -> float:
-        """Take the number; an error says why the log has none."""
+        """Return the number; ScriptError if the log has none."""
         values = log.get(self.column, ())
         if not len(values):
             raise ScriptError(f"the log has no column '{self.column}'")
         if self.level is None:
             return float(REDUCTIONS[self.reduction](values))
-        # Between the first row beyond the level and the one before it.
+        # Interpolate between the first row beyond the level and the row before.
         above = values >= self.level if values[0] < self.level else values <= self.level
         if not above.any() or "Time" not in log:
             raise ScriptError(f"{self.column} does not reach {self.level:g}")
@@ -69,11 +69,11 @@ class Reduction:
 
 
 class Recorded:
-    """Take a number from a log: ``err`` (the last value of that column), ``max:err``, ...
+    """A number from a log: ``err`` (the last value of that column), ``max:err``, ...
 
-    ``off=abs(max:depth/3.28 - 1)`` is a formula of such numbers with a name, in the
-    language of scripts; it knows the variables of the study as well. What is abs(...) as a whole
-    is recorded with its sign, too: `signed`.
+    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and of the variables of the
+    study, in the script language. A formula that is abs(...) as a whole is also recorded with its
+    sign (`signed`).
     """
 
     signed: "Recorded | None" = None
@@ -81,7 +81,7 @@ class Recorded:
     def __init__(self, word: str):
         name, equals, formula = (part.strip() for part in word.partition("="))
         self.text, self.raw = word, None
-        self.parts: dict[str, Reduction] = {}  # by their names in the formula
+        self.parts: dict[str, Reduction] = {}  # by name in the formula
         if not equals:
             self.word = word
             reduction, colon, rest = word.partition(":")
@@ -105,21 +105,21 @@ class Recorded:
             self.parts[name] = Reduction("last", name, None, word)
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
-        """List the log columns that it names, but for `variables` of the study."""
+        """List the log columns that it reads, without `variables` of the study."""
         return [part.column for name, part in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float:
-        """Take the number; an error says why there is none."""
-        found = {
+        """Return the number; ScriptError if there is none."""
+        numbers = {
             name: number_of(case[name]) if name in case else part.of(log)
             for name, part in self.parts.items()
         }
         if self.raw is None:
-            return found[""]
+            return numbers[""]
         value = None
-        if None not in found.values():
-            with suppress(ScriptError):  # such as a division by zero, in this run
-                value = evaluate(self.node, self.raw, NamesOfCase("-record", found))
+        if None not in numbers.values():
+            with suppress(ScriptError):  # such as a division by zero
+                value = evaluate(self.node, self.raw, NamesOfCase("-record", numbers))
         if not isinstance(value, float):
             raise ScriptError(f"'{self.text}' has no value")
         return value
@@ -129,26 +129,26 @@ def recorded(
     text: str, script: ScriptFiles, variables: Container[str] = (), option: str = "-record"
 ) -> list[Recorded]:
     """Read the numbers that -record, or another option, asks for."""
-    found = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
+    items = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     headings = script.logged()
-    for item in found:
+    for item in items:
         for column in item.columns(variables):
             if headings is None or column in headings:
                 continue
-            said = f"{option} {item.text}: {script.path} does not log '{column}'"
+            message = f"{option} {item.text}: {script.path} does not log '{column}'"
             hint = f"log_modify(custom, step, dt, time, {column}) in the script"
-            raise unknown(said, column, headings, hint)
-    return found
+            raise unknown(message, column, headings, hint)
+    return items
 
 
 def _is_closed(text: str) -> bool:
-    """Tell whether no parenthesis closes that was not opened before it."""
+    """Return True if every closing parenthesis was opened before."""
     depths = itertools.accumulate((sign == "(") - (sign == ")") for sign in text)
     return min(depths, default=0) >= 0
 
 
 def _apart(text: str) -> list[str]:
-    """Split words at commas outside parentheses."""
+    """Split at commas outside parentheses."""
     words, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")
@@ -162,10 +162,10 @@ def _apart(text: str) -> list[str]:
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Sequence[Recorded], folder: Path
 ) -> dict[str, Any]:
-    """Make the row of a run; what is not known of it is left empty.
+    """Make the row of a run; unknown cells are None.
 
-    A failed run has no recorded values, because its last moments mean nothing. The
-    reason of a finished run is the reason of the first missing value.
+    A failed run has no recorded values. The reason of a finished run is why its first
+    missing value is missing.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)
@@ -188,7 +188,7 @@ def row(
 
 
 def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write a table, in one piece: a reader sees the old one or the new one."""
+    """Write a table atomically."""
     file = io.StringIO()
     writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
     writer.writeheader()
@@ -198,7 +198,6 @@ def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def read(path: Path) -> list[dict[str, str]]:
-    """Read the rows of a table."""
     expected = "a table that karamelo-py sweep has written"
     try:
         rows = list(csv.DictReader(io.StringIO(read_text(path, expected), newline="")))
@@ -210,7 +209,7 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def value(each: Mapping[str, Any], name: str) -> float | None:
-    """Read the number in a column, None where it is empty or no number."""
+    """Return the number in a column; None if it is empty or no number."""
     cell = each.get(name)
     if cell is None or isinstance(cell, float):
         return cell

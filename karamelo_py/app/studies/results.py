@@ -1,28 +1,27 @@
 """karamelo-py chart -y: a result of a sweep over a variable, with a law or measured points."""
 
+from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Table, column, label, require
-from karamelo_py.app.studies.pictures import SUFFIXES, History
+from karamelo_py.app.studies.pictures import SUFFIXES, History, Sheet
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import NamesOfCase, along, names, out_file
-from karamelo_py.output.files import savefig
-from karamelo_py.output.plots import blank_figure, tidy
+from karamelo_py.output.plots import blank_figure
 from karamelo_py.scene.tables import read_table
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.parser import parse_text
 
-LAW = 200  # points of the line of a law
+LAW = 200  # points on the curve of a law
 
 
-def draw(options: Any, table: Table, by: Sequence[str]) -> int:
-    """Draw columns of a table over -x, a line for each value of `by`; returns the exit status."""
+def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
+    """Draw columns of a table over -x, a line for each value of `by`; return the exit status."""
     results = names(options.y)
     require("-y", results, table.rows[0])
     if not options.x:
@@ -33,13 +32,13 @@ def draw(options: Any, table: Table, by: Sequence[str]) -> int:
     lines = lines_of(table, options.x, results, by)
     if not any(len(line.x) for line in lines):
         raise ScriptError(f"no run has numbers of '{options.x}' and '{options.y}'")
-    law = law_of(options.law, options.x) if options.law else None
+    law = Law(options.law, options.x) if options.law else None
     measured = measured_in(options.data, options.x, results[0]) if options.data else None
-    if out is not None:  # first the picture: who reads the table may close the pipe
+    if out is not None:  # the picture first: a reader of the table may close the pipe
         first = table.label(results[0]) if len(results) == 1 else ""
         title = table.script if options.title is None else options.title
-        words = along(options, table.label(options.x), first)
-        _picture(lines, law, options.law, measured, out, words, title)
+        sheet = Sheet(out, *along(options, table.label(options.x), first), title)
+        _picture(lines, law, measured, sheet)
     _tell(lines, law, options)
     if out is not None:
         print(f"drawn: {out}")
@@ -60,25 +59,29 @@ def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) ->
     for result in results:
         for values, rows in groups.items():
             across, up = column(rows, x), column(rows, result)
-            kept = np.flatnonzero(np.isfinite(across) & np.isfinite(up))
-            kept = kept[np.argsort(across[kept], kind="stable")]
+            finite = np.flatnonzero(np.isfinite(across) & np.isfinite(up))
+            finite = finite[np.argsort(across[finite], kind="stable")]
             choice = label(dict(zip(differing, values, strict=True)))
             called = ", ".join(filter(None, (result if len(results) > 1 else "", choice)))
-            lines.append(History(across[kept], up[kept], called or result))
+            lines.append(History(across[finite], up[finite], called or result))
     return lines
 
 
-def law_of(text: str, x: str) -> Any:
-    """Make a function of an array of `x` from a formula of it."""
-    raw, node = parse_text(text, "-law")
+class Law:
+    """A formula of the variable `x`, as a function of arrays."""
 
-    def value(at: float) -> float:
-        found = evaluate(node, raw, NamesOfCase("-law", {x: float(at)}))
-        if not isinstance(found, float):
-            raise ScriptError(f"-law {text} is no number", expected=f"a formula of {x}")
-        return found
+    def __init__(self, text: str, x: str):
+        self.text, self.x = text, x
+        self.raw, self.node = parse_text(text, "-law")
 
-    return lambda xs: np.array([value(at) for at in xs])
+    def __call__(self, xs: Sequence[float] | np.ndarray) -> np.ndarray:
+        return np.array([self._value(float(x)) for x in xs])
+
+    def _value(self, x: float) -> float:
+        value = evaluate(self.node, self.raw, NamesOfCase("-law", {self.x: x}))
+        if not isinstance(value, float):
+            raise ScriptError(f"-law {self.text} is no number", expected=f"a formula of {self.x}")
+        return value
 
 
 def measured_in(path: Path, x: str, result: str) -> History:
@@ -93,16 +96,15 @@ def measured_in(path: Path, x: str, result: str) -> History:
 
 
 def _picture(
-    lines: Sequence[History], law: Any, formula: str, measured: History | None,
-    path: Path, words: Sequence[str], title: str,
-) -> None:  # fmt: skip
+    lines: Sequence[History], law: Law | None, measured: History | None, sheet: Sheet
+) -> None:
     figure = blank_figure(7.2, 4.0)
     axes, ends = figure.subplots(), []
     if law is not None:
-        given = [line.x for line in (*lines, *([measured] if measured else ())) if len(line.x)]
-        across = np.linspace(min(x.min() for x in given), max(x.max() for x in given), LAW)
+        abscissas = [line.x for line in (*lines, *([measured] if measured else ())) if len(line.x)]
+        across = np.linspace(min(x.min() for x in abscissas), max(x.max() for x in abscissas), LAW)
         axes.plot(across, law(across), color="0.6", linewidth=4, zorder=1)
-        ends.append((across[-1], law(across[-1:])[0], formula, "0.4"))
+        ends.append((across[-1], law(across[-1:])[0], law.text, "0.4"))
     for k, line in enumerate(line for line in lines if len(line.x)):
         colour = look.PALETTE[(k + 1) % len(look.PALETTE)]
         axes.plot(
@@ -114,21 +116,17 @@ def _picture(
         axes.plot(measured.x, measured.y, "k+", markersize=9, zorder=4)
         last = int(np.argmax(measured.x))
         ends.append((measured.x[last], measured.y[last], measured.label, "k"))
-    axes.set(xlabel=words[0], ylabel=words[1])
-    axes.set_title(title, loc="left", fontsize=10)
-    tidy(axes)
-    look.direct_labels(axes, ends)
-    savefig(figure, path)
+    sheet.finish(figure, axes, ends)
 
 
-def _tell(lines: Sequence[History], law: Any, options: Any) -> None:
+def _tell(lines: Sequence[History], law: Law | None, options: Namespace) -> None:
     """Print the numbers, and how far they are from the law."""
     for line in lines:
-        table = plain_table([], [options.x, line.label, *([options.law, "%"] if law else [])])
-        for at, found in zip(line.x, line.y, strict=True):
-            cells = [shown(float(at)), shown(float(found))]
+        table = plain_table([], [options.x, line.label, *([law.text, "%"] if law else [])])
+        for at, y in zip(line.x, line.y, strict=True):
+            cells = [shown(float(at)), shown(float(y))]
             if law is not None:
                 (right,) = law([at])
-                cells += [shown(right), f"{100 * (found / right - 1):+.1f}" if right else ""]
+                cells += [shown(right), f"{100 * (y / right - 1):+.1f}" if right else ""]
             table.add_row(*cells)
         terminal().print(table)

@@ -1,7 +1,7 @@
 """karamelo-py stability: where a script is stable, where its energy grows, where it fails."""
 
 import textwrap
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from itertools import pairwise
@@ -17,7 +17,7 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look, records, variables
 from karamelo_py.app.studies.case import error_of, record_of
 from karamelo_py.app.studies.curves import usable
-from karamelo_py.app.studies.study import Study, live_page
+from karamelo_py.app.studies.study import Study, open_study
 from karamelo_py.kernels import watch
 from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure, tick_texts
@@ -44,10 +44,10 @@ UNKNOWN = -1
 GAINED = "spurious energy gain"
 LOST = "spurious energy loss"
 CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
-BORNE = ("stable", "damped")  # classes of tolerable steps
-UNTOLD = ("left", "short")  # of steps that nothing is known of
+BORNE = ("stable", "damped")  # classes of stable steps
+UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
-FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program looks often enough at energies
+FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program measures energies often enough
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps from which slow growth is recognised
 FIRST = 0.1  # fraction of the rows of a log over which energies are averaged
 FEW = 9  # values of a variable that all get a tick
@@ -55,7 +55,7 @@ COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
     "short": "#e4e4e4", "failed": "#7d2a3a",
 }  # fmt: skip
-# Kinds of failures, in short.
+# Short reasons by code.
 REASONS = {
     "inside-out": "det F <= 0",
     "not-a-number": "NaN",
@@ -71,7 +71,6 @@ REASONS = {
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
     variables.add_family(parser)
     variables.add_steps(parser)
     parser.add_argument("-energy", metavar="COLUMN", help="log column that must not grow")
@@ -87,16 +86,16 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-o", type=Path, default=Path("map.png"), help="the picture (map.png)")
 
 
-def run(options: Any) -> int:
-    """Do what the command line says; returns the exit status."""
+def run(options: Namespace) -> int:
     out = variables.out_file(options.o, ".png", ".svg", ".pdf")
-    values, script, launch, jobs = variables.family(options)
+    plan = variables.family(options)
+    values, script = plan.values, plan.script
     together = variables.zipped(options)
-    variables.cases(values, together)  # which finds lists that do not fit
+    variables.cases(values, together)  # raises for lists that do not fit
     leaders = {name: group[0] for group in together for name in group}
     axes = [n for n in values if len(values[n]) > 1 and leaders.get(n, n) == n]
     worded = [name for name in axes if any(number_of(value) is None for value in values[name])]
-    axes.sort(key=worded.__contains__)  # words go along the second
+    axes.sort(key=worded.__contains__)  # words are the second axis
     if not 1 <= len(axes) <= 2:
         raise ScriptError(
             f"{len(axes)} variables have several values",
@@ -114,22 +113,22 @@ def run(options: Any) -> int:
     shades = records.recorded(options.accuracy or "", script, values, "-accuracy")
     if len(shades) > 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
-    most = prod(len(values[name]) for name in axes)
-    study = Study(
-        launch, table, list(values), items + shades, jobs, options.again, strict=True, most=most,
-        writes=False,
+    study = open_study(
+        options, plan, table, items + shades, axes=axes, strict=True, writes=False,
+        most=prod(len(values[name]) for name in axes),
+        facts={"energy": energy, "bound": options.bound},
     )  # fmt: skip
-    study.page = live_page(options, study, axes)
-    study.describe(variables=values, energy=energy, bound=options.bound)
     error = shades[0].word if shades else ""
-    chart = Map(study, values, axes, energy, options.bound, error, leaders)
+    chart = Map(
+        study, values, axes, energy=energy, bound=options.bound, error=error, leaders=leaders
+    )
     if study.page:
         study.page.judge(chart.judged, COLOURS)
     apart = [name in worded for name in axes] + [False] * (2 - len(axes))
     try:
         _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart)
     finally:
-        if chart.found:  # also of a study that is interrupted
+        if chart.found:  # also if interrupted
             records.write(table, chart.rows())
             chart.draw(out, options.script.name, words)
     chart.tell()
@@ -143,7 +142,7 @@ def run(options: Any) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Find the largest mean of an energy over the mean of its first tenth; infinite for NaN.
+    """Return the largest mean of an energy over the mean of its first tenth; inf for NaN.
 
     Means are over a tenth of the rows. From rest the median replaces the first mean.
     """
@@ -160,7 +159,7 @@ def growth(energy: np.ndarray) -> float:
 
 
 def remains(energy: np.ndarray) -> float:
-    """Divide the mean of an energy over the last tenth of its rows by that over the first."""
+    """Return the mean of an energy over the last tenth of its rows over the first tenth's."""
     rows = max(1, ceil(FIRST * len(energy)))
     first, last = (float(np.abs(part).mean()) if len(part) else 0.0
                    for part in (energy[:rows], energy[-rows:]))  # fmt: skip
@@ -168,7 +167,7 @@ def remains(energy: np.ndarray) -> float:
 
 
 def in_short(row: Mapping[str, Any], code: str) -> str:
-    """Give the reason of a failure in a few words, by the code of its error."""
+    """Return a short reason of a failure, by the code of its error."""
     if row["status"] == "too long":
         return "too long"
     if code in REASONS:
@@ -180,18 +179,18 @@ class Map:
     """The plane of a stability map.
 
     Of all variables in `values` the one or two `axes` vary. Growth is measured by the log column
-    `energy` by more than the factor `bound`, or, where none is named, what the program finds. The
-    column `error` shades what is stable. Variables go in step with their `leaders`.
+    `energy` by more than the factor `bound`; without a column, the gain that the program finds. The
+    column `error` shades stable cells. Variables go in step with their `leaders`.
     """
 
     def __init__(
-        self, study: Study, values: dict[str, list[str]], axes: list[str], energy: str,
-        bound: float, error: str = "", leaders: Mapping[str, str] | None = None,
+        self, study: Study, values: dict[str, list[str]], axes: list[str], *, energy: str = "",
+        bound: float = 2.0, error: str = "", leaders: Mapping[str, str] | None = None,
     ):  # fmt: skip
         self.leaders = leaders or {}
         self.study, self.values, self.axes = study, values, axes
         self.energy, self.bound, self.error = energy, bound, error
-        # Words are placed side by side.
+        # Words are drawn side by side.
         self.words = [
             [] if all(number_of(v) is not None for v in values[name]) else values[name]
             for name in axes
@@ -203,27 +202,27 @@ class Map:
         self.y = more[0] if more else [0.0]
         self.shape = len(self.x), len(self.y)
         self.found: dict[Cell, dict[str, Any]] = {}  # cells that were run
-        self.inferred: dict[Cell, Any] = {}  # the classes of others
+        self.inferred: dict[Cell, Any] = {}  # classes of other cells
 
     @property
     def classes(self) -> dict[Cell, Any]:
-        """Tell the class of each cell that is known."""
+        """Class of each known cell."""
         return {cell: row["class"] for cell, row in self.found.items()} | self.inferred
 
     @property
     def failures(self) -> list[tuple[str, int]]:
-        """Count why runs failed, the commonest first."""
+        """Number of failed runs by reason, the commonest first."""
         failed = (row["why"] for row in self.found.values() if row["class"] == "failed")
         return Counter(failed).most_common()
 
     def case(self, cell: Cell) -> dict[str, str]:
-        """Find the values of the variables of a cell."""
+        """Return the values of the variables of a cell."""
         at = dict(zip(self.axes, cell, strict=False))
         place = {name: at.get(self.leaders.get(name, name), 0) for name in self.values}
         return {name: values[place[name]] for name, values in self.values.items()}
 
     def classify(self, cells: Sequence[Cell]) -> list[str]:
-        """Run cells, and tell the class of each."""
+        """Run cells; return the class of each."""
         cases = {cell: self.case(cell) for cell in cells}
         try:
             self.study.run([*cases.values()])
@@ -234,83 +233,83 @@ class Map:
         return [self.found[cell]["class"] for cell in cells]
 
     def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Add to the row of a run its class, and why it is of that one."""
-        place = self.study.out.parent / row["folder"]
-        record = record_of(place)
+        """Add its class and the reason for it to the row of a run."""
+        folder = self.study.out.parent / row["folder"]
+        record = record_of(folder)
         runs, code = record.get("runs", []), error_of(record).get("code", "")
         codes = {note.get("code") for note in record.get("messages", [])}
-        found = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
+        verdict = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
         limit = runs[0].get("limited_by") if runs else None
-        if limit not in (None, "set_dt", "end"):  # where the script says the step
-            found["limit"] = limit
+        if limit not in (None, "set_dt", "end"):  # set by the script
+            verdict["limit"] = limit
         done = row["status"] == "done"
         if self.energy:
-            log = read_log(place)
+            log = read_log(folder)
             if done and self.energy not in log:
                 raise ScriptError(
                     f"the log has no column '{self.energy}'", expected=", ".join(log) or "a log"
                 )
             energy = log.get(self.energy, np.empty(0))
-            found["growth"] = factor = growth(energy)
+            verdict["growth"] = factor = growth(energy)
             grows = f"{self.energy} grows {factor:.3g} times" if factor > self.bound else ""
             share = remains(energy)
             falls = f"{self.energy} falls to {share:.3g}" if share < 1 / self.bound else ""
         else:
             changes = [run.get("energy_change_percent") for run in runs]
             changes = [change for change in changes if change is not None]
-            found["growth"] = max((1 + change / 100 for change in changes), default=None)
+            verdict["growth"] = max((1 + change / 100 for change in changes), default=None)
             if runs and "energy_unwatched" in runs[0]:
-                found["unwatched"] = not_watched(runs[0]["energy_unwatched"]).removeprefix("is ")
-            change = (found["growth"] or 1.0) - 1
+                verdict["unwatched"] = not_watched(runs[0]["energy_unwatched"])
+            change = (verdict["growth"] or 1.0) - 1
             grows = GAINED if "energy-gain" in codes or change > watch.WITHIN else ""
             falls = LOST if "energy-loss" in codes or change < -watch.WITHIN else ""
         if not done:
-            # A domain that is too small tells nothing of the step.
+            # A domain that is too small says nothing about the step.
             left = code == "left-domain" and "energy-gain" not in codes
-            found |= {"class": "left" if left else "failed", "why": in_short(row, code)}
+            verdict |= {"class": "left" if left else "failed", "why": in_short(row, code)}
         elif not (self.energy or changes) and row["steps"] < FEWEST:
-            found |= {"class": "short", "why": f"{row['steps']:.0f} steps"}
+            verdict |= {"class": "short", "why": f"{row['steps']:.0f} steps"}
         elif grows:
-            found |= {"class": "growing", "why": grows}
+            verdict |= {"class": "growing", "why": grows}
         elif falls:
-            found |= {"class": "damped", "why": falls}
-        return {**row, **found}
+            verdict |= {"class": "damped", "why": falls}
+        return {**row, **verdict}
 
     def rows(self) -> list[dict]:
         """Make the table: every cell, whether it was run, and what it showed."""
         rows = []
         for cell, kind in sorted(self.classes.items()):
             row = self.found.get(cell, {})
-            found = {"class": kind, "run": "yes" if row else "no", "reason": row.get("why")}
-            found |= {name: row.get(name) for name in ("growth", "dt", "stable_dt", "own_dt")}
-            found |= {"limit": row.get("limit"), "message": row.get("reason")}
+            cells = {"class": kind, "run": "yes" if row else "no", "reason": row.get("why")}
+            cells |= {name: row.get(name) for name in ("growth", "dt", "stable_dt", "own_dt")}
+            cells |= {"limit": row.get("limit"), "message": row.get("reason")}
             if self.error:
-                found[self.error] = row.get(self.error)
-            rows.append({**self.case(cell), **found, "folder": row.get("folder")})
+                cells[self.error] = row.get(self.error)
+            rows.append({**self.case(cell), **cells, "folder": row.get("folder")})
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Find in each row where the first step equals this column; None if nowhere.
+        """Return each row's x where the first step equals the column `step`; None if nowhere.
 
         Beyond the runs of a row the ratio of the steps continues as a power of the first variable.
-        Rows of numbers with fewer than two runs lie between their neighbours.
+        Rows of numbers with fewer than two runs are interpolated.
         """
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.found.items()):
             dt, same = row.get("dt"), row.get(step)
             if dt and same and isfinite(dt / same):
                 points[j].append((self.x[i], dt / same))
-        known = {j: at for j, row in enumerate(points) if (at := self._crossing(row)) is not None}
-        found: list[float | None] = [known.get(j) for j in range(len(self.y))]
-        for (before, low), (after, high) in pairwise(sorted(known.items())):
+        at_row = {j: at for j, row in enumerate(points) if (at := self._crossing(row)) is not None}
+        crossings: list[float | None] = [at_row.get(j) for j in range(len(self.y))]
+        for (before, low), (after, high) in pairwise(sorted(at_row.items())):
             for j in range(before + 1, after):
                 if len(points[j]) < 2 and not self.words[-1]:
                     share = (self.y[j] - self.y[before]) / (self.y[after] - self.y[before])
-                    found[j] = low + share * (high - low)
-        return found
+                    crossings[j] = low + share * (high - low)
+        return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
-        """Find where a ratio is 1, between its known values or beyond them, within the map."""
+        """Return where a ratio is 1, between its known values or beyond them, within the map."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
@@ -318,25 +317,25 @@ class Map:
             return None
         first_is_near = abs(points[0][1] - 1) < abs(points[-1][1] - 1)
         (xa, a), (xb, b) = points[:2] if first_is_near else points[-2:]
-        if isclose(a, b, rel_tol=1e-6):  # both steps go with the variable, up to round-off
+        if isclose(a, b, rel_tol=1e-6):  # both steps scale with the variable, up to round-off
             return None
         at = log(xa) - log(xb / xa) * log(a) / log(b / a)
         low, *_, high = edges(self.x)
         return exp(at) if at <= log(high) and exp(at) >= low else None
 
     def margins(self) -> list[tuple[float, int]]:
-        """Divide the largest stable step by the program's, in each row with an edge; its steps."""
-        found, classes = [], self.classes
+        """Return the largest stable step over the program's, and its steps, by row."""
+        ratios, classes = [], self.classes
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind not in BORNE), None)
             row = self.found.get((edge - 1, j)) if edge and column[edge] not in UNTOLD else None
             if row and row.get("dt") and row.get("stable_dt"):
-                found.append((row["dt"] / row["stable_dt"], int(row["steps"])))
-        return found
+                ratios.append((row["dt"] / row["stable_dt"], int(row["steps"])))
+        return ratios
 
     def tell(self) -> None:
-        """Print how many cells are of each class and why runs failed."""
+        """Print how many cells are of each class, and why runs failed."""
         count, run = Counter(self.classes.values()), len(self.found)
         print(f"{run} of {len(self.classes)} cells were run (the others lie between like ones)")
         for kind in CLASSES:
@@ -355,12 +354,12 @@ class Map:
             ratios, steps = zip(*margins, strict=True)
             low, high, few = min(ratios), max(ratios), min(steps)
             ends = f"{low:.3g}" if high - low < 1e-3 else f"{low:.3g} to {high:.3g}"
-            borne = "first step that a run survived" if unwatched else "stable first step"
-            held = f", for {few} steps: longer runs may show slow growth" if few < SURE else ""
-            print(f"the largest {borne} is {ends} times the program's stable step{held}")
+            step_words = "first step that a run survived" if unwatched else "stable first step"
+            caution = f", for {few} steps: longer runs may show slow growth" if few < SURE else ""
+            print(f"the largest {step_words} is {ends} times the program's stable step{caution}")
 
     def draw(self, path: Path, title: str, words: tuple[str, str]) -> None:
-        """Draw the map, with `words` along its axes."""
+        """Draw the map, with the axis labels `words`."""
         from matplotlib.colors import ListedColormap
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
@@ -396,17 +395,17 @@ class Map:
         limit = "the program's limit" + (f"\n({', '.join(names)})" if names else "")
         lines = ("stable_dt", limit, "k--"), ("own_dt", "the program's own", "k:")
         rows = list(pairwise(edges(y)))
-        for step, said, style in lines:
+        for step, label, style in lines:
             ends = [
                 (nan if at is None else at, up)
                 for at, row in zip(self.line(step), rows, strict=True) for up in row
             ]  # fmt: skip
             if any(at == at for at, _ in ends):
                 handles += axes.plot(
-                    *zip(*ends, strict=True), style, linewidth=1.4, label=f"first step = {said}"
+                    *zip(*ends, strict=True), style, linewidth=1.4, label=f"first step = {label}"
                 )
-        said = "run; others inferred"
-        handles.append(Line2D([], [], color="k", marker=".", linestyle="", label=said))
+        label = "run; others inferred"
+        handles.append(Line2D([], [], color="k", marker=".", linestyle="", label=label))
         axes.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
             fontsize=8, borderaxespad=0,
@@ -453,7 +452,7 @@ class Map:
 
 
 def edges(centres: Sequence[float]) -> np.ndarray:
-    """Find the edges of cells around centres."""
+    """Return the edges of cells around centres."""
     at = np.asarray(centres, float)
     if len(at) == 1:
         return np.array([at[0] - 0.5, at[0] + 0.5])
@@ -472,17 +471,17 @@ def explore(
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
     """Find the class of every cell of a plane, most of them by inference.
 
-    First lines and columns about `stride` cells apart are crossed. What lies in a row or a column
-    between two cells of one class is taken to be like them, the nearest ones first; between unlike
-    ones the middle is asked for, in the longest gaps first. Where an edge goes along a row, one in
-    three of its cells is asked for, so that no bow of it is cut off. So edges are found to the
-    cell; an island that lies wholly between the cells that were asked for is missed. Along a
-    direction of words (`apart`) nothing lies between cells.
+    Lines and columns about `stride` cells apart are run first. Cells in a row or a column between
+    two cells of one class are taken to be of that class, the nearest ones first; between unlike
+    ones the middle is run, in the longest gaps first. Where an edge goes along a row, one in three
+    of its cells is run, so that no bow of it is cut off. So edges are found to the cell; an island
+    between the cells that were run is missed. Along a direction of words (`apart`) nothing is
+    inferred.
 
-    `classify` gives the classes of cells; it is asked for several at once, none of which tells
-    another. Returns the classes of those cells, and of the others.
+    `classify` returns the classes of cells; it gets several at once. Returns the classes of those
+    cells, and of the others.
     """
-    classes: list[Hashable] = []  # of the numbers in the planes
+    classes: list[Hashable] = []  # of the numbers in planes
     known = np.full(shape, UNKNOWN)
     first = [_cuts(n, 1 if words else stride) for n, words in zip(shape, apart, strict=True)]
     cells = [(i, j) for i in first[0] for j in first[1]]
@@ -491,15 +490,15 @@ def explore(
             if kind not in classes:
                 classes.append(kind)
             known[cell] = classes.index(kind)
-        found = _filled(known, stride, apart)
-        halves = [*_halves(found, apart)]
-        cells = _spaced(halves or ([] if any(apart) else [*_unproved(known, found)]))
+        filled = _filled(known, stride, apart)
+        halves = [*_halves(filled, apart)]
+        cells = _spaced(halves or ([] if any(apart) else [*_unproved(known, filled)]))
     asked = {cell: classes[k] for cell, k in np.ndenumerate(known) if k != UNKNOWN}
-    return asked, {cell: classes[k] for cell, k in np.ndenumerate(found) if cell not in asked}
+    return asked, {cell: classes[k] for cell, k in np.ndenumerate(filled) if cell not in asked}
 
 
 def unseen(shape: Sequence[int], stride: int) -> int:
-    """Count the cells across islands and strips that no run needs to meet."""
+    """Return the width in cells of islands and strips that no run needs to meet."""
     return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
 
 
@@ -509,22 +508,22 @@ def _cuts(count: int, stride: int) -> list[int]:
 
 
 def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Neighbours in a line between which nothing is known."""
+    """Yield neighbours in a line between which nothing is known."""
     return ((a, b) for a, b in pairwise(np.flatnonzero(line != UNKNOWN)) if b - a > 1)
 
 
 def _filled(known: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill in what lies between like cells; where row and column disagree, nothing."""
-    found, reach = known.copy(), 2
+    """Fill in what lies between like cells, but not where row and column disagree."""
+    filled, reach = known.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
-        rows, columns = _between(found, along_y), _between(found.T, along_x).T
+        rows, columns = _between(filled, along_y), _between(filled.T, along_x).T
         agreed = np.where((rows == columns) | (columns == UNKNOWN), rows, columns)
         agreed[(rows != columns) & (np.minimum(rows, columns) != UNKNOWN)] = UNKNOWN
-        new = (found == UNKNOWN) & (agreed != UNKNOWN)
-        found[new] = agreed[new]
+        new = (filled == UNKNOWN) & (agreed != UNKNOWN)
+        filled[new] = agreed[new]
         reach = 2 if new.any() else reach + 1
-    return found
+    return filled
 
 
 def _between(plane: np.ndarray, reach: int) -> np.ndarray:
@@ -537,26 +536,26 @@ def _between(plane: np.ndarray, reach: int) -> np.ndarray:
     return said
 
 
-def _halves(found: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cell]]:
-    """The middles of gaps in rows and columns, each with the length of its gap."""
-    for i, line in enumerate(found if not apart[1] else ()):
+def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cell]]:
+    """Yield the middles of gaps in rows and columns, each with the length of its gap."""
+    for i, line in enumerate(plane if not apart[1] else ()):
         yield from ((b - a, (i, (a + b) // 2)) for a, b in _gaps(line))
-    for j, line in enumerate(found.T if not apart[0] else ()):
+    for j, line in enumerate(plane.T if not apart[0] else ()):
         yield from ((b - a, ((a + b) // 2, j)) for a, b in _gaps(line))
 
 
-def _unproved(known: np.ndarray, found: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """The middles of stretches along an edge in which no cell is known, with their lengths."""
-    for i, k in np.ndindex(found.shape[0] - 1, 2):
-        for stretch in _stretches(known[i + k], found[i], found[i + 1], k):
+def _unproved(known: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
+    """Yield the middles of stretches along an edge without a known cell, with their lengths."""
+    for i, k in np.ndindex(plane.shape[0] - 1, 2):
+        for stretch in _stretches(known[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])
-    for j, k in np.ndindex(found.shape[1] - 1, 2):
-        for stretch in _stretches(known[:, j + k], found[:, j], found[:, j + 1], k):
+    for j, k in np.ndindex(plane.shape[1] - 1, 2):
+        for stretch in _stretches(known[:, j + k], plane[:, j], plane[:, j + 1], k):
             yield len(stretch), (stretch[len(stretch) // 2], j + k)
 
 
 def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
-    """Find stretches longer than 1 where two lines differ and nothing is known of one of them."""
+    """Find stretches longer than 1 where two lines differ and one of them is unknown."""
     line = (near, far)[which]
     stretches: list[list[int]] = [[]]
     for i in np.flatnonzero((near != far) & (known == UNKNOWN)):
@@ -568,7 +567,7 @@ def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int)
 
 
 def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
-    """Cells of the longest gaps, those left out that lie within half the gap of another."""
+    """Return cells of the longest gaps, without those within half a gap of another."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
         if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):

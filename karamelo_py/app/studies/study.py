@@ -1,4 +1,4 @@
-"""Cases of a study, some run at once, known ones not again; karamelo-py sweep, all in a table."""
+"""Cases of a study, some run at once, known ones not again; karamelo-py sweep."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import json
 import os
 import sys
 import time
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +26,12 @@ from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from karamelo_py.app.live.study import StudyPage
+
 DESCRIPTION = """\
 Runs a script with every combination of values of its variables, and writes one table (CSV).
 
@@ -36,7 +42,7 @@ that fails is recorded with its reason and stops nothing; where none is done, th
 An interrupted sweep continues where it stopped when the same command is given again. Processor,
 threads and versions are written next to the table (sweep.json)."""
 _FACTS = ("seconds", "points", "steps")
-_STATUS = 24  # characters at least, for what became of a run, while there are facts
+_STATUS = 24  # least width of the status while facts are shown
 
 
 @dataclass
@@ -44,34 +50,34 @@ class Study:
     """A family of runs of one script."""
 
     launch: Launch
-    out: Path  # the table or picture: runs have their folders in one of that name
-    names: list[str]  # the variables
-    items: Sequence[Recorded]  # what is recorded of the logs
+    out: Path  # table or picture; runs have their folders in a folder of that name
+    names: list[str]  # variables
+    items: Sequence[Recorded]  # values recorded from the logs
     jobs: int  # runs at once
-    again: bool = False  # run also what has been run before
-    title: str = ""  # heads the table on the terminal
-    strict: bool = False  # a variant that is refused ends the study
-    most: int = 0  # cases of a study that asks for them by and by; 0: `run` gets all
-    writes: bool = True  # the table, after each run
-    page: Any = None  # a `StudyPage`, where somebody wants to watch
-    # Of finished runs, by the values of the case.
+    again: bool = False  # repeat earlier runs
+    title: str = ""  # heading of the table
+    strict: bool = False  # a refused variant ends the study
+    most: int = 0  # upper bound of an adaptive study; 0: `run` gets all cases
+    writes: bool = True  # write the table after each run
+    page: StudyPage | None = None  # with --live
+    # Rows of finished runs, by the values of the case.
     rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
     claim: Claim | None = None  # of the folder
-    ran: int = 0  # not taken from an earlier study
+    ran: int = 0  # runs made by this study
     begun: float = field(default_factory=time.perf_counter)
 
     def __post_init__(self) -> None:
         self.folder = self.out.with_suffix("")
 
     def knows(self, case: Mapping[str, str]) -> bool:
-        """Tell whether a case need not be run."""
+        """Return True if a case need not be run."""
         kept = not self.again and self.launch.kept(case, self.folder / folder_name(case))
         return tuple(case.values()) in self.rows or bool(kept)
 
-    def describe(self, **said: Any) -> None:
-        """Write next to the table how it is made."""
+    def describe(self, **facts: Any) -> None:
+        """Write how the table is made into a file next to it."""
         how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
-        text = json.dumps({"script": str(self.launch.script), **said, **how}, indent=1) + "\n"
+        text = json.dumps({"script": str(self.launch.script), **facts, **how}, indent=1) + "\n"
         self.claim_folder()
         write_whole(self.out.with_suffix(".json"), text)
 
@@ -91,26 +97,25 @@ class Study:
             )
 
     def write(self) -> None:
-        """Write the table of what is known."""
         if self.writes and self.rows:
             write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
-        """Give the rows of these cases, in order; runs what is not known yet.
+        """Return the rows of these cases, in order, after running those that are not known.
 
-        When the user interrupts, runs in progress are taken down, finished ones are kept, and it is
-        told how to continue.
+        If the user interrupts, runs in progress are ended, finished ones are stored, and a message
+        says how to continue.
         """
         waiting = []
         for case in cases:
             if tuple(case.values()) in self.rows:
                 continue
-            place = self.folder / folder_name(case)
-            known = None if self.again else self.launch.kept(case, place)
-            if known is not None:
-                self._put(case, known)
+            folder = self.folder / folder_name(case)
+            outcome = None if self.again else self.launch.kept(case, folder)
+            if outcome is not None:
+                self._put(case, outcome)
             else:
-                waiting.append((case, place))
+                waiting.append((case, folder))
         self.write()
         if self.page and self.rows and not waiting:
             self.page.follow(list(self.rows.values()), (), (), of=len(cases))
@@ -120,10 +125,10 @@ class Study:
                 with display.bar:
                     self._run(waiting, display)
             except KeyboardInterrupt:
-                kept = f"in {self.out}" if self.writes else "kept"
+                place = f"in {self.out}" if self.writes else "kept"
                 of = f"at most {self.most}" if self.most else str(len(cases))
-                said = f"{len(self.rows)} of {of} runs are {kept}"
-                print(f"{said}; the same command continues with the rest", file=sys.stderr)
+                state = f"{len(self.rows)} of {of} runs are {place}"
+                print(f"{state}; the same command continues with the rest", file=sys.stderr)
                 raise
         return [self.rows[tuple(case.values())] for case in cases]
 
@@ -134,7 +139,7 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """Choose a case to run; the first of a kind goes ahead: only it has to compile."""
+            """Choose a case to run; the first of a kind goes ahead, because it compiles."""
             kinds = (((case, place), kind_of(case.values())) for case, place in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
@@ -164,7 +169,7 @@ class Study:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
-        """Bring the page up to date; who has stopped the study there has interrupted it."""
+        """Update the page; stopping the study there raises KeyboardInterrupt."""
         of = self.most or display.count + len(self.rows) - display.finished
         left = display.left([case for case, _ in queue], running)
         places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
@@ -180,7 +185,7 @@ class Study:
 
 
 class _Display:
-    """A line for each run that ends; on a terminal also a bar, and what runs."""
+    """A line for each run that ends; on a terminal also a bar and the present runs."""
 
     def __init__(self, study: Study, count: int):
         from rich.progress import BarColumn, Progress, TextColumn
@@ -193,44 +198,44 @@ class _Display:
         self.bar = Progress(*columns, transient=True, disable=not seen)
         self.task = self.bar.add_task(study.title)
 
-    def finish(self, case: Mapping[str, str], found: Mapping[str, Any]) -> None:
+    def finish(self, case: Mapping[str, str], result: Mapping[str, Any]) -> None:
         self.finished += 1
-        numbers = [f"{i.word} {shown(found[i.word])}" for i in self.study.items]
+        numbers = [f"{i.word} {shown(result[i.word])}" for i in self.study.items]
         done, of = self.progress
         number = f"run {done} of at most {of}:" if self.study.most else f"{done}/{of} "
-        line = ", ".join([_said(case), *numbers, f"{shown(found['seconds'])} s", ended(found)])
+        line = ", ".join([_said(case), *numbers, f"{shown(result['seconds'])} s", ended(result)])
         print(f"{number} {line}", file=sys.stderr, flush=True)
 
     def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
         if self.bar.disable:
             return
-        # The number of further runs of an adaptive study is unknown.
+        # An adaptive study does not know how many runs remain.
         left = None if self.study.most else self.left(queue, running)
         done, of = self.progress
-        said = f"{done} of {'at most ' if self.study.most else ''}{of} runs"
-        said += f", {duration(time.perf_counter() - self.study.begun)}"
-        said += f", about {duration(left)} left" if left is not None else ""
+        text = f"{done} of {'at most ' if self.study.most else ''}{of} runs"
+        text += f", {duration(time.perf_counter() - self.study.begun)}"
+        text += f", about {duration(left)} left" if left is not None else ""
         for case in running:
-            said += f"\n{_said(case)}: running, {duration(self.since(case))}"
-        self.bar.update(self.task, total=of, completed=done, description=said)
+            text += f"\n{_said(case)}: running, {duration(self.since(case))}"
+        self.bar.update(self.task, total=of, completed=done, description=text)
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Count the runs that there were, and of how many."""
+        """Number of finished runs, and of all."""
         most = self.study.most
         return (self.study.ran, most) if most else (self.finished, self.count)
 
     def since(self, case: Mapping) -> float:
-        """Tell for how many seconds a case has been running."""
+        """Return the seconds that a case has been running."""
         return time.perf_counter() - self.started[tuple(case.values())]
 
     def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
-        """Guess the seconds that remain, by the times of finished runs and their variables."""
-        done = [found for found in self.study.rows.values() if found.get("wall_s")]
+        """Estimate the remaining seconds from the times and variables of finished runs."""
+        done = [result for result in self.study.rows.values() if result.get("wall_s")]
         if not self.finished or not done:
             return None
-        cases = [{name: found[name] for name in self.study.names} for found in done]
-        predict = guessed_time(cases, [found["wall_s"] for found in done])
+        cases = [{name: result[name] for name in self.study.names} for result in done]
+        predict = guessed_time(cases, [result["wall_s"] for result in done])
         rest = sum(predict(case) for case in queue)
         rest += sum(max(predict(case) - self.since(case), 0.0) for case in running)
         return rest / min(self.study.jobs, max(len(queue) + len(running), 1))
@@ -245,25 +250,25 @@ def guessed_time(
 ) -> Callable[[Mapping[str, str]], float]:
     """Fit the time of a case: a product of powers of its numbers and factors of its words.
 
-    By least squares of logarithms, with a pull towards "changes nothing" where little is known.
+    Ridge regression of logarithms, which tends to "changes nothing" where data are few.
     """
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
-        """Note logarithms of numbers by their names, and 1 for each word; 0 is a word, too."""
-        found: dict[Any, float] = {}
+        """Return logarithms of numbers by name, and 1 for each word; 0 counts as a word."""
+        logs: dict[Any, float] = {}
         for name, word in case.items():
             number = number_of(word)
             if number is not None and number > 0:
-                found[name] = np.log(number)
+                logs[name] = np.log(number)
             else:
-                found[name, word] = 1.0
-        return found
+                logs[name, word] = 1.0
+        return logs
 
     terms = list(dict.fromkeys(term for case in cases for term in features(case)))
 
     def line(case: Mapping[str, str]) -> list[float]:
-        have = features(case)
-        return [have.get(term, 0.0) for term in terms]
+        values = features(case)
+        return [values.get(term, 0.0) for term in terms]
 
     matrix = np.array([line(case) for case in cases], float).reshape(len(cases), -1)
     logs = np.log(times)
@@ -275,7 +280,7 @@ def guessed_time(
 
 
 def shown(value: Any) -> str:
-    """Write a number or a word as a table shows it; NaN is none."""
+    """Format a table cell; a dash for NaN, None and empty words."""
     if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
@@ -283,12 +288,11 @@ def shown(value: Any) -> str:
     return str(value)
 
 
-def ended(found: Mapping[str, Any]) -> str:
-    """Write what became of a run."""
-    return found["status"] + (f": {found['reason']}" if found["reason"] else "")
+def ended(result: Mapping[str, Any]) -> str:
+    return result["status"] + (f": {result['reason']}" if result["reason"] else "")
 
 
-def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Any:
+def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Table:
     """Make an empty table for a terminal, with columns of words and of numbers."""
     from rich.table import Table
 
@@ -300,29 +304,22 @@ def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None 
     return table
 
 
-def results_table(
-    rows: Sequence[Mapping[str, Any]],
-    names: Sequence[str],
-    items: Sequence[Recorded],
-    title: str,
-    console: Any,
-) -> Any:
+def results_table(rows: Sequence[Mapping[str, Any]], study: Study, console: Console) -> Table:
     """Make a table of runs.
 
-    No value is cut off: where there is little room some facts are left out, and the last column
-    takes more lines.
+    No value is cut: if there is little room, some facts are left out, and the last column wraps.
     """
     from rich.text import Text
 
-    words, facts = [item.word for item in items], list(_FACTS)
+    words, facts = [item.word for item in study.items], list(_FACTS)
     while True:
         columns = [*words, *facts]
-        table = plain_table(names, columns, title or None)
+        table = plain_table(study.names, columns, study.title or None)
         table.add_column("status", overflow="fold", min_width=_STATUS if facts else 6)
         for each in rows:
             end = ended(each)
             style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"])
-            cells = [shown(each[name]) for name in (*names, *columns)]
+            cells = [shown(each[name]) for name in (*study.names, *columns)]
             said = Text(end if len(end) < 60 else end[:59] + "…", style=style or "yellow")
             table.add_row(*map(Text, cells), said)
         wanted = console.measure(table, options=console.options.update(max_width=1000))
@@ -331,30 +328,37 @@ def results_table(
         facts.pop()
 
 
-def terminal() -> Any:
-    """Open the place of tables; a file or a pipe is wide enough for whole rows."""
+def terminal() -> Console:
+    """Make a console for tables; in a file or a pipe, rows have up to 200 characters."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)
 
 
-def live_page(options: Any, study: Study, axes: Sequence[str] = ()) -> Any:
-    """Open the page of a study where the options ask for it, and say its address; else None."""
-    if not options.live:
-        return None
-    from karamelo_py.app.live.study import StudyPage
+def open_study(
+    options: Namespace, plan: variables.Plan, out: Path, items: Sequence[Recorded], *,
+    axes: Sequence[str] = (), facts: Mapping[str, Any], **settings: Any,
+) -> Study:  # fmt: skip
+    """Start a study: its folder is locked, `facts` of it are written, and its page is open.
 
-    recorded = [item.word for item in study.items]
-    page = StudyPage(options.script, study.names, recorded, axes, study.folder.parent)
-    print(f"live: {page.server.address}", flush=True)
-    return page
+    `settings` are further fields of `Study`; `axes` label the chart on the page.
+    """
+    names, again = list(plan.values), options.again
+    study = Study(plan.launch, out, names, items, plan.jobs, again=again, **settings)
+    if options.live:
+        from karamelo_py.app.live.study import StudyPage
+
+        words = [item.word for item in items]
+        study.page = StudyPage(options.script, names, words, axes=axes, base=study.folder.parent)
+        print(f"live: {study.page.server.address}", flush=True)
+    study.describe(variables=plan.values, **facts)
+    return study
 
 
 # ---- karamelo-py sweep --------------------------------------------------------------------------
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what the subcommand takes."""
     variables.add_family(parser)
     variables.add_combinations(parser)
     parser.add_argument(
@@ -370,22 +374,20 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-o", type=Path, default=Path("sweep.csv"), help="the table (sweep.csv)")
 
 
-def run(options: Any) -> int:
-    """Do what the command line says; returns the exit status."""
+def run(options: Namespace) -> int:
     out = variables.out_file(options.o, ".csv")
     repeat = options.repeat if options.time else 1
-    values, script, launch, jobs = variables.family(options, timed=options.time, repeat=repeat)
-    combinations = variables.cases(values, variables.zipped(options), options.where)
-    items = recorded(",".join(options.record), script, values)
-    study = Study(launch, out, list(values), items, jobs, options.again, str(options.script))
-    study.page = live_page(options, study)
-    record, computes = [item.text for item in items], script.computes()
-    study.describe(
-        variables=values, record=record, computes=computes, timed=options.time, repeat=repeat
-    )
+    plan = variables.family(options, timed=options.time, repeat=repeat)
+    combinations = variables.cases(plan.values, variables.zipped(options), options.where)
+    items = recorded(",".join(options.record), plan.script, plan.values)
+    facts = {
+        "record": [item.text for item in items], "computes": plan.script.computes(),
+        "timed": options.time, "repeat": repeat,
+    }  # fmt: skip
+    study = open_study(options, plan, out, items, title=str(options.script), facts=facts)
     rows = study.run(combinations)
     write(out, rows)
-    tell(rows, values, items, study, out)
+    tell(rows, study)
     if not any(row["status"] == "done" for row in rows):
         raise ScriptError(
             f"no run is done: {rows[0]['reason']}",
@@ -394,16 +396,16 @@ def run(options: Any) -> int:
     return 0
 
 
-def tell(rows: list, values: dict, items: list, study: Study, out: Path) -> None:
-    """Show the whole table and what became of the runs."""
+def tell(rows: Sequence[Mapping[str, Any]], study: Study) -> None:
+    """Print the whole table and the number of runs by outcome."""
     console = terminal()
-    console.print(results_table(rows, study.names, items, study.title, console))
+    console.print(results_table(rows, study, console))
     done = sum(row["status"] == "done" for row in rows)
-    left, old = len(rows) - done, len(rows) - study.ran
-    said = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
-    said += f", {left} {'is' if left == 1 else 'are'} not (see reason)" if left else ""
-    said += f"; {old} were known" if old > 0 else ""
-    print(f"{said}; the table is {out}")
+    others, old = len(rows) - done, len(rows) - study.ran
+    text = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
+    text += f", {others} {'is' if others == 1 else 'are'} not (see reason)" if others else ""
+    text += f"; {old} were known" if old > 0 else ""
+    print(f"{text}; the table is {study.out}")
     refused = [row["reason"] for row in rows if row["status"] == "refused"]
     if refused and done:
         print(

@@ -1,4 +1,4 @@
-"""Variables of a study, their values and whether its script reads them; options of studies."""
+"""Variables of a study, their values, and the options that studies have in common."""
 
 import csv
 import os
@@ -9,7 +9,7 @@ from itertools import product
 from math import prod
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
@@ -31,22 +31,22 @@ _MOST = 100_000
 def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, list[str]]:
     """Read the values of each variable: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
 
-    Variables that go `in_step` with others may have a value twice.
+    Variables `in_step` with others may repeat a value.
     """
-    found: dict[str, list[str]] = {}
+    variables: dict[str, list[str]] = {}
     for word in words:
         name, equals, text = word.partition("=")
         values = [value.strip() for value in text.split(",")]
         if not equals or not name.isidentifier() or not all(values):
             raise ScriptError(f"-var {word}: this is not a list of values", expected=VALUES)
-        if name in found:
+        if name in variables:
             raise ScriptError(
                 f"-var {name} is given twice", expected=f"all values in one list: {VALUES}"
             )
-        found[name] = [each for value in values for each in _spread(name, value)]
-        if name not in in_step and len(set(found[name])) < len(found[name]):
-            raise ScriptError(f"-var {name} has a value twice: {', '.join(found[name])}")
-    return found
+        variables[name] = [each for value in values for each in _spread(name, value)]
+        if name not in in_step and len(set(variables[name])) < len(variables[name]):
+            raise ScriptError(f"-var {name} has a value twice: {', '.join(variables[name])}")
+    return variables
 
 
 def _spread(name: str, value: str) -> list[str]:
@@ -69,8 +69,8 @@ def cases(
 ) -> list[dict[str, str]]:
     """Combine the values of all variables, the first one changing slowest.
 
-    Variables `zipped` go in step: first with first, second with second. A combination must fulfil
-    all conditions `where`, which are in the language of scripts.
+    Variables `zipped` go in step: first with first, second with second. A combination has to fulfil
+    all conditions `where`, in the script language.
     """
     axes: list[list[dict[str, str]]] = []
     for group in zipped:
@@ -94,19 +94,19 @@ def cases(
     if total > _MOST:
         raise ScriptError(f"these are {total} combinations", expected=f"at most {_MOST}")
     words = {value for column in values.values() for value in column}
-    found = []
+    selected = []
     for parts in product(*axes):
         combined = {name: value for part in parts for name, value in part.items()}
         case = {name: combined[name] for name in values}
         if all(holds(condition, case, words) for condition in where):
-            found.append(case)
-    if not found:
+            selected.append(case)
+    if not selected:
         raise ScriptError("no combination fulfils -where " + " and ".join(where))
-    return found
+    return selected
 
 
 class NamesOfCase:
-    """The names in a formula of an option: `known` values, and words without quotes."""
+    """Names in a formula of an option: `known` values, and unquoted `words`."""
 
     def __init__(self, option: str, known: Mapping[str, Any], words: Iterable[str] = ()):
         self.option, self.known, self.words = option, {**CONSTANTS, **known}, words
@@ -126,7 +126,6 @@ class NamesOfCase:
         )
 
     def hides(self, name: str) -> bool:
-        """No command has the name of a function here."""
         return False
 
     def command(self, node: Any, raw: Any) -> Any:
@@ -134,7 +133,7 @@ class NamesOfCase:
 
 
 def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) -> bool:
-    """Evaluate a condition in the language of scripts for a case."""
+    """Evaluate a condition in the script language for a case."""
     raw, node = parse_text(condition, "-where")
     value = evaluate(node, raw, NamesOfCase("-where", case, words))
     if not isinstance(value, float):
@@ -143,12 +142,12 @@ def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) ->
 
 
 class ScriptFiles:
-    """A script of a study and those that it includes, by their statements."""
+    """The statements of a script and of its includes."""
 
     def __init__(self, path: Path):
         self.path = path
         self.statements: dict[Path, list[Any]] = {}
-        self.all_known = True  # else it includes what is not known beforehand
+        self.all_known = True  # False if an include has no fixed name
         self._read(path)
 
     def _read(self, path: Path) -> None:
@@ -163,19 +162,17 @@ class ScriptFiles:
                 self.all_known = False
 
     def calls(self, name: str, path: Path) -> list[CommandCall]:
-        """Find the calls of a command in a file."""
-        found = self.statements[path]
-        return [each for each in found if isinstance(each, CommandCall) and each.name == name]
+        statements = self.statements[path]
+        return [s for s in statements if isinstance(s, CommandCall) and s.name == name]
 
     def texts(self) -> tuple[str, ...]:
-        """Read the text of all files."""
         return tuple(map(read_script, sorted(self.statements)))
 
     def check(self, names: Iterable[str]) -> None:
-        """See that it reads each of these variables."""
+        """Check that the script reads each of these variables."""
         read: set[str] = set()
         assigned: set[str] = set()
-        for statement in (each for found in self.statements.values() for each in found):
+        for statement in (each for statements in self.statements.values() for each in statements):
             codes = [statement.raw.code]
             if isinstance(statement, Assignment):
                 assigned.add(statement.name)
@@ -186,11 +183,11 @@ class ScriptFiles:
             read.update(_NAME.findall(re.sub(r'"[^"]*"', "", code)))
         for name in names:
             if name not in read and self.all_known:
-                what = "sets it and never reads it" if name in assigned else "has no such variable"
-                raise unknown(f"-var {name}: {self.path} {what}", name, sorted(assigned & read))
+                fault = "sets it and never reads it" if name in assigned else "has no such variable"
+                raise unknown(f"-var {name}: {self.path} {fault}", name, sorted(assigned & read))
 
     def logged(self) -> list[str] | None:
-        """List headings of the log columns that it names; None if that is not known beforehand."""
+        """List the log columns that the script names; None if an include may name others."""
         if self.calls("include", self.path):
             return None
         headings = ["Step", "dt", "Time"]
@@ -200,17 +197,17 @@ class ScriptFiles:
         return headings
 
     def computes(self) -> list[str]:
-        """List the IDs of its computes, as far as known."""
+        """List the IDs of its computes."""
         return [words[0] for words in self.words("compute")]
 
     def words(self, name: str) -> list[list[str]]:
-        """List the arguments of all calls of a command that has some."""
+        """List the arguments of each call of a command that has arguments."""
         calls = [call for path in sorted(self.statements) for call in self.calls(name, path)]
-        found = [[raw.code.strip().strip('"') for raw in call.arguments] for call in calls]
-        return [words for words in found if words]
+        arguments = [[raw.code.strip().strip('"') for raw in call.arguments] for call in calls]
+        return [words for words in arguments if words]
 
     def unit(self, name: str) -> str:
-        """Name the unit of a log column, empty where none is known."""
+        """Return the unit of a log column; empty if unknown."""
         reduction, _, column = name.rpartition(":")
         if reduction not in ("", "max", "min", "mean", "first", "last"):
             return ""
@@ -234,7 +231,7 @@ def _published(family: str, style: str) -> tuple[str, ...]:
 
 
 def add_family(parser: Any) -> None:
-    """Add options of a family of runs."""
+    """Add the options of a family of runs."""
     parser.add_argument("script", type=Path, help="the script")
     parser.add_argument(
         *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
@@ -256,7 +253,7 @@ def add_family(parser: Any) -> None:
 
 
 def add_axes(parser: Any) -> None:
-    """Add the option of words along the axes of a picture."""
+    """Add the option of axis labels."""
     parser.add_argument(
         "-axes",
         metavar="X,Y",
@@ -266,7 +263,7 @@ def add_axes(parser: Any) -> None:
 
 
 def along(options: Any, x: str, y: str) -> tuple[str, str]:
-    """Choose the words along the axes: as the options say, else `x` and `y`."""
+    """Return the axis labels of the options, by default `x` and `y`."""
     words = split(options.axes or ",")
     if len(words) != 2:
         raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
@@ -274,12 +271,11 @@ def along(options: Any, x: str, y: str) -> tuple[str, str]:
 
 
 def split(text: str) -> list[str]:
-    """Part words at commas; one in double quotes may contain commas."""
+    """Split at commas outside double quotes."""
     return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
 def names(text: str) -> list[str]:
-    """Part names at commas."""
     return list(filter(None, split(text)))
 
 
@@ -292,7 +288,7 @@ def add_steps(parser: Any) -> None:
 
 
 def add_combinations(parser: Any) -> None:
-    """Add options of which values go together."""
+    """Add the options that select combinations."""
     add_steps(parser)
     parser.add_argument(
         "-where", action="append", default=[], metavar="CONDITION",
@@ -301,15 +297,21 @@ def add_combinations(parser: Any) -> None:
 
 
 def zipped(options: Any) -> list[list[str]]:
-    """Read which variables go in step."""
     # Not every study of a family has it.
     return [names(group) for group in getattr(options, "zip", [])]
 
 
-def family(
-    options: Any, *, timed: bool = False, repeat: int = 1
-) -> tuple[dict, ScriptFiles, Launch, int]:
-    """Read values of the variables, the script, how to run, and how many at once."""
+class Plan(NamedTuple):
+    """The runs of a study: values of the variables, the script, and how it is run."""
+
+    values: dict[str, list[str]]
+    script: ScriptFiles
+    launch: Launch
+    jobs: int  # runs at once
+
+
+def family(options: Any, *, timed: bool = False, repeat: int = 1) -> Plan:
+    """Read the variables, the script, how it is run, and how many runs go at once."""
     script, threads = ScriptFiles(options.script), options.threads or 1
     in_step = {name for group in zipped(options) for name in group}
     values = choices(options.var, in_step)
@@ -321,11 +323,11 @@ def family(
         raise ScriptError("-time runs one at a time", expected="-time without -jobs")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     jobs = 1 if timed else options.jobs or max(1, cores // threads)
-    return values, script, launch, jobs
+    return Plan(values, script, launch, jobs)
 
 
 def out_file(path: Path, *suffixes: str) -> Path:
-    """See that a file can be written, with one of these endings."""
+    """Check that a file can be written, with one of these suffixes."""
     if suffixes and path.suffix.lower() not in suffixes:
         raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
     if not path.parent.is_dir():

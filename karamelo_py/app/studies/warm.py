@@ -1,10 +1,9 @@
-"""Begin runs as copies (forks) of processes that are warm: that have the program at hand.
+"""Start runs as copies (forks) of warm processes, which have imported the program.
 
-The first has imported the program. A run that is done leaves a copy of itself, which holds the
-kernels of its kind; from then on runs of that kind are copies of it. A run is a process like any
-other: the study waits for it, and nothing that happens to it affects others. On Linux, where the
-study can adopt orphaned processes; elsewhere, and where any of this fails, a run starts from
-nothing.
+The first has only imported it. A run that is done leaves a copy of itself with the kernels of its
+kind; later runs of that kind are copies of it. A run is a child process of the study like any
+other. On Linux only, where the study can adopt orphaned processes; elsewhere, and if anything
+fails, a run starts a new interpreter.
 """
 
 import ctypes
@@ -19,20 +18,20 @@ import threading
 import time
 import traceback
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NoReturn
 
 from karamelo_py.app.leaving import STUDY
 
-MOST = 8  # kinds whose kernels are held
-TRIES = 3  # to start the first
-PATIENCE = 20.0  # seconds for an answer: a start takes some hundredths, the import two or so
+MOST = 8  # kinds with a process
+TRIES = 3  # to start the first process
+PATIENCE = 20.0  # seconds for an answer: a start takes about 0.01, the import 2
 SUBREAPER = 36  # of Linux's prctl: adopts processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
-# A script's own functions in Python may store what the next run must not find.
+# Functions of a script in Python may change what the next run finds.
 NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
@@ -43,22 +42,21 @@ class WarmProcess:
         self.link, self.pid = link, pid
 
     def is_ready(self) -> bool:
-        """Tell whether runs can be copies of it; ConnectionError where it has gone."""
+        """Return True if runs can be copies of it; ConnectionError if it has gone."""
         if self.pid is None:
             with suppress(BlockingIOError):
-                said = self.link.recv(32, socket.MSG_DONTWAIT)
-                if not said:
+                answer = self.link.recv(32, socket.MSG_DONTWAIT)
+                if not answer:
                     raise ConnectionError
-                self.pid = int(said)
+                self.pid = int(answer)
         return self.pid is not None
 
     def end(self) -> None:
-        """Let it end."""
         self.link.close()
         if self.pid is not None:
             with suppress(OSError):
-                os.kill(self.pid, signal.SIGKILL)  # it has nothing to lose
-                for _ in range(100):  # at most a second: the system may hold it
+                os.kill(self.pid, signal.SIGKILL)  # nothing is open
+                for _ in range(100):  # at most a second: the system may delay it
                     if os.waitpid(self.pid, os.WNOHANG)[0]:
                         break
                     time.sleep(0.01)
@@ -75,9 +73,9 @@ class WarmProcesses:
         self.finalizer = weakref.finalize(self, _end, self.keepers)
 
     def start(
-        self, kind: tuple[str, ...], words: list[str], folder: Path, out: BinaryIO, err: BinaryIO
+        self, kind: tuple[str, ...], words: list[str], folder: Path, files: Sequence[BinaryIO]
     ) -> int | None:
-        """Begin a run; gives the number of the process, a child of this one, or None."""
+        """Start a run with output and error in `files`; return the pid of this child, or None."""
         with self.lock:
             while self.tries:
                 key: tuple[str, ...] = ()
@@ -86,10 +84,10 @@ class WarmProcesses:
                     link = self.keepers[key].link
                     link.settimeout(PATIENCE)  # TimeoutError is an OSError
                     stays = self._awaited(("kind", *kind))
-                    said = json.dumps([str(folder.absolute()), *words]).encode()
-                    files = [out.fileno(), err.fileno(), *([stays.fileno()] if stays else [])]
+                    request = json.dumps([str(folder.absolute()), *words]).encode()
+                    handles = [file.fileno() for file in (*files, stays) if file is not None]
                     with stays or nullcontext():
-                        socket.send_fds(link, [said], files)
+                        socket.send_fds(link, [request], handles)
                     return int(link.recv(32))
                 except (OSError, ValueError):
                     self._forget(key)
@@ -97,11 +95,11 @@ class WarmProcesses:
         return None
 
     def _chosen(self, key: tuple[str, ...]) -> tuple[str, ...]:
-        """Choose the process to copy: the one of this kind, or the first."""
-        found = self.keepers.get(key)
-        if found is not None:
+        """Return the key of the process to copy: of this kind, or the first."""
+        process = self.keepers.get(key)
+        if process is not None:
             try:
-                if found.is_ready():
+                if process.is_ready():
                     return key
             except ConnectionError:
                 self._forget(key)
@@ -110,7 +108,6 @@ class WarmProcesses:
         return ()
 
     def _begin(self) -> None:
-        """Start the first."""
         if ctypes.CDLL(None, use_errno=True).prctl(SUBREAPER, 1, 0, 0, 0):
             raise OSError("cannot adopt")
         mine, theirs = _pair()
@@ -123,7 +120,7 @@ class WarmProcesses:
         self.keepers[()] = WarmProcess(mine, process.pid)
 
     def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
-        """Make the link of the process that a run is to leave; none where there is one."""
+        """Make the socket for the process that a run is to leave; None if there is one."""
         if key in self.keepers:
             return None
         if len(self.keepers) > MOST:
@@ -150,7 +147,7 @@ def _end(keepers: dict[Any, WarmProcess]) -> None:
 
 
 def begin() -> NoReturn:
-    """Import the program, and begin runs of it."""
+    """Import the program, and start runs of it."""
     gc.disable()
     link = socket.socket(fileno=os.dup(0))
     import karamelo_py.app.cli
@@ -160,17 +157,17 @@ def begin() -> NoReturn:
 
 
 def keep(link: socket.socket) -> NoReturn:
-    """Begin runs as copies of this process, until the study has ended."""
+    """Start runs as copies of this process until the study ends."""
     gc.collect()
     gc.freeze()
     gc.disable()
-    os.chdir("/")  # no folder is in use by it
+    os.chdir("/")  # so that folders can be removed
     with open(os.devnull, "r+b") as nothing:
         for at in range(3):
             os.dup2(nothing.fileno(), at)
     while True:
-        said, files, *_ = socket.recv_fds(link, LONGEST, 3)
-        if not said:
+        request, files, *_ = socket.recv_fds(link, LONGEST, 3)
+        if not request:
             os._exit(0)
         read, write = os.pipe()
         between = os.fork()
@@ -181,7 +178,7 @@ def keep(link: socket.socket) -> NoReturn:
                 os._exit(0)
             for end in (link, read, write):
                 end.close() if end is link else os.close(end)
-            _run(json.loads(said), *files)
+            _run(json.loads(request), *files)
         os.waitpid(between, 0)  # from here on the run is a child of the study
         os.close(write)
         link.send(os.read(read, 32))
@@ -189,17 +186,17 @@ def keep(link: socket.socket) -> NoReturn:
             os.close(file)
 
 
-def _run(said: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
-    """Carry out a run in this process, as the program does, and leave a copy if it went well."""
+def _run(request: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
+    """Run the program in this process, and leave a copy if it went well."""
     from karamelo_py.app.start import main
 
-    folder, *sys.argv[1:] = said
+    folder, *sys.argv[1:] = request
     study = os.environ.get(STUDY, "")
-    for _ in range(1000):  # until the study has adopted it, after some thousandths of a second
+    for _ in range(1000):  # until the study has adopted it, within milliseconds
         if str(os.getppid()) == study:
             break
         time.sleep(0.002)
-    os.setsid()  # Ctrl-C is of the study alone
+    os.setsid()  # Ctrl-C reaches the study only
     os.chdir(folder)
     for file, at in ((out, 1), (err, 2)):
         os.dup2(file, at)
@@ -223,7 +220,7 @@ def _run(said: list[str], out: int, err: int, stays: int | None = None) -> NoRet
 
 
 def _is_clean() -> bool:
-    """Tell whether nothing but the program itself has run here."""
+    """Return True if nothing but the program itself has run here."""
     from karamelo_py.language import registry
 
     return NOT_OURS not in sys.modules and not registry.foreign()
