@@ -77,13 +77,12 @@ def forecast(
 ) -> Forecast | None:  # fmt: skip
     """Forecast a run at `x` from the runs at `xs`, coarse ones first; None if impossible.
 
-    The error continues with the order between the last two runs. Its bounds follow from the least
-    and the largest order so far, at least a third of the expected order above and half of it below;
-    an order that has fallen may fall by as much again, and one that has not yet reached 2 may.
-    Errors that are small by chance count as large as they may be (`credible`, with the order
-    `highest` of the basis). The time is steps times (a + b points), fitted to the runs; any other
-    cost continues as between the last two. Impossible with fewer than two runs that have an error,
-    or if the last one got worse.
+    The error continues with the last order. Bounds follow from the least and the largest order so
+    far, at least a third of the expected order above and half of it below; an order that has fallen
+    may fall by as much again, and one that has not yet reached 2 may. Errors small by chance count
+    as large as they may be (`credible`, with the order `highest` of the basis). The time is steps
+    times (a + b points), fitted to the runs; other costs continue as between the last two.
+    Impossible with fewer than two errors, or if the last run got worse.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -144,16 +143,15 @@ class ChoiceRuns:
 
     @property
     def kind(self) -> set[str]:
-        """Words of the basis and the method, which decide where errors end."""
+        """Words of basis and method, which decide where errors end."""
         return {*self.values.values(), *self.words} & {*REACHED, *look.FAMILIES[2]}
 
     @property
     def highest(self) -> float:
-        """Order of its basis."""
         return reached(self.kind)
 
     def look(self, folder: Path) -> None:
-        """Read method and warnings of its finest run."""
+        """Read method and warnings of the finest run."""
         place = folder / self.rows[-1]["folder"]
         record = record_of(place)
         self.words = frozenset(record["runs"][0]["method"].split() if record.get("runs") else ())
@@ -174,7 +172,7 @@ class Candidate:
 
 
 class Adviser:
-    """Looks for the cheapest variant whose error is at most `target`.
+    """Finds the cheapest variant whose error is at most `target`.
 
     `along` is the variable that refines a scene, with its values, coarse ones first; `accuracy` and
     `cost` are columns of the table.
@@ -191,7 +189,6 @@ class Adviser:
         self.accuracy, self.cost, self.target = accuracy, cost, target
 
     def go_on(self, choice: ChoiceRuns) -> None:
-        """Run the next finer variant of a choice."""
         choice.rows += self.study.run([self._next(choice)])
         choice.look(self.study.folder.parent)
 
@@ -200,7 +197,7 @@ class Adviser:
         return {name: case[name] for name in self.study.names}
 
     def pilot(self, count: int) -> None:
-        """Run the coarsest variants of all choices, up to the target, and read earlier runs."""
+        """Run the coarsest variants up to the target, and read earlier runs."""
         for _ in range(min(count, len(self.values))):
             for choice in self.choices:
                 if not self._met(choice):
@@ -210,7 +207,7 @@ class Adviser:
                 self.go_on(choice)
 
     def _met(self, choice: ChoiceRuns) -> list[Candidate]:
-        """List the runs of a choice that meet the target."""
+        """List a choice's runs that meet the target."""
         signed = errors(choice.rows, self.accuracy)
         costs = column(choice.rows, self.cost)
         chances = by_chance(self.xs[: len(signed)], signed, choice.highest)
@@ -229,7 +226,7 @@ class Adviser:
         ]
 
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
-        """Return True if the gradients of its basis jump, and points may cross cells at a step."""
+        """Return True if gradients jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
         stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN if unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
@@ -237,9 +234,9 @@ class Adviser:
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
     ) -> Candidate | None:
-        """Return the cheapest variant of a choice that meets the target, known or expected.
+        """Return a choice's cheapest variant that meets the target, known or expected.
 
-        With `hope`, by the lower bound of the error; with `lucky`, one that may meet it by chance.
+        With `hope`, by the lower bound of the error; with `lucky`, perhaps by chance.
         """
         met = [run for run in self._met(choice) if lucky or not run.chance]
         if met or lucky:
@@ -256,7 +253,7 @@ class Adviser:
         return None
 
     def lucky(self) -> Candidate | None:
-        """Return the cheapest variant of all that meets the target, if only by chance."""
+        """Return the cheapest variant that meets the target, if only by chance."""
         candidates = filter(None, (self.candidate(choice, lucky=True) for choice in self.choices))
         return min(candidates, key=lambda c: c.cost, default=None)
 
@@ -269,7 +266,7 @@ class Adviser:
         """Return the cheapest candidate, after runs that may change it.
 
         A choice that could become the cheapest is followed until its candidate is the next finer
-        variant, so that its order is known where it matters.
+        variant.
         """
         while True:
             best = next(iter(self.candidates()), None)
@@ -287,7 +284,7 @@ class Adviser:
             self.go_on(follow)
 
     def _doubted(self, limit: float) -> ChoiceRuns | None:
-        """Return a choice whose finest run meets the target below a cost, if only by chance."""
+        """Return a choice that meets the target below a cost, if only by chance."""
         for choice in self.choices:
             finest = len(choice.rows) - 1
             for last in self._met(choice)[-1:] if finest < len(self.values) - 1 else ():
@@ -296,7 +293,7 @@ class Adviser:
         return None
 
     def _risen(self, limit: float) -> ChoiceRuns | None:
-        """Return a choice whose last error alone has grown, and whose next run costs less."""
+        """Return a choice whose last error alone has grown, if its next run is cheap."""
         for choice in self.choices:
             count = len(choice.rows)
             fell = np.diff(sizes(choice.rows, self.accuracy)) < 0
@@ -326,7 +323,7 @@ class Adviser:
         return reasons
 
     def hopeful(self) -> Candidate | None:
-        """Return the cheapest variant that may meet the target though none is expected to."""
+        """Return the cheapest variant that may meet the target, though not expected to."""
         return next((c for c in self.candidates(hope=True) if c.forecast), None)
 
     def label(self, choice: ChoiceRuns, step: int) -> str:
@@ -398,7 +395,7 @@ def run(options: Namespace) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Sort values by the work they cause, which `karamelo-py check` measures at the ends."""
+    """Sort values by the work they cause, as `check` measures."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
@@ -417,7 +414,6 @@ def coarse_first(
 
 
 def tell(adviser: Adviser) -> None:
-    """Print what each choice has shown, and what is expected of it."""
     headings = ("runs", f"finest {adviser.name}", adviser.accuracy, "order", "meets it at", "cost")
     table = plain_table(["choice"], headings)
     for choice in adviser.choices:
@@ -437,7 +433,6 @@ def tell(adviser: Adviser) -> None:
 
 
 def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
-    """Print what to write, and how sure it is."""
     values = {**best.choice.values, adviser.name: adviser.values[best.step]}
     print(f"\nfor {adviser.accuracy} <= {adviser.target:g} at the least {adviser.cost}:")
     for name, value in values.items():
@@ -476,7 +471,7 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
 
 
 def _nothing(adviser: Adviser) -> int:
-    """Print that no variant meets the target, and which comes nearest; return the exit status."""
+    """Print that no variant meets the target, and the nearest one."""
     lucky = adviser.lucky()
     luck = ", unless by chance" * (lucky is not None)
     print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}{luck}")
@@ -502,10 +497,7 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised; if it misses the target, continue with the new result.
-
-    If no variant is expected to meet it, try one that may.
-    """
+    """Run what is advised until the target is met, or what may meet it."""
     best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)

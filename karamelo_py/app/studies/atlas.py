@@ -54,7 +54,7 @@ PICTURES = (".png", ".svg")
 
 @dataclass
 class Entry:
-    """A picture or a table, and the commands that make it."""
+    """A picture or table, with its commands."""
 
     name: str  # its folder; a part before a slash is its group
     text: str = ""  # what it shows
@@ -71,7 +71,6 @@ class Entry:
         return self.name.partition("/")[0]
 
     def lines(self, inputs: str, *, small: bool) -> list[str]:
-        """Insert values into the commands."""
         words = {"inputs": inputs, **self.whole, **(self.small if small else {})}
         try:
             return [command.format(**words) for command in self.commands]
@@ -83,7 +82,6 @@ class Entry:
 
 
 def read(path: Path) -> tuple[list[Entry], Path]:
-    """Read the entries of an atlas, and its folder of scripts."""
     try:
         content = tomllib.loads(read_text(path))
     except tomllib.TOMLDecodeError as error:
@@ -154,14 +152,14 @@ def run(options: Namespace) -> int:
 
 
 def ended(place: Path) -> tuple[list[str], int]:
-    """List runs in the tables of an entry that did not end well, and count all."""
+    """List the runs in an entry's tables that did not end well, and count all."""
     tables = [records.read(path) for path in sorted(place.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)
 
 
 def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:
-    """Run the commands of an entry in its folder; return ``done``, ``known`` or ``failed``."""
+    """Run an entry's commands in its folder; return ``done``, ``known`` or ``failed``."""
     lines = entry.lines(str(inputs), small=small)
     key = key_of(lines)
     record = place / RECORD
@@ -192,7 +190,7 @@ def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -
 
 
 def key_of(lines: list[str]) -> str:
-    """Hash all that a result depends on: the commands, the scripts they name, the version."""
+    """Hash commands, the scripts they name, and the version."""
     parts = [karamelo_py.__version__, *lines]
     for word in {word for line in lines for word in shlex.split(line)}:
         if os.path.isabs(word) and Path(word).is_file():
@@ -201,7 +199,7 @@ def key_of(lines: list[str]) -> str:
 
 
 def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
-    """Write the page of the entries that are done; parts of the others stay."""
+    """Write the page of finished entries; parts of the others stay."""
     before = page.read_text(encoding="utf-8") if page.exists() else ""
     before_by_name = {
         part.partition("\n")[0]: part.rstrip() for part in re.split("^##+ ", before, flags=re.M)
@@ -227,7 +225,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
 
 
 def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
-    """Write the part of a page on an entry; copy its pictures to the folder `shown`."""
+    """Write an entry's part of the page; copy its pictures to `shown`."""
     parts = [entry.name, entry.text]
     title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
     for path in sorted(path for path in place.iterdir() if path.suffix in PICTURES):

@@ -36,10 +36,10 @@ _NOT_OF_RUN = ("internal", "busy")
 
 @dataclass
 class CaseOutcome:
-    """Outcome of a case.
+    """Outcome of a run.
 
-    Its status is ``done``, ``failed`` (the run ended with an error), ``refused`` (by a mistake of
-    the script, before any step), ``too long`` or ``killed``.
+    Status: ``done``, ``failed``, ``refused`` (by a mistake of the script, before any step),
+    ``too long`` or ``killed``.
     """
 
     status: str
@@ -50,7 +50,6 @@ class CaseOutcome:
 
     @property
     def complaint(self) -> str:
-        """Standard error of the run."""
         return said_in(self.folder / "err.txt")
 
 
@@ -80,7 +79,7 @@ def worded(case: Mapping[str, Any]) -> str:
 
 
 def said_in(file: Path) -> str:
-    """Read the output of a run; empty if the file cannot be read."""
+    """Read a file of output; empty if that fails."""
     try:
         return file.read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -88,7 +87,7 @@ def said_in(file: Path) -> str:
 
 
 class Refused(ScriptError):
-    """A variant refused for a mistake of its script; shows the message and the values."""
+    """A variant refused for a mistake of its script."""
 
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
@@ -100,12 +99,12 @@ class Refused(ScriptError):
 
 
 class Stop(Exception):
-    """The study is to end now, with its runs."""
+    """Ends the study and its runs."""
 
 
 @dataclass
 class Launch:
-    """How the cases of a study are run."""
+    """Settings of the runs of a study."""
 
     script: Path
     threads: int = 1  # of each run
@@ -116,14 +115,14 @@ class Launch:
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
-        """Hash all that a result depends on; earlier results are used again by this hash."""
+        """Hash all that a result depends on."""
         parts = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
         parts += [f"{name}={value}" for name, value in case.items()]
         parts.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """Read the outcome of this case from an earlier study; None if it has to be run again."""
+        """Return this case's outcome from an earlier study, None if it has to be run again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
@@ -137,7 +136,6 @@ class Launch:
         return CaseOutcome(status, reason, facts, folder, stored.get("code", ""))
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
-        """Run a case and store its outcome."""
         with reported(folder):
             folder.mkdir(parents=True, exist_ok=True)
             (folder / KEPT).unlink(missing_ok=True)
@@ -198,7 +196,7 @@ class Launch:
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
-        """Wait for the end; return the peak memory in MiB (or None) and whether it was stopped."""
+        """Wait for the end; return the peak memory (MiB) and whether time was up."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
@@ -222,7 +220,7 @@ class Launch:
 
 
 def kind_of(values: Iterable[str]) -> tuple[str, ...]:
-    """Return the words among the values of a case, which decide what is compiled."""
+    """Return the words of a case, which decide what is compiled."""
     return tuple(value for value in values if number_of(value) is None)
 
 
@@ -231,24 +229,23 @@ def options_of(case: Mapping[str, str]) -> list[str]:
 
 
 def command_of(script: Any, case: Mapping[str, str]) -> str:
-    """Format the shell command of a case; each value stays one word."""
+    """Format the shell command of a case, with values quoted."""
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of a run: it imports this very program from any folder."""
+    """Return the environment of a run, which imports this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}
 
 
 def record_of(folder: Path) -> dict[str, Any]:
-    """Read run.json in a folder; empty if there is none."""
     return read_json(folder / NAME)
 
 
 def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
-    """Return the numbers of a script's runs, of all or of the first, by the names in `COLUMNS`."""
+    """Return numbers of all runs of a script, or of the first, see `COLUMNS`."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
     names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")
@@ -271,13 +268,11 @@ def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
 
 
 def error_of(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the error that ended a script; empty if none did."""
     errors = [note for note in record.get("messages", []) if note["kind"] == "error"]
     return errors[-1] if errors else {}
 
 
 def folder_name(case: Mapping[str, Any]) -> str:
-    """Return a folder name for the values of a case."""
     text = ",".join(f"{name}={value}" for name, value in case.items())
     plain = re.sub(r"[^\w.,=+-]", "_", text)
     if plain == text and len(plain) < 100:

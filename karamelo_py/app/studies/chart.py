@@ -130,7 +130,7 @@ def run(options: Namespace) -> int:
 
 
 def read(path: Path, where: Sequence[str]) -> Table:
-    """Read a table, of its rows those that fulfil the conditions."""
+    """Read the rows of a table that fulfil the conditions."""
     rows, made = records.read(path), read_json(path.with_suffix(".json"))
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
@@ -147,7 +147,7 @@ def read(path: Path, where: Sequence[str]) -> Table:
 
 
 def side_by_side(options: Namespace) -> int:
-    """Draw two values of a variable side by side, for the scenes of all tables."""
+    """Draw two values of a variable, for the scenes of all tables."""
     if not options.accuracy:
         raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
     out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
@@ -174,7 +174,6 @@ def side_by_side(options: Namespace) -> int:
 
 
 def curves(options: Namespace, table: Table, by: list[str]) -> int:
-    """Draw a column of the logs, a curve for each run."""
     out = out_file(options.o or Path("curves.png"), *pictures.SUFFIXES)
     differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
@@ -198,7 +197,7 @@ def curves(options: Namespace, table: Table, by: list[str]) -> int:
 
 
 def keeps(options: Namespace, table: Table, by: list[str]) -> int:
-    """Show whether a log column stays constant, and which runs fail silently."""
+    """Show which runs conserve a log column, and which fail silently."""
     out = out_file(options.o, ".md") if options.o else None
     require("-by", by, table.variables)
     over, parts, folder = options.x or "Time", table.made.get("computes", ()), table.path.parent
@@ -219,7 +218,7 @@ def keeps(options: Namespace, table: Table, by: list[str]) -> int:
 
 
 def tell(family: Family, *, costs: bool) -> None:
-    """Print the runs, by cost with the Pareto front marked, and the order of each line."""
+    """Print the runs by cost, the Pareto front, and the orders of lines."""
     front = {id(row) for row in family.front()} if costs else set()
     named = {"x": family.along, "cost": family.cost if costs else None, "error": family.accuracy}
     columns = {column: name for column, name in named.items() if name}
@@ -271,7 +270,6 @@ _MOST = 60  # pictures in a page
 
 
 def write_page(family: Family, sheet: pictures.Sheet) -> None:
-    """Write the page with Plotly."""
     from plotly import graph_objects
     from plotly import io as plotly_io
 
@@ -339,7 +337,7 @@ def write_page(family: Family, sheet: pictures.Sheet) -> None:
 
 
 def in_html(lead: str, exponent: int) -> str:
-    """Write a number times a power of ten in HTML; without a lead, the power alone."""
+    """Format a number in HTML; without a lead, the power of ten alone."""
     return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
 
 
@@ -366,7 +364,7 @@ def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict
 
 
 def _picture(folder: Path) -> str | None:
-    """Return the newest picture of a run as a data URL, reduced for the page; None without one."""
+    """Return the newest picture of a run as a data URL."""
     pictures = sorted(folder.glob("*.png"), key=lambda p: p.stat().st_mtime)
     if not pictures:
         return None

@@ -19,7 +19,7 @@ NONE = "mechanical"  # word of a method without a word here
 
 
 class Order(NamedTuple):
-    """The exponent of a power law y = c x^exponent, fitted to logarithms by least squares."""
+    """Exponent of y = c x^exponent, by least squares of logarithms."""
 
     exponent: float  # NaN with fewer than two points
     lowest: float  # exponents between neighbouring points
@@ -27,11 +27,11 @@ class Order(NamedTuple):
 
     @property
     def of_fall(self) -> "Order":
-        """Order by which y falls while x grows, a positive number."""
+        """Order by which y falls as x grows."""
         return Order(-self.exponent, -self.highest, -self.lowest)
 
     def towards(self, x: Sequence[float]) -> "Order":
-        """Order by which errors fall from the first to the last of `x`."""
+        """Order by which errors fall from the first to the last x."""
         return self.of_fall if x[-1] > x[0] else self
 
     def __str__(self) -> str:
@@ -43,7 +43,7 @@ class Order(NamedTuple):
 
 
 def order(x: Sequence[float], y: Sequence[float]) -> Order:
-    """Fit the order of y in x, without points that have no logarithm."""
+    """Fit the order of positive y in positive x."""
     pairs = sorted((a, b) for a, b in zip(x, y, strict=True) if usable(a) and usable(b))
     logs = np.log(np.array(pairs).reshape(-1, 2))
     if len(np.unique(logs[:, 0])) < 2:
@@ -70,12 +70,12 @@ WORSE = 1.1  # ratio of a worse error
 
 
 def reached(words: Iterable[str]) -> float:
-    """Return the highest order to expect of a choice of words."""
+    """Return the highest order to expect of a choice."""
     return min((REACHED[word] for word in words if word in REACHED), default=4)
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """Return why small errors of runs, coarse ones first, are chance; empty where they are not.
+    """Return why errors of runs, coarse ones first, are small by chance; "" where they are not.
 
     `values` are errors at `x`, signed where the sign is known. A small error is chance if a finer
     run is worse; and, as long as no finer run is as good, if the sign has changed, the error fell
@@ -99,9 +99,9 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 
 
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
-    """Return the sizes of errors that a forecast may start from, without reductions by chance.
+    """Return sizes of errors for a forecast, without reductions by chance.
 
-    An error is at least the change from the run before over the reduction by the order `highest`,
+    An error is at least its change since the run before over the reduction by the order `highest`,
     and no less than the error of each finer run.
     """
     values = np.asarray(values, float)
@@ -114,12 +114,11 @@ def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.
 
 
 def usable(a: float | None) -> bool:
-    """Return True if a number has a logarithm."""
     return a is not None and 0 < a < inf
 
 
 class Table(NamedTuple):
-    """A table of runs, the variables among its columns, and how it was made."""
+    """A table of runs."""
 
     rows: list[Mapping[str, str]]
     variables: list[str]
@@ -131,14 +130,14 @@ class Table(NamedTuple):
         return Path(self.made.get("script", "")).name
 
     def label(self, name: str) -> str:
-        """Return the axis title of a column of the table, or of the logs with its unit."""
+        """Return the axis title of a column of the table or of the logs."""
         path = Path(self.made.get("script", ""))
         return labelled(look.label(name), ScriptFiles(path).unit(name) if path.is_file() else "")
 
 
 @dataclass
 class GroupedRuns:
-    """Runs that differ in one variable only, in its order."""
+    """Runs that differ in one variable, in its order."""
 
     choice: dict[str, str]  # values of the other variables that differ between lines
     rows: list[Mapping[str, str]]
@@ -152,15 +151,12 @@ class GroupedRuns:
 
     @property
     def lucky(self) -> np.ndarray:
-        """Mask of the runs whose errors are small by chance."""
+        """Mask of errors that are small by chance."""
         return np.array([*map(bool, self.chance)], bool)
 
     @property
     def rises(self) -> bool:
-        """True if the variable along the line grows with refinement, as costs do.
-
-        Particle-steps decide where known: times of short runs are noisy.
-        """
+        """True if the variable grows with refinement, measured in particle-steps where known."""
         done = column(self.rows, "particle_steps")
         return not order(self.x, done if np.isfinite(done).all() else self.cost).exponent < 0
 
@@ -170,13 +166,13 @@ class GroupedRuns:
 
     @property
     def shown(self) -> np.ndarray:
-        """Mask of the runs that a diagram of errors can show."""
+        """Mask of runs that a diagram can show."""
         good = np.isfinite(self.error) & (self.error > 0)
         return good & np.isfinite(self.across) & (self.linear | (self.across > 0))
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Write a choice in words: a value that means nothing alone with its variable."""
+    """Format a choice; a value that means nothing alone has its name."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -185,8 +181,8 @@ def label(choice: Mapping[str, str]) -> str:
 class Family:
     """A table of runs as lines.
 
-    `accuracy` and `cost` are the columns to compare. Variables `by` distinguish lines; others that
-    differ are added. `along` differs along a line: by default the number with the most values.
+    Variables `by` distinguish lines, as do others that differ; `along` differs along a line, by
+    default the number with the most values. `accuracy` and `cost` are the columns compared.
     """
 
     def __init__(
@@ -232,7 +228,7 @@ class Family:
         return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
 
     def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
-        """Judge chance in a line whose number of points only rises or only falls."""
+        """Find chance in a line with ever more or ever fewer points."""
         points = column(rows, "points")
         rise = np.diff(points[np.isfinite(points)])
         if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):
@@ -242,13 +238,13 @@ class Family:
         return by_chance(x[::way], signed[::way], highest)[::way]
 
     def place(self, row: Mapping[str, str]) -> float:
-        """Return the position of a run along its line: the number, or the index of the word."""
+        """Return a run's position along its line."""
         end = row[self.along]
         return self.words.index(end) if self.words else number_of(end)
 
     @property
     def error_label(self) -> str:
-        """Axis title of the error: the formula of the sweep where there is one."""
+        """Axis title of the error, with the formula of the sweep."""
         words = (word.partition("=") for word in self.table.made.get("record", ()))
         formula = {name: formula for name, _, formula in words}.get(self.accuracy)
         if not formula:
@@ -257,10 +253,7 @@ class Family:
         return f"{self.accuracy} = {f'abs({formula})' if signed else formula}"
 
     def front(self) -> list[Mapping[str, str]]:
-        """Return the Pareto front: runs that none beats in both cost and error, cheapest first.
-
-        Errors that are small by chance do not count.
-        """
+        """Return the runs that none beats in cost and error, cheapest first, without chance."""
         members = [
             (c, e, k, row)
             for line in self.lines
@@ -278,24 +271,23 @@ class Family:
 
 
 def errors(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Read errors, with their signs where they are known; NaN where missing."""
+    """Read errors, signed where possible; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
 def sizes(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Read the absolute values of a column, NaN where missing."""
+    """Read absolute values; NaN where missing."""
     return np.abs(column(rows, name))
 
 
 def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
-    """Read the numbers of a column, NaN where missing."""
     numbers = [value(row, name) for row in rows]
     return np.array([np.nan if a is None else a for a in numbers], float)
 
 
 def require(option: str, names: Iterable[str], names_of_table: Iterable[str]) -> None:
-    """Check that a table has columns, or variables."""
+    """Raise an error for names that a table does not have."""
     for name in names:
         if name not in names_of_table:
             raise missing(option, name, list(names_of_table))

@@ -44,7 +44,7 @@ ALIKE = 0.99  # correlation of indistinguishable variables
 
 
 class Observation:
-    """A measurement: a number of the log, or a log column over time."""
+    """A measured number of the log, or a log column over time."""
 
     def __init__(self, text: str, script: variables.ScriptFiles, values: Mapping[str, list[str]]):
         word, _, what = (part.strip() for part in text.partition("="))
@@ -69,7 +69,7 @@ class Observation:
             self.times, self.wanted = next(iter(table.values())), table[column]
 
     def differences(self, log: Mapping[str, np.ndarray], case: Mapping[str, str]) -> np.ndarray:
-        """Return log minus measurement (n,), over the largest measured value."""
+        """Return log minus measurement (n,), over the largest measurement."""
         if self.times is None:
             values = np.array([self.item.of(log, case)])
         elif log["Time"][-1] < self.times[-1] * (1 - 1e-9):
@@ -81,12 +81,12 @@ class Observation:
 
 
 class NoDerivatives(ScriptError):
-    """Runs on both sides of a point failed."""
+    pass
 
 
 @dataclass
 class End:
-    """End of a search: positions in the ranges (0 to 1), remaining differences, slopes."""
+    """End of a search: positions in the ranges (0 to 1), differences, slopes."""
 
     share: np.ndarray
     off: np.ndarray
@@ -94,12 +94,12 @@ class End:
 
     @property
     def left(self) -> float:
-        """Root of the mean square difference."""
+        """Root mean square difference."""
         return float(np.sqrt(np.mean(self.off**2)))
 
 
 class Search:
-    """Runs of a script by the positions of its variables in their ranges, from 0 to 1."""
+    """Runs by the positions of variables in their ranges, 0 to 1."""
 
     def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
@@ -113,12 +113,11 @@ class Search:
         self.low, self.high = (np.array([end(ends) for ends in numbers]) for end in (min, max))
 
     def case(self, share: np.ndarray) -> dict[str, str]:
-        """Return the values of the variables at these positions."""
         at = self.low + share * (self.high - self.low)
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *shares: np.ndarray) -> list[np.ndarray]:
-        """Return the differences of runs at these positions; inf if a run failed."""
+        """Return the differences at these positions; inf for a failed run."""
         cases, results = [self.case(share) for share in shares], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:
@@ -136,9 +135,9 @@ class Search:
         return results
 
     def slopes(self, share: np.ndarray, both: bool = False) -> np.ndarray:
-        """Return derivatives (n, variables): towards the middle, or over `both` sides.
+        """Return derivatives (n, variables) towards the middle, or over `both` sides.
 
-        NoDerivatives is raised if the runs on both sides fail.
+        Raises NoDerivatives if runs on both sides fail.
         """
         moves = np.diag(np.where(share < 0.5, STEP, -STEP))
         first, *ahead = self.differences(share, *(share + moves))
@@ -156,7 +155,7 @@ class Search:
         return np.column_stack(columns)
 
     def down(self, start: np.ndarray, most: int) -> End | None:
-        """Search by least squares from a start; None if runs fail there."""
+        """Run least squares from a start; None if runs fail there."""
         from scipy.optimize import least_squares
 
         if not np.isfinite(self.differences(start)[0]).all():
@@ -171,9 +170,9 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """Return the lowest point near an end, along variables and the weakest direction.
+        """Return the lowest point around an end, along variables and the weakest direction.
 
-        The slopes of `end` become those over both sides.
+        `end` gets slopes over both sides.
         """
 
         def nearby(*moves: np.ndarray) -> list[End]:
@@ -248,7 +247,6 @@ def run(options: Namespace) -> int:
 
 
 def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[End]]:
-    """Return the lowest end after a look around it, and the other ends."""
     if not ends:
         raise next(iter(search.failed.values()))
     best, *others = sorted(ends, key=lambda end: end.left)
@@ -262,14 +260,14 @@ def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[E
 
 
 def disagree(best: End, other: End, half: np.ndarray) -> bool:
-    """Return True if ends differ by more than both 95 % ranges, in variables that matter."""
+    """Return True if ends differ by more than both 95 % ranges."""
     off = abs(best.share - other.share)
     wide = np.maximum(np.where(np.isnan(half), 0, 2 * half), NEAR)
     return bool((off > wide)[best.slopes.any(axis=0)].any())
 
 
 def tell_apart(search: Search, ends: Sequence[End]) -> None:
-    """Print the ends of searches that disagree, the likely cause, and a fix."""
+    """Print ends that disagree, the likely cause, and a fix."""
     print("The searches end at different values, so that there is no +-:")
     for end in ends:
         values = search.case(end.share)
@@ -282,9 +280,9 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Return half the 95 % ranges, and pairs of variables that cannot be told apart.
 
-    NaN for a variable without effect, and for all without more measurements than variables; inf if
-    only a combination is determined. From the covariance s^2 (J^T J)^-1, with s^2 from the n - p
-    remaining differences `off` (Seber & Wild 2003, Nonlinear Regression, section 2.1).
+    NaN without effect, or with too few measurements; inf if only a combination is determined.
+    Covariance s^2 (J^T J)^-1, s^2 from the n - p differences `off` (Seber & Wild 2003, Nonlinear
+    Regression, section 2.1).
     """
     from scipy.stats import t
 

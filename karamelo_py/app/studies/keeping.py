@@ -20,9 +20,9 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 class Kept(NamedTuple):
     """Verdict on the column in a run.
 
-    Its word is ``keeps``, ``damps``, ``gains``, ``breaks`` (the run was stopped), ``refused`` (no
-    step was made), or ``unknown`` (given up or killed). A part of the energy ``falls`` or
-    ``grows``, which says nothing about the total.
+    ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step), or ``unknown``
+    (given up or killed). A part of the energy ``falls`` or ``grows``, which says nothing about the
+    total.
     """
 
     word: str
@@ -32,12 +32,12 @@ class Kept(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """True if the run went wrong and no message says why."""
+        """True if no message says why the run went wrong."""
         return self.word in WRONG and not self.warned
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """Return the word for a column `y` over `x`, and its mean over the last part over the first."""
+    """Return the verdict on `y` over `x`, and the mean of its last part over the first."""
     span = SHARE * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:
@@ -52,7 +52,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Judge a column in a run; values of the computes `parts` are parts of a total."""
+    """Judge a column in a run; values of the computes `parts` are no totals."""
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))
@@ -75,16 +75,15 @@ def look_at(
 
 
 def _general(note: Mapping[str, str]) -> str:
-    """Return the cause in a message, else the title of its code, else its text."""
+    """Return the cause in a message, else its title, else its text."""
     title = codes().get(note.get("code", ""), {}).get("title")
     return note.get("cause") or title or note["text"]
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
-    """Write a Markdown table: rows for the values of variables `by`, columns for the others.
+    """Write a Markdown table with rows by the variables `by`, and list silent failures.
 
-    Messages of runs follow, numbered as in brackets. Variables in step with row variables are
-    left out. Also returns the runs that went wrong silently.
+    Messages follow, by numbers in brackets. Variables in step with row variables are left out.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

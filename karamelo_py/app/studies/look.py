@@ -1,4 +1,4 @@
-"""Colours, markers, axes and labels of charts; a method has the same colour everywhere."""
+"""Colours, markers, axes and labels of charts; a method always has the same colour."""
 
 import hashlib
 from collections.abc import Sequence
@@ -36,12 +36,11 @@ FAMILIES = (
 
 
 def known(word: str) -> bool:
-    """Return True if a word has a fixed colour and marker."""
     return any(word in family for family in FAMILIES)
 
 
 def place(word: str, others: Sequence[str] = ()) -> int:
-    """Return the number of the colour and marker of a word: fixed for methods, else by order."""
+    """Return the style number of a word: fixed for methods, else by order."""
     for family in FAMILIES:
         if word in family:
             return family.index(word) % len(PALETTE)
@@ -51,10 +50,10 @@ def place(word: str, others: Sequence[str] = ()) -> int:
 
 
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
-    """Return colour, marker number and dash number of each line of a chart.
+    """Return colour, marker and dashes (by number) of each line.
 
-    The first variable gives colour and marker, the others the dashes: fixed ones for known words,
-    or the next that is free in this colour.
+    The first variable sets colour and marker, the others the dashes: fixed for known words, or the
+    next unused in this colour.
     """
     names = list(choices[0]) if choices else []
     if not names:
@@ -77,7 +76,6 @@ def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
 
 
 def _in_order(value: str, values: Sequence[str]) -> str:
-    """Return the colour of a number among others: dark to light."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
@@ -86,7 +84,7 @@ def _in_order(value: str, values: Sequence[str]) -> str:
 
 
 def readable(colour: str) -> str:
-    """Darken a colour to a contrast of 4.5 to 1 on white (WCAG 2), so that text is legible."""
+    """Darken a colour to a contrast of 4.5 to 1 on white (WCAG 2)."""
     from matplotlib.colors import to_hex, to_rgb
 
     rgb = np.array(to_rgb(colour))
@@ -96,7 +94,7 @@ def readable(colour: str) -> str:
 
 
 def contrast(rgb: Any) -> float:
-    """Return the contrast of white to a colour (sRGB, 0 to 1), WCAG 2.1."""
+    """Return the contrast with white of an sRGB colour, 0 to 1 (WCAG 2.1)."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
@@ -107,10 +105,9 @@ def label(name: str) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Return round ticks of a logarithmic axis: at 1, 2 and 5, at 1, or at every few decades.
+    """Return round ticks of a logarithmic axis: 1, 2 and 5, 1, or every few decades.
 
-    More leading digits if a short axis would have fewer than three; never so near that labels
-    touch.
+    A short axis gets more digits; labels never touch.
     """
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
@@ -128,7 +125,7 @@ def log_ticks(low: float, high: float) -> list[float]:
 
 
 def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
-    """Select ascending ticks at least a `PART` of a logarithmic axis apart."""
+    """Select ascending ticks at least `PART` of the axis apart."""
     chosen: list[float] = []
     for tick in ticks:
         if not chosen or tick >= chosen[-1] * (high / low) ** PART:
@@ -137,7 +134,7 @@ def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
 
 
 def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:
-    """Make an axis logarithmic, with plain numbers at its ticks: at `values` if they are few."""
+    """Make an axis logarithmic, with ticks at `values` if they are few."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     axes = axis.axes
@@ -153,7 +150,7 @@ def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None 
 
 
 def slope(axes: Any, lines: Sequence[tuple[Any, Any]], exponent: float) -> None:
-    """Draw a triangle of y = x^exponent below lines, each its x and y, on logarithmic axes."""
+    """Draw a triangle of y = x^exponent below lines (x, y), on logarithmic axes."""
     p, falls = abs(exponent), exponent < 0
     logs = [np.log([x, y]) for x, y in lines]
     low, high = min(x.min() for x, _ in logs), max(x.max() for x, _ in logs)
@@ -182,7 +179,7 @@ def slope(axes: Any, lines: Sequence[tuple[Any, Any]], exponent: float) -> None:
 
 
 def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:
-    """Move values apart to a distance of `gap`, in the same order, within `low` and `high`."""
+    """Move values to distances of at least `gap`, in order, within `low` and `high`."""
     rank = np.argsort(wanted, kind="stable")
     count = max(len(rank) - 1, 1)
     steps = min(gap, (high - low) / count) * np.arange(len(rank))
@@ -195,9 +192,9 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names of lines next to the axes, by x and y of their ends, names and colours.
+    """Write names next to the axes, for x, y, name and colour of line ends.
 
-    Lines of one colour with one end have one name: "linear, usf / usavg".
+    Equal ends of one colour have one name: "linear, usf / usavg".
     """
     if not ends:
         return

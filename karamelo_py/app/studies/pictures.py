@@ -43,7 +43,6 @@ class Sheet(NamedTuple):
     title: str = ""
 
     def finish(self, figure: "Figure", axes: "Axes", ends: Sequence[Curve]) -> None:
-        """Label axes and curves, and write the file."""
         axes.set(xlabel=self.x, ylabel=self.y)
         axes.set_title(self.title, loc="left", fontsize=10)
         tidy(axes)
@@ -55,7 +54,7 @@ DECADES = 1e4  # ratio of values from which a curve gets a logarithmic axis
 
 
 def lines(family: Family, sheet: Sheet) -> None:
-    """Draw errors over costs with the Pareto front, or over the variable along lines."""
+    """Draw errors over costs with the Pareto front, or over a variable."""
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
     convergence = family.convergence
@@ -100,13 +99,13 @@ def lines(family: Family, sheet: Sheet) -> None:
 
 
 def _bars(family: Family, line: GroupedRuns) -> np.ndarray:
-    """Return half the spread of repeated costs, 0 without repetitions."""
+    """Return half the spread of repeated costs."""
     spread = column(line.rows, f"{family.cost}_spread")
     return np.zeros(len(spread)) if family.convergence else np.nan_to_num(spread) / 2
 
 
 def _gone(axes: "Axes", marks: Sequence[tuple[float, str]]) -> None:
-    """Draw a cross at the top for each run without a value, side by side at one abscissa."""
+    """Draw a cross at the top for each run without a value."""
     for at in {x for x, _ in marks}:
         colours = [colour for x, colour in marks if x == at]
         for k, colour in enumerate(colours):
@@ -118,7 +117,7 @@ def _gone(axes: "Axes", marks: Sequence[tuple[float, str]]) -> None:
 
 
 def _slope(axes: "Axes", family: Family) -> None:
-    """Draw a triangle with the median order of all lines, rounded to halves."""
+    """Draw a triangle with the median order, in halves."""
     lines = [line for line in family.lines if len(set(line.x[line.shown])) > 1]
     sure = [line for line in lines if not line.lucky.any()] or lines
     fits = [order(line.x[line.shown], line.error[line.shown]).exponent for line in sure]
@@ -153,7 +152,7 @@ def _footnote(figure: "Figure", family: Family) -> None:
 
 
 def heat(family: Family, x: str, y: str, sheet: Sheet) -> None:
-    """Draw a column of the table over two variables, as coloured cells with their numbers."""
+    """Draw errors over two variables, as coloured cells with numbers."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
@@ -217,7 +216,7 @@ def _sorted(rows: Sequence[Mapping[str, str]], name: str) -> list[str]:
 
 
 class History(NamedTuple):
-    """One column over another, of one run."""
+    """One column over another in a run."""
 
     x: np.ndarray
     y: np.ndarray
@@ -228,10 +227,9 @@ class History(NamedTuple):
 def histories(
     table: Table, by: Sequence[str], over: str, curve: str, *, log: str, names: Sequence[str]
 ) -> list[History]:
-    """Read one column `over` another from the logs of all runs that have them.
+    """Read one column `over` another from the logs.
 
-    Runs are labelled by `names` in the order of the table, else by their values of the variables
-    `by`.
+    Labels are `names`, in the order of the table, else values of the variables `by`.
     """
     curves = []
     for k, row in enumerate(table.rows):
@@ -251,10 +249,10 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Select the rows (n,) of a log with increasing time.
+    """Return the rows (n,) of a log with increasing time.
 
-    A run that was stopped ends with its last good state, which is earlier; one that went back and
-    continued with smaller steps has rows of the discarded state.
+    A stopped run ends with its last good state, which is earlier; one that has gone back has rows
+    of the discarded state.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)
@@ -263,7 +261,7 @@ def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
 
 
 def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | None = None) -> None:
-    """Draw curves with their names at the ends; a cross where a run was stopped."""
+    """Draw curves, with a cross where a run was stopped."""
     figure = blank_figure(7.2, 4.0)
     axes = figure.subplots()
     ys = np.concatenate([each.y for each in curves])
@@ -301,7 +299,7 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
 
 @dataclass
 class Pair:
-    """The runs of a scene for two values of one variable, with numbers of both, or NaN."""
+    """Numbers of a scene for two values of one variable; NaN where missing."""
 
     label: str  # the scene, and other choices
     error: tuple[float, float]
@@ -310,12 +308,11 @@ class Pair:
 
     @property
     def cost_ratio(self) -> float:
-        """Cost of the second over the cost of the first."""
+        """Second cost over the first."""
         return self.cost[1] / self.cost[0]
 
 
 def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair], list[str]]:
-    """Return the pairs of a table, and the two values in their order."""
     rows, variables = table.rows, table.variables
     require("-accuracy", [accuracy], rows[0])
     require("-cost", [cost], rows[0])
@@ -362,7 +359,7 @@ def tell_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, cost
 
 
 def draw_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, sheet: Sheet) -> None:
-    """Draw errors of both values on the left, and the ratio of their costs on the right."""
+    """Draw errors on the left, cost ratios on the right."""
     figure = blank_figure(9.0, 1.1 + 0.3 * len(pairs))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     errors = np.array([pair.error for pair in pairs])

@@ -53,7 +53,6 @@ class Reduction:
             raise ScriptError(incomplete, expected=_WORDS)
 
     def of(self, log: Mapping[str, np.ndarray]) -> float:
-        """Return the number; ScriptError if the log has none."""
         values = log.get(self.column, ())
         if not len(values):
             raise ScriptError(f"the log has no column '{self.column}'")
@@ -69,11 +68,10 @@ class Reduction:
 
 
 class Recorded:
-    """A number from a log: ``err`` (the last value of that column), ``max:err``, ...
+    """A number from a log: ``err`` (the last value), ``max:err``, ...
 
-    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and of the variables of the
-    study, in the script language. A formula that is abs(...) as a whole is also recorded with its
-    sign (`signed`).
+    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and of variables. A formula
+    that is abs(...) as a whole is also recorded with its sign (`signed`).
     """
 
     signed: "Recorded | None" = None
@@ -105,11 +103,10 @@ class Recorded:
             self.parts[name] = Reduction("last", name, None, word)
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
-        """List the log columns that it reads, without `variables` of the study."""
+        """List the log columns that it reads; `variables` are none."""
         return [part.column for name, part in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float:
-        """Return the number; ScriptError if there is none."""
         numbers = {
             name: number_of(case[name]) if name in case else part.of(log)
             for name, part in self.parts.items()
@@ -128,7 +125,7 @@ class Recorded:
 def recorded(
     text: str, script: ScriptFiles, variables: Container[str] = (), option: str = "-record"
 ) -> list[Recorded]:
-    """Read the numbers that -record, or another option, asks for."""
+    """Read the numbers that an option asks for."""
     items = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     headings = script.logged()
     for item in items:
@@ -164,8 +161,8 @@ def row(
 ) -> dict[str, Any]:
     """Make the row of a run; unknown cells are None.
 
-    A failed run has no recorded values. The reason of a finished run is why its first
-    missing value is missing.
+    A failed run has no recorded values. The reason of a finished run is why its first missing value
+    is missing.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)
@@ -209,7 +206,7 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def value(each: Mapping[str, Any], name: str) -> float | None:
-    """Return the number in a column; None if it is empty or no number."""
+    """Return the number in a column, or None."""
     cell = each.get(name)
     if cell is None or isinstance(cell, float):
         return cell

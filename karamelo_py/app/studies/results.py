@@ -21,7 +21,7 @@ LAW = 200  # points on the curve of a law
 
 
 def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
-    """Draw columns of a table over -x, a line for each value of `by`; return the exit status."""
+    """Draw columns of a table over -x; return the exit status."""
     results = names(options.y)
     require("-y", results, table.rows[0])
     if not options.x:
@@ -46,7 +46,7 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
 
 
 def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) -> list[History]:
-    """Group runs that differ in `x` alone, in its order; a line for each group and result."""
+    """Return a line for each result and each group of runs that differ in `x` alone."""
     differing = [
         name
         for name in by or table.variables
@@ -68,7 +68,7 @@ def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) ->
 
 
 class Law:
-    """A formula of the variable `x`, as a function of arrays."""
+    """A formula of `x`, for arrays."""
 
     def __init__(self, text: str, x: str):
         self.text, self.x = text, x
@@ -85,7 +85,7 @@ class Law:
 
 
 def measured_in(path: Path, x: str, result: str) -> History:
-    """Read measured points: the columns of these names, else the first two of the file."""
+    """Read the columns of these names, else the first two."""
     columns = read_table(path)
     if len(columns) < 2:
         raise ScriptError(f"{path} has one column", expected="two, of x and of what was measured")
@@ -120,7 +120,7 @@ def _picture(
 
 
 def _tell(lines: Sequence[History], law: Law | None, options: Namespace) -> None:
-    """Print the numbers, and how far they are from the law."""
+    """Print the results with their deviation from the law."""
     for line in lines:
         table = plain_table([], [options.x, line.label, *([law.text, "%"] if law else [])])
         for at, y in zip(line.x, line.y, strict=True):

@@ -142,7 +142,7 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Return the largest mean of an energy over the mean of its first tenth; inf for NaN.
+    """Return the largest mean of an energy over its first; inf for NaN.
 
     Means are over a tenth of the rows. From rest the median replaces the first mean.
     """
@@ -167,7 +167,6 @@ def remains(energy: np.ndarray) -> float:
 
 
 def in_short(row: Mapping[str, Any], code: str) -> str:
-    """Return a short reason of a failure, by the code of its error."""
     if row["status"] == "too long":
         return "too long"
     if code in REASONS:
@@ -176,11 +175,11 @@ def in_short(row: Mapping[str, Any], code: str) -> str:
 
 
 class Map:
-    """The plane of a stability map.
+    """A stability map: the plane of one or two `axes` among the variables in `values`.
 
-    Of all variables in `values` the one or two `axes` vary. Growth is measured by the log column
-    `energy` by more than the factor `bound`; without a column, the gain that the program finds. The
-    column `error` shades stable cells. Variables go in step with their `leaders`.
+    Growth is measured by the log column `energy` by more than the factor `bound`; without a column,
+    by the program. The column `error` shades stable cells. Variables go in step with their
+    `leaders`.
     """
 
     def __init__(
@@ -206,23 +205,19 @@ class Map:
 
     @property
     def classes(self) -> dict[Cell, Any]:
-        """Class of each known cell."""
         return {cell: row["class"] for cell, row in self.found.items()} | self.inferred
 
     @property
     def failures(self) -> list[tuple[str, int]]:
-        """Number of failed runs by reason, the commonest first."""
         failed = (row["why"] for row in self.found.values() if row["class"] == "failed")
         return Counter(failed).most_common()
 
     def case(self, cell: Cell) -> dict[str, str]:
-        """Return the values of the variables of a cell."""
         at = dict(zip(self.axes, cell, strict=False))
         place = {name: at.get(self.leaders.get(name, name), 0) for name in self.values}
         return {name: values[place[name]] for name, values in self.values.items()}
 
     def classify(self, cells: Sequence[Cell]) -> list[str]:
-        """Run cells; return the class of each."""
         cases = {cell: self.case(cell) for cell in cells}
         try:
             self.study.run([*cases.values()])
@@ -233,7 +228,7 @@ class Map:
         return [self.found[cell]["class"] for cell in cells]
 
     def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Add its class and the reason for it to the row of a run."""
+        """Add class and reason to the row of a run."""
         folder = self.study.out.parent / row["folder"]
         record = record_of(folder)
         runs, code = record.get("runs", []), error_of(record).get("code", "")
@@ -276,7 +271,7 @@ class Map:
         return {**row, **verdict}
 
     def rows(self) -> list[dict]:
-        """Make the table: every cell, whether it was run, and what it showed."""
+        """Make the table of all cells."""
         rows = []
         for cell, kind in sorted(self.classes.items()):
             row = self.found.get(cell, {})
@@ -289,10 +284,10 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Return each row's x where the first step equals the column `step`; None if nowhere.
+        """Return each row's x where the first step equals the column `step`, or None.
 
-        Beyond the runs of a row the ratio of the steps continues as a power of the first variable.
-        Rows of numbers with fewer than two runs are interpolated.
+        Beyond the runs, the ratio of the steps continues as a power of x. Rows of numbers with
+        fewer than two runs are interpolated.
         """
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.found.items()):
@@ -309,7 +304,7 @@ class Map:
         return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
-        """Return where a ratio is 1, between its known values or beyond them, within the map."""
+        """Return where a ratio is 1, at or beyond its known values."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
@@ -335,7 +330,6 @@ class Map:
         return ratios
 
     def tell(self) -> None:
-        """Print how many cells are of each class, and why runs failed."""
         count, run = Counter(self.classes.values()), len(self.found)
         print(f"{run} of {len(self.classes)} cells were run (the others lie between like ones)")
         for kind in CLASSES:
@@ -359,7 +353,6 @@ class Map:
             print(f"the largest {step_words} is {ends} times the program's stable step{caution}")
 
     def draw(self, path: Path, title: str, words: tuple[str, str]) -> None:
-        """Draw the map, with the axis labels `words`."""
         from matplotlib.colors import ListedColormap
         from matplotlib.lines import Line2D
         from matplotlib.patches import Patch
@@ -421,7 +414,7 @@ class Map:
         savefig(figure, path)
 
     def _shade(self, figure: Any, axes: Any) -> None:
-        """Shade stable cells by their errors, interpolated for cells that were not run."""
+        """Shade stable cells by errors, interpolated between runs."""
         from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
         stable = [cell for cell, kind in self.classes.items() if kind == "stable"]
@@ -452,7 +445,6 @@ class Map:
 
 
 def edges(centres: Sequence[float]) -> np.ndarray:
-    """Return the edges of cells around centres."""
     at = np.asarray(centres, float)
     if len(at) == 1:
         return np.array([at[0] - 0.5, at[0] + 0.5])
@@ -475,11 +467,9 @@ def explore(
     two cells of one class are taken to be of that class, the nearest ones first; between unlike
     ones the middle is run, in the longest gaps first. Where an edge goes along a row, one in three
     of its cells is run, so that no bow of it is cut off. So edges are found to the cell; an island
-    between the cells that were run is missed. Along a direction of words (`apart`) nothing is
-    inferred.
+    between runs is missed. Along a direction of words (`apart`) nothing is inferred.
 
-    `classify` returns the classes of cells; it gets several at once. Returns the classes of those
-    cells, and of the others.
+    `classify` gets several cells at once. Returns the classes of those cells, and of the others.
     """
     classes: list[Hashable] = []  # of the numbers in planes
     known = np.full(shape, UNKNOWN)
@@ -498,7 +488,7 @@ def explore(
 
 
 def unseen(shape: Sequence[int], stride: int) -> int:
-    """Return the width in cells of islands and strips that no run needs to meet."""
+    """Return the largest width of unseen islands and strips, in cells."""
     return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
 
 
@@ -508,12 +498,12 @@ def _cuts(count: int, stride: int) -> list[int]:
 
 
 def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield neighbours in a line between which nothing is known."""
+    """Yield known neighbours with a gap between them."""
     return ((a, b) for a, b in pairwise(np.flatnonzero(line != UNKNOWN)) if b - a > 1)
 
 
 def _filled(known: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill in what lies between like cells, but not where row and column disagree."""
+    """Fill in cells between like ones unless row and column disagree."""
     filled, reach = known.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
@@ -537,7 +527,7 @@ def _between(plane: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cell]]:
-    """Yield the middles of gaps in rows and columns, each with the length of its gap."""
+    """Yield the length and middle of each gap."""
     for i, line in enumerate(plane if not apart[1] else ()):
         yield from ((b - a, (i, (a + b) // 2)) for a, b in _gaps(line))
     for j, line in enumerate(plane.T if not apart[0] else ()):
@@ -545,7 +535,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(known: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield the middles of stretches along an edge without a known cell, with their lengths."""
+    """Yield length and middle of stretches along an edge without a run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(known[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])
@@ -555,7 +545,7 @@ def _unproved(known: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]
 
 
 def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
-    """Find stretches longer than 1 where two lines differ and one of them is unknown."""
+    """Find stretches longer than 1 where two lines differ and one is unknown."""
     line = (near, far)[which]
     stretches: list[list[int]] = [[]]
     for i in np.flatnonzero((near != far) & (known == UNKNOWN)):
@@ -567,7 +557,7 @@ def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int)
 
 
 def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
-    """Return cells of the longest gaps, without those within half a gap of another."""
+    """Return cells of the longest gaps, at least half a gap apart."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
         if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):

@@ -70,19 +70,17 @@ class Study:
         self.folder = self.out.with_suffix("")
 
     def knows(self, case: Mapping[str, str]) -> bool:
-        """Return True if a case need not be run."""
         kept = not self.again and self.launch.kept(case, self.folder / folder_name(case))
         return tuple(case.values()) in self.rows or bool(kept)
 
     def describe(self, **facts: Any) -> None:
-        """Write how the table is made into a file next to it."""
         how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
         text = json.dumps({"script": str(self.launch.script), **facts, **how}, indent=1) + "\n"
         self.claim_folder()
         write_whole(self.out.with_suffix(".json"), text)
 
     def claim_folder(self) -> None:
-        """Lock the folder of the runs; ScriptError if another study has locked it."""
+        """Lock the folder of the runs against other studies."""
         if self.folder.exists() and not self.folder.is_dir():
             expected = "a free name for the folder of the runs"
             raise ScriptError(f"{self.folder} is a file", expected=expected)
@@ -101,10 +99,9 @@ class Study:
             write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
-        """Return the rows of these cases, in order, after running those that are not known.
+        """Return the rows of cases, in order, after running unknown ones.
 
-        If the user interrupts, runs in progress are ended, finished ones are stored, and a message
-        says how to continue.
+        An interrupt ends runs in progress, stores finished ones, and says how to continue.
         """
         waiting = []
         for case in cases:
@@ -139,7 +136,7 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """Choose a case to run; the first of a kind goes ahead, because it compiles."""
+            """Choose a case; the first of a kind goes ahead, because it compiles."""
             kinds = (((case, place), kind_of(case.values())) for case, place in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
@@ -169,7 +166,7 @@ class Study:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
-        """Update the page; stopping the study there raises KeyboardInterrupt."""
+        """Update the page; KeyboardInterrupt if the study was stopped there."""
         of = self.most or display.count + len(self.rows) - display.finished
         left = display.left([case for case, _ in queue], running)
         places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
@@ -185,7 +182,7 @@ class Study:
 
 
 class _Display:
-    """A line for each run that ends; on a terminal also a bar and the present runs."""
+    """Progress: a line for each finished run, on a terminal also a bar."""
 
     def __init__(self, study: Study, count: int):
         from rich.progress import BarColumn, Progress, TextColumn
@@ -221,16 +218,14 @@ class _Display:
 
     @property
     def progress(self) -> tuple[int, int]:
-        """Number of finished runs, and of all."""
         most = self.study.most
         return (self.study.ran, most) if most else (self.finished, self.count)
 
     def since(self, case: Mapping) -> float:
-        """Return the seconds that a case has been running."""
         return time.perf_counter() - self.started[tuple(case.values())]
 
     def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
-        """Estimate the remaining seconds from the times and variables of finished runs."""
+        """Estimate the remaining seconds from finished runs."""
         done = [result for result in self.study.rows.values() if result.get("wall_s")]
         if not self.finished or not done:
             return None
@@ -250,11 +245,11 @@ def guessed_time(
 ) -> Callable[[Mapping[str, str]], float]:
     """Fit the time of a case: a product of powers of its numbers and factors of its words.
 
-    Ridge regression of logarithms, which tends to "changes nothing" where data are few.
+    By ridge regression of logarithms.
     """
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
-        """Return logarithms of numbers by name, and 1 for each word; 0 counts as a word."""
+        """Return logarithms of numbers above 0, and 1 for each other word."""
         logs: dict[Any, float] = {}
         for name, word in case.items():
             number = number_of(word)
@@ -280,7 +275,7 @@ def guessed_time(
 
 
 def shown(value: Any) -> str:
-    """Format a table cell; a dash for NaN, None and empty words."""
+    """Format a table cell; a dash for NaN, None and ""."""
     if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
@@ -293,7 +288,7 @@ def ended(result: Mapping[str, Any]) -> str:
 
 
 def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Table:
-    """Make an empty table for a terminal, with columns of words and of numbers."""
+    """Make an empty table with columns of words and of numbers."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
@@ -305,9 +300,9 @@ def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None 
 
 
 def results_table(rows: Sequence[Mapping[str, Any]], study: Study, console: Console) -> Table:
-    """Make a table of runs.
+    """Make a table of runs that cuts no value.
 
-    No value is cut: if there is little room, some facts are left out, and the last column wraps.
+    If there is little room, facts are left out, and the last column wraps.
     """
     from rich.text import Text
 
@@ -329,17 +324,17 @@ def results_table(rows: Sequence[Mapping[str, Any]], study: Study, console: Cons
 
 
 def terminal() -> Console:
-    """Make a console for tables; in a file or a pipe, rows have up to 200 characters."""
+    """Make a console for tables; rows in a file are up to 200 characters wide."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)
 
 
 def open_study(
-    options: Namespace, plan: variables.Plan, out: Path, items: Sequence[Recorded], *,
+    options: Namespace, plan: variables.StudyPlan, out: Path, items: Sequence[Recorded], *,
     axes: Sequence[str] = (), facts: Mapping[str, Any], **settings: Any,
 ) -> Study:  # fmt: skip
-    """Start a study: its folder is locked, `facts` of it are written, and its page is open.
+    """Start a study: lock its folder, write `facts` of it, open its page.
 
     `settings` are further fields of `Study`; `axes` label the chart on the page.
     """
@@ -397,7 +392,6 @@ def run(options: Namespace) -> int:
 
 
 def tell(rows: Sequence[Mapping[str, Any]], study: Study) -> None:
-    """Print the whole table and the number of runs by outcome."""
     console = terminal()
     console.print(results_table(rows, study, console))
     done = sum(row["status"] == "done" for row in rows)

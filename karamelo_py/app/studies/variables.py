@@ -29,7 +29,7 @@ _MOST = 100_000
 
 
 def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, list[str]]:
-    """Read the values of each variable: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
+    """Read values of variables: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
 
     Variables `in_step` with others may repeat a value.
     """
@@ -69,8 +69,7 @@ def cases(
 ) -> list[dict[str, str]]:
     """Combine the values of all variables, the first one changing slowest.
 
-    Variables `zipped` go in step: first with first, second with second. A combination has to fulfil
-    all conditions `where`, in the script language.
+    Variables `zipped` go in step. `where` are conditions in the script language.
     """
     axes: list[list[dict[str, str]]] = []
     for group in zipped:
@@ -106,7 +105,7 @@ def cases(
 
 
 class NamesOfCase:
-    """Names in a formula of an option: `known` values, and unquoted `words`."""
+    """Names in a formula: `known` values, and unquoted `words`."""
 
     def __init__(self, option: str, known: Mapping[str, Any], words: Iterable[str] = ()):
         self.option, self.known, self.words = option, {**CONSTANTS, **known}, words
@@ -142,7 +141,7 @@ def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) ->
 
 
 class ScriptFiles:
-    """The statements of a script and of its includes."""
+    """The statements of a script and its includes."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -169,7 +168,7 @@ class ScriptFiles:
         return tuple(map(read_script, sorted(self.statements)))
 
     def check(self, names: Iterable[str]) -> None:
-        """Check that the script reads each of these variables."""
+        """Raise an error for a variable that the script does not read."""
         read: set[str] = set()
         assigned: set[str] = set()
         for statement in (each for statements in self.statements.values() for each in statements):
@@ -187,7 +186,7 @@ class ScriptFiles:
                 raise unknown(f"-var {name}: {self.path} {fault}", name, sorted(assigned & read))
 
     def logged(self) -> list[str] | None:
-        """List the log columns that the script names; None if an include may name others."""
+        """List the log columns that the script names; None with includes."""
         if self.calls("include", self.path):
             return None
         headings = ["Step", "dt", "Time"]
@@ -197,17 +196,15 @@ class ScriptFiles:
         return headings
 
     def computes(self) -> list[str]:
-        """List the IDs of its computes."""
         return [words[0] for words in self.words("compute")]
 
     def words(self, name: str) -> list[list[str]]:
-        """List the arguments of each call of a command that has arguments."""
         calls = [call for path in sorted(self.statements) for call in self.calls(name, path)]
         arguments = [[raw.code.strip().strip('"') for raw in call.arguments] for call in calls]
         return [words for words in arguments if words]
 
     def unit(self, name: str) -> str:
-        """Return the unit of a log column; empty if unknown."""
+        """Return the unit of a log column, or ""."""
         reduction, _, column = name.rpartition(":")
         if reduction not in ("", "max", "min", "mean", "first", "last"):
             return ""
@@ -231,7 +228,6 @@ def _published(family: str, style: str) -> tuple[str, ...]:
 
 
 def add_family(parser: Any) -> None:
-    """Add the options of a family of runs."""
     parser.add_argument("script", type=Path, help="the script")
     parser.add_argument(
         *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
@@ -253,7 +249,6 @@ def add_family(parser: Any) -> None:
 
 
 def add_axes(parser: Any) -> None:
-    """Add the option of axis labels."""
     parser.add_argument(
         "-axes",
         metavar="X,Y",
@@ -280,7 +275,6 @@ def names(text: str) -> list[str]:
 
 
 def add_steps(parser: Any) -> None:
-    """Add the option of variables that go in step."""
     parser.add_argument(
         "-zip", action="append", default=[], metavar="A,B",
         help="variables that change together: their first values, then their second, ...",
@@ -288,7 +282,6 @@ def add_steps(parser: Any) -> None:
 
 
 def add_combinations(parser: Any) -> None:
-    """Add the options that select combinations."""
     add_steps(parser)
     parser.add_argument(
         "-where", action="append", default=[], metavar="CONDITION",
@@ -301,8 +294,8 @@ def zipped(options: Any) -> list[list[str]]:
     return [names(group) for group in getattr(options, "zip", [])]
 
 
-class Plan(NamedTuple):
-    """The runs of a study: values of the variables, the script, and how it is run."""
+class StudyPlan(NamedTuple):
+    """Variables, script and settings of a study."""
 
     values: dict[str, list[str]]
     script: ScriptFiles
@@ -310,8 +303,8 @@ class Plan(NamedTuple):
     jobs: int  # runs at once
 
 
-def family(options: Any, *, timed: bool = False, repeat: int = 1) -> Plan:
-    """Read the variables, the script, how it is run, and how many runs go at once."""
+def family(options: Any, *, timed: bool = False, repeat: int = 1) -> StudyPlan:
+    """Read variables, script and settings from the options."""
     script, threads = ScriptFiles(options.script), options.threads or 1
     in_step = {name for group in zipped(options) for name in group}
     values = choices(options.var, in_step)
@@ -323,11 +316,11 @@ def family(options: Any, *, timed: bool = False, repeat: int = 1) -> Plan:
         raise ScriptError("-time runs one at a time", expected="-time without -jobs")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     jobs = 1 if timed else options.jobs or max(1, cores // threads)
-    return Plan(values, script, launch, jobs)
+    return StudyPlan(values, script, launch, jobs)
 
 
 def out_file(path: Path, *suffixes: str) -> Path:
-    """Check that a file can be written, with one of these suffixes."""
+    """Check the suffix and folder of a file to write."""
     if suffixes and path.suffix.lower() not in suffixes:
         raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
     if not path.parent.is_dir():

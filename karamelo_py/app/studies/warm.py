@@ -1,9 +1,8 @@
 """Start runs as copies (forks) of warm processes, which have imported the program.
 
-The first has only imported it. A run that is done leaves a copy of itself with the kernels of its
-kind; later runs of that kind are copies of it. A run is a child process of the study like any
-other. On Linux only, where the study can adopt orphaned processes; elsewhere, and if anything
-fails, a run starts a new interpreter.
+A run leaves a copy of itself with the kernels of its kind, for later runs of that kind. Runs are
+child processes of the study. On Linux only, where the study can adopt orphans; otherwise, and if
+anything fails, a run starts a new interpreter.
 """
 
 import ctypes
@@ -42,7 +41,7 @@ class WarmProcess:
         self.link, self.pid = link, pid
 
     def is_ready(self) -> bool:
-        """Return True if runs can be copies of it; ConnectionError if it has gone."""
+        """Return True if it can be copied; ConnectionError if it has gone."""
         if self.pid is None:
             with suppress(BlockingIOError):
                 answer = self.link.recv(32, socket.MSG_DONTWAIT)
@@ -63,7 +62,7 @@ class WarmProcess:
 
 
 class WarmProcesses:
-    """The warm processes of a study, which end with it."""
+    """Warm processes by kind, which end with the study."""
 
     def __init__(self, environment: Mapping[str, str]):
         self.environment = environment
@@ -95,7 +94,7 @@ class WarmProcesses:
         return None
 
     def _chosen(self, key: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the key of the process to copy: of this kind, or the first."""
+        """Return the key of the process to copy."""
         process = self.keepers.get(key)
         if process is not None:
             try:
@@ -120,7 +119,7 @@ class WarmProcesses:
         self.keepers[()] = WarmProcess(mine, process.pid)
 
     def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
-        """Make the socket for the process that a run is to leave; None if there is one."""
+        """Make the socket for the process that a run is to leave, if none is there."""
         if key in self.keepers:
             return None
         if len(self.keepers) > MOST:
@@ -147,7 +146,6 @@ def _end(keepers: dict[Any, WarmProcess]) -> None:
 
 
 def begin() -> NoReturn:
-    """Import the program, and start runs of it."""
     gc.disable()
     link = socket.socket(fileno=os.dup(0))
     import karamelo_py.app.cli
@@ -187,7 +185,7 @@ def keep(link: socket.socket) -> NoReturn:
 
 
 def _run(request: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
-    """Run the program in this process, and leave a copy if it went well."""
+    """Run the program, and leave a copy if it went well."""
     from karamelo_py.app.start import main
 
     folder, *sys.argv[1:] = request
@@ -220,7 +218,7 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
 
 
 def _is_clean() -> bool:
-    """Return True if nothing but the program itself has run here."""
+    """Return True if only the program itself has run here."""
     from karamelo_py.language import registry
 
     return NOT_OURS not in sys.modules and not registry.foreign()
