@@ -477,7 +477,9 @@ def test_four_panels_make_a_square(table, monkeypatch):
         for b in "12"
         for c in "1234"
     ]
-    pictures.heat(Family(Table(rows, ["a", "b", "c"]), "err", "seconds"), "a", "b", pictures.Sheet(None))
+    pictures.heat(
+        Family(Table(rows, ["a", "b", "c"]), "err", "seconds"), "a", "b", pictures.Sheet(None)
+    )
     places = [axes.get_subplotspec().get_gridspec().get_geometry() for axes in drawn[0].axes[:4]]
     assert places == [(2, 2)] * 4
 
