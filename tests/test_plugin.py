@@ -17,6 +17,8 @@ from plugged import PLUGIN, install, offer
 from scenes import block
 from selection import few
 
+from karamelo_py import Simulation
+
 pytestmark = [pytest.mark.xdist_group("plugin"), pytest.mark.usefixtures("starts_are_cheap")]
 PYTHON = sys.executable  # which compiles, too
 
@@ -767,3 +769,50 @@ def test_a_solid(run_interpreted):
     np.testing.assert_allclose(mass, 3 * 40 * (2 * np.pi * 0.3 / 40) ** 2, rtol=1e-9)
     np.testing.assert_allclose([x, y], 0.5, rtol=1e-9)
     assert "points of ring outside the domain left out" in run_interpreted(script.format(0.8)).err
+
+
+NEXT_TO_IT = """
+method(ulmpm, FLIP, linear, 1)
+dimension(1, 0, 10, 0.5)
+region(bar, block, 1, 2)
+material(m, myfluid.ElasticFluid, 3, 100)
+solid(bar, region, bar, 2, m, 0.5)
+fix(start, initial_velocity_particles, all, 2)
+fix(air, mydrag.Drag, all, 0.5)
+compute(v, average_velocity, all)
+set_dt(0.01)
+log_modify(custom, time, v_x)
+run(20)
+"""
+
+
+def test_classes_next_to_the_script_are_styles(tmp_path, site):
+    """v = v0 exp(-c t). Another folder has another class of that name; `help` finds both."""
+    for factor, name in ((1, "one"), (2, "two")):
+        (folder := tmp_path / name).mkdir()
+        for file, target in (("elastic_fluid", "myfluid"), ("drag", "mydrag")):
+            text = (PLUGIN / "src" / "mpm_examples" / f"{file}.py").read_text("utf-8")
+            text = text.replace("-self.rate", f"-{factor} * self.rate")
+            (folder / f"{target}.py").write_text(text, "utf-8")
+        (folder / "in.file").write_text(NEXT_TO_IT, "utf-8")
+        sim = Simulation(folder / "in.file")
+        sim.run()
+        exact = 2 * np.exp(-0.5 * factor * sim.log["Time"])
+        np.testing.assert_allclose(sim.log["v_x"], exact, rtol=1e-9)
+    helped = karamelo_py(site, folder, "help", "fix", "mydrag.Drag")
+    assert "rate" in helped.stdout and "from the module mydrag" in helped.stdout
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ("mydrag.Dreg", "mydrag.Dreg' of the module mydrag cannot be loaded: AttributeError"),
+        ("mydrog.Drag", "there is no mydrog.py next to the script"),
+    ],
+)
+def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
+    (tmp_path / "mydrag.py").write_text("class Drag:\n    pass\n", "utf-8")
+    script = NEXT_TO_IT.replace("mydrag.Drag", wrong).replace("myfluid.ElasticFluid", "linear")
+    (tmp_path / "in.file").write_text(script.replace("3, 100", "3, 100, 0"), "utf-8")
+    done = karamelo_py(site, tmp_path, "in.file")
+    assert done.returncode == 1 and said in done.stderr and "in.file:8" in done.stderr

@@ -5,6 +5,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from pathlib import Path
 
 from karamelo_py.language import registry, rules
 from karamelo_py.language.help import Help, describe
@@ -78,7 +79,8 @@ def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
     """Explain a name, or a family and a name; return the exit status."""
     if len(given) == 2 and (family := _singular(given[0])) in families():
         try:
-            return _explain(family, given[1])
+            with registry.modules_of(Path.cwd()):
+                return _explain(family, given[1])
         except ScriptError as error:
             if error.hint or not _about(" ".join(given)):
                 raise

@@ -210,7 +210,8 @@ class Interpreter:
         depth = len(self.frames)
         done = len(self.record.statements)
         try:
-            self._execute_recorded(statement)
+            with registry.modules_of(self.folder.absolute()):
+                self._execute_recorded(statement)
         except Pause:
             self.record.forget_from(done)
             raise

@@ -5,11 +5,18 @@ A package offers a style with a line in its pyproject.toml, for example::
     [project.entry-points."karamelo_py.fix"]
     gravity = "my_package:Gravity"
 
+A script names a class of a module next to it, or of an installed one, as ``module.Class``.
+
 Nothing is imported before it is used.
 """
 
+import re
+import sys
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
+from importlib.machinery import PathFinder
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
@@ -19,6 +26,8 @@ from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant, one
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"
+
+_CLASS = re.compile(r"([^\W\d]\w*)(?:\.[^\W\d]\w*)*\.([^\W\d]\w*)")
 
 _loaded: dict[tuple[str, str], Any] = {}
 
@@ -46,7 +55,7 @@ def _origin(entry: EntryPoint) -> str:
     if entry.dist is not None:
         return f"{entry.dist.name} {entry.dist.version}"
     built_in = entry.value.startswith(PREFIX)
-    return f"karamelo-py {__version__}" if built_in else "an unknown package"
+    return f"karamelo-py {__version__}" if built_in else f"the module {entry.module}"
 
 
 def families() -> list[str]:
@@ -61,7 +70,37 @@ def names(family: str) -> list[str]:
 
 def knows(family: str, name: str) -> bool:
     """Tell if `family` has a style of this name (which may be broken)."""
-    return name in _families().get(family, {})
+    return name in _families().get(family, {}) or _of_module(family, name) is not None
+
+
+@contextmanager
+def modules_of(folder: Path) -> Iterator[None]:
+    """Import modules of this folder before others, within the context."""
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+
+
+def _of_module(family: str, name: str) -> EntryPoint | None:
+    """Return the entry point of ``module.Class``, if the module can be found."""
+    dotted = _CLASS.fullmatch(name)
+    if not dotted or not forget_other(dotted[1]):
+        return None
+    module, _, of_module = name.rpartition(".")
+    return EntryPoint(name, f"{module}:{of_module}", PREFIX + family)
+
+
+def forget_other(module: str) -> bool:
+    """Forget a module of this name that a script in another folder has imported.
+
+    Returns whether there is a module of this name.
+    """
+    spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
+    if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
+        del sys.modules[module]
+    return spec is not None
 
 
 def name_of(family: str, style: type) -> str:
@@ -87,7 +126,8 @@ def find(family: str, name: str) -> Any:
         If there is no such style, it cannot be imported, or two packages offer it.
     """
     key = family, name
-    if key not in _loaded:
+    of_module = _of_module(family, name)
+    if of_module or key not in _loaded:
         entries = _entries(family, name)
         if len(entries) > 1:
             raise ScriptError(
@@ -106,7 +146,9 @@ def find(family: str, name: str) -> Any:
             raise ScriptError(
                 f"{family} '{name}' of {package} cannot be loaded: {what}",
                 name=name,
-                hint=f"reinstall or repair {package.split()[0]}; it names {entry.value}",
+                hint=None
+                if of_module
+                else f"reinstall or repair {package.split()[0]}; it names {entry.value}",
             ) from error
     return _loaded[key]
 
@@ -126,10 +168,14 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     styles = _families().get(family, {})
     if name in styles:
         return styles[name]
+    if of_module := _of_module(family, name):
+        return [of_module]
     hint = instead(family, name) or meant(name, styles)
     others = [other for other in families() if other != "command" and knows(other, name)]
     if hint is None and others:
         hint = f"'{name}' is a style of {' and of '.join(others)}"
+    if hint is None and (dotted := _CLASS.fullmatch(name)):
+        hint = f"there is no {dotted[1]}.py next to the script, nor an installed module {dotted[1]}"
     raise ScriptError(
         f"unknown {family if family == 'command' else family + ' style'} '{name}'",
         code="unknown-style",

@@ -13,6 +13,7 @@ import numpy as np
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.hooks import ACTS_ON, STAGES
 from karamelo_py.language.faults import KNOWN, cause_of, place_in, steps_to
+from karamelo_py.language.registry import forget_other
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.group import AnyGroup, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -43,30 +44,23 @@ class PythonFunction:
         no_file = (
             f"a function f of the file {module}.py is {module}.f" if function == "py" else None
         )
+        folder = hub.interpreter.folder.absolute()
         if not module:
             raise ScriptError(
                 f"'{name}' names no module",
                 place=argument.place,
                 expected="module.function, of a module next to the script or an installed one",
             )
-        folder = hub.interpreter.folder.absolute()
-        sys.path.insert(0, str(folder))
         try:
-            # Another script of this process may have had a different module of this name.
-            beside = folder / f"{module}.py"
-            known = getattr(sys.modules.get(module), "__file__", None)
-            if beside.is_file() and known != str(beside):
-                sys.modules.pop(module, None)
+            exists = forget_other(module.partition(".")[0])
             found = import_module(module)
         except FAILURES as error:
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}",
                 place=argument.place,
                 hint=no_file
-                or (None if beside.is_file() else f"{module}.py is not in {folder}, nor installed"),
+                or (None if exists else f"{module}.py is not in {folder}, nor installed"),
             ) from error
-        finally:
-            sys.path.pop(0)
         if not callable(getattr(found, function, None)):
             known = [key for key, value in vars(found).items() if callable(value)]
             close = nearest(function, known)
