@@ -121,7 +121,9 @@ def _operations(text):
 def _texts(script):
     from test_gpu import begun
 
-    from karamelo_py.compiler import gpu, loops, machine, trace
+    from karamelo_py.compiler import gpu
+    from karamelo_py.compiler.code import machine
+    from karamelo_py.compiler.trace import functions, kernels
     from karamelo_py.kernels.step import advance
     from karamelo_py.run.gpu import StepsOnCard
 
@@ -129,7 +131,7 @@ def _texts(script):
     hub, simulation = begun(script)
     arguments = simulation.step_kind, simulation.setup
     hooks = simulation._acting
-    files = loops.cache
+    files = kernels.cache
     found = []
     usual = machine.compile_text, files.machine_code, files.KernelFiles.kernel, gpu.text_of
 
@@ -153,11 +155,11 @@ def _texts(script):
     machine.compile_text = noted
     files.KernelFiles.kernel = lambda self, kinds, result, compiled: compiled()
     files.machine_code = lambda name, make: make()
-    trace.outdate_kernels()
+    functions.outdate_kernels()
     try:
         if not simulation.implicit and hasattr(hooks, "_fields"):
-            kinds = loops.plan_for((*arguments, hooks, 1)).types
-            loops.Kernel(advance.function).unit(kinds)
+            kinds = kernels.plan_for((*arguments, hooks, 1)).types
+            kernels.Kernel(advance.function).unit(kinds)
             gpu.text_of = text_of
             card = gpu.Emulator()
             card.loaded = lambda code: None
@@ -171,7 +173,7 @@ def _texts(script):
                 found.append(("no card", str(why)[:200]))
     finally:
         machine.compile_text, files.machine_code, files.KernelFiles.kernel, gpu.text_of = usual
-        trace.outdate_kernels()
+        functions.outdate_kernels()
     return sorted(found)
 
 

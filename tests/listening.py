@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from karamelo_py.compiler.loops import compilation
+from karamelo_py.compiler import compilation
 
 
 class Compiled:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import scalar
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.table import ACCELERATE, SUMS

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 from cuda.bindings import nvjitlink
 
-from karamelo_py.compiler import gpu
-from karamelo_py.compiler.argument_buffer import plan_for
-from karamelo_py.compiler.compile import index, shared
+from karamelo_py.compiler import gpu, index, shared
+from karamelo_py.compiler.code.arguments import plan_for
 from karamelo_py.kernels.equations.node_updates import at_node
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler.failing import Failure, noting
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel
+from karamelo_py.compiler.code.exceptions import Failure, noting
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 

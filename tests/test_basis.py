@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tensors import ALL_KINEMATICS, every_kinematics, flat
 
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel, shared
 from karamelo_py.points.basis import (
     affine_weight,
     blank,

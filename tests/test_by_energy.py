@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tensors import every_kinematics, flat
 
-from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.points.kinematics import Space, tensor
 from karamelo_py.points.laws import (

@@ -19,11 +19,12 @@ import pytest
 from listening import listening
 from numba import config
 
-from karamelo_py.compiler import cache, choices, machine
-from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.lowering import FunctionType
+from karamelo_py.compiler import files, kernel, point_function
+from karamelo_py.compiler.code import machine
+from karamelo_py.compiler.disk import cache
 from karamelo_py.compiler.threads import Threaded, shared_out
+from karamelo_py.compiler.trace import choices
+from karamelo_py.compiler.trace.lowering import FunctionType
 from karamelo_py.kernels.table import each_node
 from karamelo_py.output.console import Console
 from karamelo_py.run.timings import Timings
@@ -35,7 +36,7 @@ pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled"
 FILES = {
     "numbers_used.py": "HALF = 0.5\nUNUSED = 7\n",
     "helpers.py": """
-        from karamelo_py.compiler.compile import implements, shared
+        from karamelo_py.compiler import implements, shared
         import numbers_used
 
         @shared
@@ -58,8 +59,8 @@ FILES = {
         """,
     "loops.py": """
         from typing import NamedTuple
-        from karamelo_py.compiler.compile import implements, point_function
-        from karamelo_py.compiler.loops import kernel
+        from karamelo_py.compiler import implements, point_function
+        from karamelo_py.compiler import kernel
 
         class Pair(NamedTuple):
             first: float
@@ -126,7 +127,7 @@ FILES = {
         """,
     "program.py": """
         import warnings
-        from karamelo_py.compiler.loops import compilation
+        from karamelo_py.compiler import compilation
         from loops import Pair, total
         from disks import Disk
         from squares import Square
@@ -354,7 +355,7 @@ def refuse(*arguments, **keywords):
 def test_a_full_disk_or_a_forbidden_folder(tmp_path, monkeypatch, call):
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     told = []
-    with monkeypatch.context() as patched, cache.telling(told.append):
+    with monkeypatch.context() as patched, files.telling(told.append):
         patched.setattr(call, refuse)
         assert fresh()(Tag()) == 42
         assert fresh()(Tag()) == 42
@@ -392,7 +393,7 @@ def test_what_another_user_may_have_written_is_not_read(tmp_path, monkeypatch, w
     else:
         monkeypatch.setattr(os, "geteuid", lambda: 12345)
     told = []
-    with cache.telling(told.append):
+    with files.telling(told.append):
         assert fresh()(Tag()) == 42
     assert not (tmp_path / "harm").exists()
     assert len(told) == 1 and f"cannot be kept in {tmp_path / 'kernels'}" in told[0]
@@ -407,7 +408,7 @@ def test_the_folder_is_closed_to_others(tmp_path, monkeypatch):
     (tmp_path / "kernels").mkdir()
     (tmp_path / "kernels").chmod(0o777)
     told = []
-    with cache.telling(told.append):
+    with files.telling(told.append):
         assert fresh()(Tag()) == 42
         assert fresh()(Tag()) == 42
     assert told == []
@@ -426,7 +427,7 @@ def test_a_folder_that_is_gone_when_a_loop_is_compiled(tmp_path, monkeypatch):
 
     monkeypatch.setattr(machine, "compile_text", meanwhile)
     told = []
-    with cache.telling(told.append):
+    with files.telling(told.append):
         assert fresh()(Tag()) == 42
     assert len(told) == 1 and "cannot be kept in" in told[0]
 

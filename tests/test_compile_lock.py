@@ -11,10 +11,10 @@ import pytest
 from numba import config
 from test_cache import ALL, VALUES, Shapes, Tag, fresh
 
-from karamelo_py.compiler import cache, compile_lock
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.session import current
-from karamelo_py.compiler.trace import CannotCompile
+from karamelo_py.compiler import CannotCompile, files, kernel
+from karamelo_py.compiler.disk import lock as lock_module
+from karamelo_py.compiler.disk.lock import lock
+from karamelo_py.compiler.trace.session import session
 
 fcntl = pytest.importorskip("fcntl")
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled"
 HOLDS = """
 import sys
 from pathlib import Path
-from karamelo_py.compiler.compile_lock import lock
+from karamelo_py.compiler.disk.lock import lock
 with lock(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()
@@ -73,21 +73,21 @@ def test_a_process_that_is_killed_is_not_waited_for(path, holder):
     assert not is_free(path)
     holder.send_signal(getattr(signal, "SIGKILL", signal.SIGTERM))
     holder.wait()
-    with compile_lock.lock(path):
+    with lock(path):
         assert not is_free(path)
     assert not path.exists()
 
 
 def test_nobody_waits_for_ever(path, holder, monkeypatch):
     """A process that is stopped keeps its lock; others compile for themselves then."""
-    monkeypatch.setattr(compile_lock, "PATIENCE", 0.1)
-    monkeypatch.setattr(current(), "waits", True)
-    with compile_lock.lock(path):
+    monkeypatch.setattr(lock_module, "PATIENCE", 0.1)
+    monkeypatch.setattr(session, "waits", True)
+    with lock(path):
         """Another has it."""
     assert path.exists() and not is_free(path)
     # One that is stopped may hold several: nobody waits for each of them.
-    monkeypatch.setattr(compile_lock.time, "sleep", lambda seconds: pytest.fail("it waits again"))
-    with compile_lock.lock(path):
+    monkeypatch.setattr(lock_module.time, "sleep", lambda seconds: pytest.fail("it waits again"))
+    with lock(path):
         """Nor now."""
 
 
@@ -103,14 +103,14 @@ def test_where_there_are_no_locks_nobody_waits(tmp_path, monkeypatch, call, why)
         raise OSError(why, os.strerror(why))
 
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
-    files = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
-    with monkeypatch.context() as patched, cache.telling([].append):
+    opened = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
+    with monkeypatch.context() as patched, files.telling([].append):
         patched.setattr(call, refuse)
         assert fresh()(Tag()) == 42
-        with compile_lock.lock(tmp_path / "another" / "loop.lock"):
+        with lock(tmp_path / "another" / "loop.lock"):
             """Without it."""
-    if files:
-        assert len(os.listdir("/proc/self/fd")) == files
+    if opened:
+        assert len(os.listdir("/proc/self/fd")) == opened
 
 
 def test_what_cannot_be_compiled_is_no_lock_for_others(tmp_path, monkeypatch):

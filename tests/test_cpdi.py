@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from selection import parameters
 from states import final_hub, same_bits, state_of
 
-from karamelo_py.compiler.compile import accumulate
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.tuples import row
+from karamelo_py.compiler import kernel
+from karamelo_py.kernels.records import accumulate, row
 from karamelo_py.points.basis import (
     affine_weight,
     carried,

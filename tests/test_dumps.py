@@ -15,8 +15,7 @@ from hypothesis.extra.numpy import arrays
 from scenes import block
 from selection import parameters
 
-from karamelo_py.kernels import text
-from karamelo_py.output import files
+from karamelo_py.output import files, text
 from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import Place, ScriptError

@@ -17,8 +17,7 @@ from tensors import (
 )
 
 from karamelo_py.app.cli import main
-from karamelo_py.compiler import tuples
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler import real, tuples
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space, tr, von_mises

@@ -18,7 +18,7 @@ from scenes import block
 from test_heat import slab
 
 from karamelo_py import Simulation, SimulationError
-from karamelo_py.compiler.loops import address_of_python, caller_of, kernel
+from karamelo_py.compiler import address_of_python, caller_of, kernel
 from karamelo_py.kernels import touching
 from karamelo_py.styles.fixes import grip
 from karamelo_py.styles.fixes.grip import Grip, grip_for

@@ -7,9 +7,9 @@ import pytest
 from numba import config
 from selection import few
 
-from karamelo_py.compiler import cache
+from karamelo_py.compiler.disk import cache
 from karamelo_py.compiler.gpu import Emulator
-from karamelo_py.compiler.trace import forget
+from karamelo_py.compiler.trace.functions import forget
 from karamelo_py.kernels.arrays import arrays_of
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console

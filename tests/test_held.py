@@ -4,22 +4,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from llvmlite import binding as llvm
+from llvmlite import binding
 from numba import config, typeof
 
-from karamelo_py.compiler import argument_buffer, code, machine
+from karamelo_py.compiler import CannotCompile, at_hand, hold, kernel, llvm, noinline
+from karamelo_py.compiler.code import arguments, machine
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.held import at_hand, held_type, hold, is_held
-from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.session import current
-from karamelo_py.compiler.threads import (
-    Serial,
-    Threaded,
-    by_team,
-    new_team,
-    shared_out,
-)
-from karamelo_py.compiler.trace import CannotCompile
+from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
+from karamelo_py.compiler.trace.held import held_type, is_held
+from karamelo_py.compiler.trace.session import session
 
 
 class Pair(NamedTuple):
@@ -136,7 +129,7 @@ def test_memory_that_moves_is_noticed():
     if not config.DISABLE_JIT:
         with pytest.raises(ValueError, match="resize"):
             out.resize(100_000, refcheck=False)
-    argument_buffer.forget(out)
+    arguments.forget_array(out)
     out.resize(100_000, refcheck=False)
     out[:] = 0.0
     assert _of_python(mixed, 1, out)[1] == 100_000
@@ -156,10 +149,10 @@ def test_an_array_in_the_place_of_another():
         assert out[6] == k
         del out
     assert len(numbers) < 50  # Python has used numbers again
-    assert not numbers & current().arrays.keys()
+    assert not numbers & session.arrays.keys()
     one, other = np.zeros(8), np.zeros(8)
     _of_python(mixed, 1, one)
-    current().arrays[id(other)] = current().arrays[id(one)]  # as if nobody had told
+    session.arrays[id(other)] = session.arrays[id(one)]  # as if nobody had told
     _of_python(mixed, 2, other)
     assert (one[6], other[6]) == (1, 2)
     known = len(_of_python.units)
@@ -171,14 +164,14 @@ def test_an_array_in_the_place_of_another():
 
 @pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 def test_types_are_laid_as_llvm_lays_them():
-    data = llvm.create_target_data(str(machine._target().target_data))
+    data = binding.create_target_data(str(machine._target().target_data))
     inner = (Pair(np.full(1, 0.5), np.zeros(0)),)
     values = Mixed(True, np.float32(1), (3, (1, 2.0)), np.eye(2), None, np.int32(0), inner)
     for value in (values, setup(), (True, (True, 1.5)), (np.float32(1), np.int8(2))):
         for kind in (typeof(value), held_type(typeof(value))):
-            model = code.memory_type(kind)
+            model = llvm.memory_type(kind)
             model = getattr(model, "pointee", model)
-            end, aligned = argument_buffer._lay(model, 0, [])
+            end, aligned = arguments._lay(model, 0, [])
             size = -(-end // aligned) * aligned
             assert size == model.get_abi_size(data)
 

@@ -159,7 +159,7 @@ OPTIMISED = """
 import sys
 from pathlib import Path
 import numpy as np
-from karamelo_py.compiler import machine
+from karamelo_py.compiler.code import machine
 from karamelo_py.run import tiles
 from states import final_state
 assert machine.LEVEL == 3

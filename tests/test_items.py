@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from karamelo_py.compiler import kernel
 from karamelo_py.compiler.fields import addresses_of_rows, pick_items, put_items, rows_of_points
-from karamelo_py.compiler.loops import kernel
 
 SMALL, LARGE = np.int32(0), np.int64(0)
 

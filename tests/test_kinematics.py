@@ -28,8 +28,7 @@ from tensors import (
     vectors,
 )
 
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel, shared
 from karamelo_py.points.frames import Total, Updated, of_places_before
 from karamelo_py.points.kinematics import (
     Axisymmetric,

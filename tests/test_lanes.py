@@ -5,28 +5,17 @@ from math import log1p, sin
 import numpy as np
 import pytest
 
-from karamelo_py.compiler.compile import (
-    accumulate,
-    all_lanes,
-    beside,
-    fma,
-    of_present,
-    real,
-    shared,
-    where,
-)
+from karamelo_py.compiler import CannotCompile, all_lanes, fma, kernel, real, shared, where
 from karamelo_py.compiler.fields import field, load, load_vector, store
-from karamelo_py.compiler.lanes import EightLanes, FourLanes, group
-from karamelo_py.compiler.lanes.records import accumulate_affine
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler.lanes import EightLanes, FourLanes, beside, group, of_present
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
 from karamelo_py.compiler.threads import Serial
-from karamelo_py.compiler.trace import CannotCompile
-from karamelo_py.compiler.tuples import flat, nested_as, row
+from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.kernels.arrays import arrays_of, with_items
 from karamelo_py.kernels.equations import Task
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.equations.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
+from karamelo_py.kernels.records import accumulate, accumulate_affine, row
 from karamelo_py.kernels.sweep import OldWeights, Visit, context_of, sweep_points
 from karamelo_py.kernels.views import place_at
 from karamelo_py.language.interpreter import Interpreter
@@ -473,12 +462,12 @@ def _give_affine(array, at, weights, field, p):
     value, by_row, by_node = (
         tuple([of_present(p, field[3 * k + c, p]) for c in range(3)]) for k in range(3)
     )
-    accumulate_affine(array, nodes, 1, given, value, (by_row, by_node))
-    accumulate_affine(array, nodes, 4, given, value[:2], ())
+    accumulate_affine(array, nodes, 1, given, (value, (by_row, by_node)))
+    accumulate_affine(array, nodes, 4, given, (value[:2], ()))
     # More than the widest register takes: eleven, and nine that do not grow.
     wide, along, across = (3 * part + part[:2] for part in (value, by_row, by_node))
-    accumulate_affine(array, nodes, 8, given, wide, (along, across))
-    accumulate_affine(array, nodes, 20, given, 3 * value, ())
+    accumulate_affine(array, nodes, 8, given, (wide, (along, across)))
+    accumulate_affine(array, nodes, 20, given, (3 * value, ()))
 
 
 @kernel
@@ -511,11 +500,11 @@ def test_affine_fields_at_the_nodes(real_type, give):
         first = at[p] if give is _give_affine_in_lanes else at[0]
         nodes = [first + k // 3 * 7 + k % 3 for k in range(9)]
         value, *slopes = field[:3, p], field[3:6, p], field[6:, p]
-        accumulate_affine(expected, nodes, 1, weights[:, p], value, slopes)
-        accumulate_affine(expected, nodes, 4, weights[:, p], value[:2], ())
+        accumulate_affine(expected, nodes, 1, weights[:, p], (value, slopes))
+        accumulate_affine(expected, nodes, 4, weights[:, p], (value[:2], ()))
         wide, *growths = (np.append(np.tile(part, 3), part[:2]) for part in (value, *slopes))
-        accumulate_affine(expected, nodes, 8, weights[:, p], wide, growths)
-        accumulate_affine(expected, nodes, 20, weights[:, p], np.tile(value, 3), ())
+        accumulate_affine(expected, nodes, 8, weights[:, p], (wide, growths))
+        accumulate_affine(expected, nodes, 20, weights[:, p], (np.tile(value, 3), ()))
     np.testing.assert_allclose(array, expected, rtol=0, atol=200 * np.finfo(real_type).eps)
 
 

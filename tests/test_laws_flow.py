@@ -8,8 +8,8 @@ from laws import isochoric, mises, pressure_of, start, stress, stretched
 from tensors import every_kinematics, flat
 
 from comparisons.results import read_log
+from karamelo_py.compiler import kernel
 from karamelo_py.compiler.formula import CONSTANT, POINT
-from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on, law_table

@@ -17,10 +17,10 @@ from karamelo_py.advice.suggestions import _output as output
 from karamelo_py.advice.suggestions import _precision as precision
 from karamelo_py.advice.suggestions import suggestions
 from karamelo_py.app.cli import main
-from karamelo_py.compiler import cache
-from karamelo_py.compiler.choices import classes_in
+from karamelo_py.compiler import classes_in
+from karamelo_py.compiler.disk import cache
 from karamelo_py.compiler.fields import name_of, rows_of_points, some_points
-from karamelo_py.compiler.trace import PointFunction, forget, outdate_kernels
+from karamelo_py.compiler.trace.functions import PointFunction, forget, outdate_kernels
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance

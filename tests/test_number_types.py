@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler.algebra import algebra, on_numbers
-from karamelo_py.compiler.compile import fma, implements, real, shared, where
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import algebra, fma, implements, kernel, on_numbers, real, shared, where
 from karamelo_py.compiler.powers import logarithm, logarithm_near_one
 from karamelo_py.points.kinematics import PlaneStrain, Space
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress

@@ -9,8 +9,7 @@ import pytest
 from numba import config
 
 from karamelo_py import Simulation, SimulationError
-from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel, point_function
 
 pytestmark = pytest.mark.xdist_group("disks")
 compiled = pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")

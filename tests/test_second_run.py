@@ -11,7 +11,7 @@ from conftest import INPUTS
 from test_identical import crossing
 from verification import LINEAR
 
-from karamelo_py.compiler import cache
+from karamelo_py.compiler import files
 
 # Each scene compiles what other tests of its group compile too.
 SCENES = {
@@ -59,9 +59,9 @@ def test_the_second_run_compiles_nothing(tmp_path, name):
         assert done.returncode == 0, done.stderr
         return done.stdout + done.stderr
 
-    lend(cache.folder(), own / "kernels")
+    lend(files.folder(), own / "kernels")
     run()
-    lend(own / "kernels", cache.folder())
+    lend(own / "kernels", files.folder())
     kept = kernels(own / "kernels")
     assert kept
     said = run()

@@ -9,9 +9,7 @@ import pytest
 from numba import config
 from selection import parameters
 
-from karamelo_py.compiler.algebra import on_numbers
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel, on_numbers, shared
 from karamelo_py.compiler.slopes import Dual, NoSlope, seeded, slopes_of
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, large
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress

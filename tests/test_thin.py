@@ -7,7 +7,7 @@ import pytest
 from conftest import INPUTS
 from scipy.optimize import brentq
 
-from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler import on_numbers
 from karamelo_py.kernels.implicit import nominal_stress, stress_and_tangent
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, large
 from karamelo_py.points.laws import (

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numba import config
 
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel, shared
 from karamelo_py.compiler.threads import Serial, Threaded, by_team, new_team, shared_out
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

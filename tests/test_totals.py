@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel
 from karamelo_py.kernels.totals import LIMBS, add_many, add_to, rounded
 
 numbers = some.lists(some.floats(-1e300, 1e300), max_size=30)

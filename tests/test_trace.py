@@ -10,12 +10,22 @@ import pytest
 from listening import listening
 from numba import config, typeof, types
 
-from karamelo_py.compiler.compile import fma, implements, point_function, real, shared, where
-from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import address_of, kernel, written
-from karamelo_py.compiler.lowering import Lowering
-from karamelo_py.compiler.trace import CannotCompile, forget
-from karamelo_py.compiler.values import in_one
+from karamelo_py.compiler import (
+    CannotCompile,
+    address_of,
+    fma,
+    hold,
+    implements,
+    kernel,
+    point_function,
+    real,
+    shared,
+    where,
+)
+from karamelo_py.compiler.trace.functions import forget
+from karamelo_py.compiler.trace.kernels import written
+from karamelo_py.compiler.trace.lowering import Lowering
+from karamelo_py.compiler.trace.values import in_one
 from karamelo_py.language.faults import cause_of, place_in
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")

@@ -7,7 +7,7 @@ import pytest
 from numba import config, typeof
 
 from karamelo_py.compiler.fields import rows_of_points
-from karamelo_py.compiler.held import held_type
+from karamelo_py.compiler.trace.held import held_type
 from karamelo_py.kernels.arrays import known_to_laws
 from karamelo_py.kernels.export import export, export_state
 from karamelo_py.kernels.sorting import sort_points

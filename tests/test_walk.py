@@ -7,11 +7,8 @@ import pytest
 from listening import listening
 from numba import config
 
-from karamelo_py.compiler import statements
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.trace import CannotCompile
+from karamelo_py.compiler import CannotCompile, hold, kernel, noinline, shared
+from karamelo_py.compiler.trace import statements
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 

@@ -35,11 +35,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.code import I64
-from karamelo_py.compiler.compile import implements, index, real, where
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.llvm import I64
+from karamelo_py.compiler.trace.primitives import implements, index, real, where
+from karamelo_py.compiler.trace.values import intrinsic
 from karamelo_py.compiler.tuples import count_in, flat, nested_as
-from karamelo_py.compiler.values import intrinsic
 
 LINE = 64  # bytes per cache line
 
@@ -175,7 +175,6 @@ def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def _start(kind: type, kin: Any, real: type) -> np.ndarray:
-    """The initial value, one number or one per component."""
     start = getattr(kind, "start", 0.0)
     return np.array(start(kin) if callable(start) else [start], real)
 
@@ -290,8 +289,8 @@ def _row_in_kernels(address, like, count):
     row = types.Array(like, 1, "C")
 
     def codegen(builder, place, _, size):
-        data = builder.inttoptr(place, code.memory_type(like).as_pointer())
-        return code.make_array(builder, row, data, [size], [I64(like.bitwidth // 8)])
+        data = builder.inttoptr(place, llvm.memory_type(like).as_pointer())
+        return llvm.make_array(builder, row, data, [size], [I64(like.bitwidth // 8)])
 
     return row(types.int64, like, types.int64), codegen
 

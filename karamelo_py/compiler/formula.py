@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
+from karamelo_py.compiler.trace.kernels import caller_of, kernel, noinline
 
 BLOCK = 128
 MAX_DEPTH = 32
@@ -39,18 +39,15 @@ class Program(NamedTuple):
 
 @noinline
 def _copy(n, a, b):
-    """Copy the first `n` numbers of `b` to `a`."""
     a[:n] = b[:n]
 
 
 @noinline
 def _fill(n, a, value):
-    """Set the first `n` numbers of `a` to a value."""
     a[:n] = value
 
 
 def _select(n, a, b, c):
-    """Replace the first `n` numbers of `a` by `b`, or by `c` where they are 0."""
     for i in range(n):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
@@ -63,7 +60,6 @@ _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 
 @noinline
 def _unary(op, n, a):
-    """Replace the first `n` numbers of `a` by a function of them."""
     for number, do in _UNARY_LOOPS:
         if op == number:
             for i in range(n):
@@ -75,7 +71,6 @@ def _unary(op, n, a):
 
 @noinline
 def _binary(op, n, a, b):
-    """Replace the first `n` numbers of `a` by `op` of `a` and `b`."""
     for number, do in _BINARY_LOOPS:
         if op == number:
             for i in range(n):

@@ -19,15 +19,17 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import cache, code, machine
-from karamelo_py.compiler.argument_buffer import ArgumentBuffer, plan_for
-from karamelo_py.compiler.choices import INTERPRETED, modules_noted, modules_of, note
-from karamelo_py.compiler.code import I32, I64
-from karamelo_py.compiler.compile import implements
-from karamelo_py.compiler.loops import ENTRY, NAME, compilation, items_at, written
-from karamelo_py.compiler.session import current
-from karamelo_py.compiler.trace import formula
-from karamelo_py.compiler.values import in_one, intrinsic
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import machine
+from karamelo_py.compiler.code.arguments import ArgumentBuffer, plan_for
+from karamelo_py.compiler.disk import cache
+from karamelo_py.compiler.llvm import I32, I64
+from karamelo_py.compiler.trace.choices import INTERPRETED, modules_noted, modules_of, note
+from karamelo_py.compiler.trace.functions import traced
+from karamelo_py.compiler.trace.kernels import ENTRY, NAME, compilation, items_at, written
+from karamelo_py.compiler.trace.primitives import implements
+from karamelo_py.compiler.trace.session import session
+from karamelo_py.compiler.trace.values import in_one, intrinsic
 
 THREADS = 128  # per block
 USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # NVIDIA's default
@@ -55,7 +57,7 @@ def counted(array: np.ndarray, i: int, step: int) -> int:
 @intrinsic
 def _counted(array, i, step):
     def codegen(builder, table, i, step):
-        at = code.item_pointer(builder, array, table, (i,))
+        at = llvm.item_pointer(builder, array, table, (i,))
         return builder.atomic_rmw("add", at, step, "monotonic")
 
     return array.dtype(array, types.int64, array.dtype), codegen
@@ -64,7 +66,7 @@ def _counted(array, i, step):
 @intrinsic
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
-        at = code.item_pointer(builder, array, table, (i,))
+        at = llvm.item_pointer(builder, array, table, (i,))
         # Bits of non-negative floats are ordered like the numbers.
         bits = builder.bitcast(number, I64)
         builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
@@ -96,14 +98,14 @@ def aligned_record(array, i, count):
     together = max(1, min(16 // size, count.literal_value))
 
     def codegen(builder, table, i, _):
-        kind = ir.VectorType(code.register_type(array.dtype), together)
-        place = code.item_pointer(builder, array, table, (i, I64(0)))
+        kind = ir.VectorType(llvm.register_type(array.dtype), together)
+        place = llvm.item_pointer(builder, array, table, (i, I64(0)))
         place = builder.bitcast(place, kind.as_pointer())
         numbers = []
         for k in range(count.literal_value // together):
             found = builder.load(builder.gep(place, [I64(k)]), align=size * together)
             numbers += [builder.extract_element(found, I32(lane)) for lane in range(together)]
-        return code.make_tuple(builder, result, numbers)
+        return llvm.make_tuple(builder, result, numbers)
 
     return result(array, types.int64, count), codegen
 
@@ -120,7 +122,7 @@ def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) ->
     """Write a loop over the work of all threads."""
     entry, builder = _entry(module)
     items = items_at(builder, kinds[1:], entry.args[0])
-    with code.counted(builder, entry.args[1]) as i:
+    with llvm.counted(builder, entry.args[1]) as i:
         builder.call(main, [i, *items])
     builder.ret_void()
 
@@ -131,7 +133,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     entry.calling_convention = "ptx_kernel"
 
     def special(name: str) -> Any:
-        asked = code.external(builder, f"llvm.nvvm.read.ptx.sreg.{name}", I32, [])
+        asked = llvm.external(builder, f"llvm.nvvm.read.ptx.sreg.{name}", I32, [])
         return builder.zext(builder.call(asked, []), I64)
 
     i = builder.add(builder.mul(special("ctaid.x"), special("ntid.x")), special("tid.x"))
@@ -152,7 +154,6 @@ _MATHEMATICS = {
 
 
 def _of_nvidia(name: str) -> str | None:
-    """Return NVIDIA's counterpart of a function of LLVM or C."""
     if name == "karamelo_gamma":
         return "__nv_tgamma"
     plain = name.removeprefix("llvm.").removesuffix(".f64")
@@ -202,8 +203,7 @@ def numbers_of(function: Callable, arguments: tuple) -> int:
     """Count the numbers that a thread function returns for its further arguments."""
     kinds = plan_for(arguments).types
     with in_one({}):
-        found = formula(function, (*kinds, types.int64))
-    return len(found.result)
+        return len(traced(function, (*kinds, types.int64)).result)
 
 
 def assembled(text: str, processor: str) -> str:
@@ -224,7 +224,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 
 class Code(NamedTuple):
-    """Code of a thread function, like :class:`~karamelo_py.compiler.loops.Unit`."""
+    """Code of a thread function, like :class:`~karamelo_py.compiler.trace.kernels.Unit`."""
 
     name: str
     code: bytes  # empty if it is to be read from the disk
@@ -248,7 +248,7 @@ class _Coded:
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
         """Prepare the function for launches with arguments of these types."""
         called = called or {}
-        key = function, kinds, current().changes, *called.values()
+        key = function, kinds, session.changes, *called.values()
         if key not in self._known:
             code = self._found(function, kinds, called)
             self._load(code)
@@ -258,7 +258,6 @@ class _Coded:
         return self._known[key]
 
     def _found(self, function: Callable, kinds: tuple, called: dict) -> Code:
-        """Read code from the disk, or make it and write it there."""
         files = cache.KernelFiles(function, self._load, self.processor, *called.values())
         return files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
 
@@ -269,7 +268,6 @@ class _Coded:
             self._entries[code.name] = self.loaded(code._replace(code=content))
 
     def _compiled(self, function: Callable, kinds: tuple, called: dict) -> Code:
-        """Trace a function, and make the code that no file has."""
         with compilation(function.__name__), modules_noted() as modules:
             note(modules_of(function, *called.values()))
             name, text = text_of(function, kinds, self.on_card, called)

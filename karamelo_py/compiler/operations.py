@@ -5,9 +5,9 @@ import math
 import operator
 from collections.abc import Callable
 
-from karamelo_py.compiler.choices import INTERPRETED
-from karamelo_py.compiler.compile import implements
-from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.trace.choices import INTERPRETED
+from karamelo_py.compiler.trace.kernels import noinline
+from karamelo_py.compiler.trace.primitives import implements
 
 
 @noinline
@@ -60,7 +60,6 @@ def _power(a, b):
 
 
 def _truth(compare: Callable) -> Callable:
-    """Make a comparison that returns 1.0 or 0.0."""
 
     def truth(a, b):
         return 1.0 if compare(a, b) else 0.0

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.code import I32, Lanes
-from karamelo_py.compiler.compile import all_lanes, fma, implements, real, where
-from karamelo_py.compiler.values import OF_REALS, intrinsic
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.llvm import I32, Lanes
+from karamelo_py.compiler.trace.primitives import all_lanes, fma, implements, real, where
+from karamelo_py.compiler.trace.values import OF_REALS, intrinsic
 
 
 def logarithm(x: float) -> float:
@@ -52,12 +52,12 @@ class _Bits(NamedTuple):
 
 
 def _bits(kind: Any) -> _Bits:
-    scalar = code.scalar_of(kind)
+    scalar = llvm.scalar_of(kind)
     whole, short = ir.IntType(scalar.bitwidth), I32
     if isinstance(kind, Lanes):
         whole, short = (ir.VectorType(one, kind.width) for one in (whole, short))
     parts = (52, 1023) if scalar.bitwidth == 64 else (23, 127)
-    return _Bits(code.register_type(kind), whole, short, *parts)
+    return _Bits(llvm.register_type(kind), whole, short, *parts)
 
 
 def _constant(whole: ir.Type, value: int) -> ir.Constant:
@@ -78,7 +78,7 @@ def _taken_apart(x):
         m = builder.bitcast(builder.sub(bits, builder.shl(e, shift)), number)
         if mantissa == 52:
             e = builder.trunc(e, short)
-        return code.make_tuple(builder, made, [m, builder.sitofp(e, number)])
+        return llvm.make_tuple(builder, made, [m, builder.sitofp(e, number)])
 
     return made(x), codegen
 

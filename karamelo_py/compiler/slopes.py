@@ -11,10 +11,10 @@ from collections import namedtuple
 from collections.abc import Callable
 from typing import Any
 
-from karamelo_py.compiler.algebra import algebra
-from karamelo_py.compiler.compile import fma, implements, real, round_off, where
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
-from karamelo_py.compiler.values import is_literal, rebuilt
+from karamelo_py.compiler.trace.algebra import algebra
+from karamelo_py.compiler.trace.primitives import fma, implements, real, round_off, where
+from karamelo_py.compiler.trace.values import is_literal, rebuilt
 
 
 @algebra

@@ -24,15 +24,24 @@ import numpy as np
 from llvmlite import ir
 from numba import config, types
 
-from karamelo_py.compiler import code, machine
-from karamelo_py.compiler.choices import INTERPRETED
-from karamelo_py.compiler.code import I32, I64
-from karamelo_py.compiler.compile import implements, shared
-from karamelo_py.compiler.failing import failure_at, note
-from karamelo_py.compiler.held import HeldTuple, held_as, held_type
-from karamelo_py.compiler.loops import kernel, noinline
-from karamelo_py.compiler.trace import formula
-from karamelo_py.compiler.values import HeldValue, Value, in_kernels, intrinsic, now
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import machine
+from karamelo_py.compiler.code.exceptions import failure_at, note
+from karamelo_py.compiler.llvm import I32, I64
+from karamelo_py.compiler.trace.choices import INTERPRETED
+from karamelo_py.compiler.trace.functions import traced
+from karamelo_py.compiler.trace.held import HeldTuple, held_as, held_type
+from karamelo_py.compiler.trace.kernels import kernel, noinline
+from karamelo_py.compiler.trace.primitives import implements, shared
+from karamelo_py.compiler.trace.values import (
+    HeldValue,
+    Value,
+    builtin,
+    in_kernels,
+    in_one_module,
+    intrinsic,
+    now,
+)
 
 
 class Serial(NamedTuple):
@@ -43,6 +52,16 @@ class Threaded(NamedTuple):
     """All threads; `team` is the address of a team's shared memory (`new_team`)."""
 
     team: int = 0
+
+
+def many_threads() -> bool:
+    """Tell whether many threads may write to one number at a time: see `values.in_one`."""
+    return False
+
+
+@builtin(many_threads)
+def _many_threads(lowering: Any) -> bool:
+    return in_one_module()
 
 
 # --- shared memory words ----------------------------------------------------------------------
@@ -99,7 +118,7 @@ def pause(long):
 
     def codegen(builder, sleeps):
         def call(name, result, *numbers):
-            function = code.external(builder, name, result, [I32] * len(numbers))
+            function = llvm.external(builder, name, result, [I32] * len(numbers))
             builder.call(function, [I32(number) for number in numbers])
 
         with builder.if_else(sleeps) as (then, otherwise):
@@ -124,7 +143,7 @@ def add_among(array, i, j, value):
 @intrinsic
 def _add_among(array, i, j, value):
     def codegen(builder, table, i, j, number):
-        at = code.item_pointer(builder, array, table, (i, j))
+        at = llvm.item_pointer(builder, array, table, (i, j))
         builder.atomic_rmw("add", at, number, "monotonic")
 
     return types.none(array, types.int64, types.int64, types.int64), codegen
@@ -139,8 +158,6 @@ _SHARE_OUT = [ctypes.c_int64] * 6
 
 
 class _Pools(threading.local):
-    """The thread pools of a Python thread, by size."""
-
     def __init__(self) -> None:
         self.of = functools.cache(ThreadPoolExecutor)
 
@@ -193,7 +210,6 @@ class _Task(NamedTuple):
 
 
 def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
-    """Return the address of a separate function of `count` integers."""
     made = lowering.function(name, run, (types.intp,) * count, types.none)
     if getattr(made, "raises", False):
         lowering.builder.function.raises = True
@@ -204,17 +220,16 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
     """Store items; return the addresses of a function of them and an index, and of the items."""
     held = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
-    found = formula(function.seen, (*held, types.intp))
+    chosen = traced(function.seen, (*held, types.intp))
     there = held_as(lowering, items, held)
     if lowering.builder is None:
         return Value(types.intp, None), Value(types.intp, None)
-    task = _address(lowering, found.name, _Task(function.seen, held), 2)
+    task = _address(lowering, chosen.name, _Task(function.seen, held), 2)
     return task, Value(types.intp, lowering.builder.ptrtoint(there._value, I64))
 
 
 @intrinsic
 def _call(task, arguments, number):
-    """Call the task at an address."""
 
     def codegen(builder, task, *numbers):
         pointer = builder.inttoptr(task, _TASK.as_pointer())
@@ -241,13 +256,13 @@ def _do_part(task, arguments, begin, end):
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
     """Run a task for each index below `count`, by a thread pool (`_share_out`)."""
-    found = formula(_do_part, (types.intp,) * 4)
+    chosen = traced(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
-        part = _address(lowering, found.name, found.run, 4)
+        part = _address(lowering, chosen.name, chosen.run, 4)
         given = (count, part, task, arguments, threads)
         numbers = [lowering.lowered(number, types.intp) for number in given]
-        function = code.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
+        function = llvm.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
         builder.call(function, [*numbers, failure_at(builder)])
 
 
@@ -318,7 +333,6 @@ def _take_part(team, k):
 
 @noinline
 def _share(team, count, task, arguments):
-    """Run a loop on the team; called by its leader."""
     size = read(team + _SIZE)
     write(team + _TASK_AT, task)
     write(team + _ARGUMENTS, arguments)
@@ -357,7 +371,6 @@ def _serve(team, k):
 
 @noinline
 def _distribute(team, count, task, arguments):
-    """Run a loop on the active team, or else on a thread pool."""
     if team == 0:
         _in_parallel(count, task, arguments, 0)
     elif read(team + _STATE) != _LEADS:

@@ -3,8 +3,6 @@
 Comprehensions make lists, which Python interprets in two thirds of the time.
 """
 
-from karamelo_py.compiler.compile import Weighted, fma, shared
-
 
 def flat(nested):
     """The numbers of nested tuples in order."""
@@ -32,33 +30,9 @@ def count_in(nested):
     return sum([count_in(item) if isinstance(item, tuple) else 1 for item in nested])
 
 
-def put_at(array, i, first, values):
-    """array[i, first + k] = values[k]."""
-    for k, value in enumerate(values):
-        array[i, first + k] = value
-
-
-@shared
-def row(array, i, first, like):
-    """(array[i, first], ..., array[i, first + len(like) - 1])."""
-    if isinstance(i, Weighted):
-        total = [a - a for a in like]
-        for one, weight in zip(i.rows, i.weights, strict=True):
-            found = row(array, one, first, like)
-            total = [fma(weight, x, t) for x, t in zip(found, total, strict=True)]
-        return tuple(total)
-    return tuple([array[i, first + k] for k in range(len(like))])
-
-
 def record(table, i):
     """Row `i` of a NamedTuple of arrays: the same NamedTuple of scalars.
 
     Nested NamedTuples become NamedTuples of scalars, too.
     """
     return type(table)(*[record(c, i) if isinstance(c, tuple) else c[i] for c in table])
-
-
-def clear_first(array, i):
-    """Set the first number of row `i` of an array that may be absent (None) to zero."""
-    if array is not None:
-        array[i, 0] = 0

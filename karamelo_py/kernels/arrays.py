@@ -10,9 +10,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
+from karamelo_py.compiler import noinline
 from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
-from karamelo_py.compiler.loops import noinline
-from karamelo_py.compiler.tuples import row
+from karamelo_py.kernels.records import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import vector

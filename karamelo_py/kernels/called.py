@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from numba import types
 
+from karamelo_py.compiler import caller_of, kernel
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import caller_of, kernel
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points

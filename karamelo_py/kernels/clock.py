@@ -3,10 +3,8 @@
 from math import inf
 from typing import Any
 
-from karamelo_py.compiler.compile import index, real
+from karamelo_py.compiler import at_hand, index, kernel, real
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag

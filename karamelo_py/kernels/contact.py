@@ -29,8 +29,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler import kernel, noinline
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum, vector_at
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node

@@ -2,11 +2,10 @@
 
 from typing import Any
 
-from karamelo_py.compiler.compile import index
+from karamelo_py.compiler import at_hand, index, kernel
 from karamelo_py.compiler.fields import load, store
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.tuples import put_at, record, row
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.records import put_at, row
 from karamelo_py.kernels.views import deformation_of, place_at, state_at
 from karamelo_py.points import laws as law_functions
 from karamelo_py.points.basis import entry, locate, reach, support

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index, real, where
+from karamelo_py.compiler import index, real, where
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.compiler.tuples import flat, nested_as, record

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import index
+from karamelo_py.compiler import index
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import ROWS, STACK
 from karamelo_py.compiler.gpu import counted, raise_to

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.arrays import Buffers, Nodes

@@ -9,11 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import caller_of, hold, kernel, noinline, point_function
 from karamelo_py.compiler.fields import field, load_vector
 from karamelo_py.compiler.formula import BLOCK, ROWS, STACK, call_evaluate
-from karamelo_py.compiler.held import hold
-from karamelo_py.compiler.loops import caller_of, kernel, noinline
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals

@@ -33,10 +33,11 @@ from typing import Any, NamedTuple
 
 from numba import types
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import field, load_vector, store, vector
-from karamelo_py.compiler.tuples import flat, put_at
+from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import volume_of
 
 _F8 = types.float64

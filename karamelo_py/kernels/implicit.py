@@ -12,10 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import config
 
-from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler import at_hand, kernel, on_numbers
 from karamelo_py.compiler.fields import load, rows_of_points, store
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record

@@ -4,8 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.choices import classes_in
-from karamelo_py.compiler.compile import implements, index
+from karamelo_py.compiler import classes_in, implements, index
 from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
 from karamelo_py.kernels.arrays import Index, Number, Tag
 from karamelo_py.kernels.equations.strain import Strain

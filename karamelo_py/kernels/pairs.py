@@ -9,9 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.kernels.views import state_at, volume_of
 from karamelo_py.points.bodies import NEW, MinimizePenetration, along, force_between, radius, rub

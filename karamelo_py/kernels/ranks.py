@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.loops import caller_of, kernel
+from karamelo_py.compiler import caller_of, kernel
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.sums import arrays_given
 from karamelo_py.kernels.sweep import sweep_blocks, visit_shares

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler import kernel, noinline
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.clock import kick

@@ -1,6 +1,6 @@
 """Friction of points on tools, one by one, in double precision."""
 
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import kernel
 from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.points.bodies import along, rub
 from karamelo_py.points.kinematics import zero_vector

@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import pick_items, put_items
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
 from karamelo_py.compiler.threads import by_team, by_threads, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number

@@ -3,14 +3,14 @@
 At once: moments along the arms of a stencil, affine sums, corners of domains.
 """
 
-from karamelo_py.compiler.compile import all_lanes, point_function, prefetch_records, real
+from karamelo_py.compiler import all_lanes, point_function, real
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.lanes.records import accumulate_affine
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.arrays import Tag, of_force
 from karamelo_py.kernels.equations.loss import EnergyLoss
 from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.lanes import OneByOne
+from karamelo_py.kernels.records import accumulate_affine, prefetch_records
 from karamelo_py.kernels.views import PointView, Work, node_of
 from karamelo_py.points import transfers
 from karamelo_py.points.basis import carried, entry, product, reach, support
@@ -48,7 +48,7 @@ def give_affine(lanes, w, stencil, parts):
     nodes, weights = tuple([node.i for node in seen]), tuple([node.N for node in seen])
     for array, first, value, growths in joined(lanes, w.kin, parts):
         value, growths = (*value,), tuple([(*growth,) for growth in growths])
-        accumulate_affine(array, nodes, first, weights, value, growths)
+        accumulate_affine(array, nodes, first, weights, (value, growths))
 
 
 def gathered_by_arms(w):

@@ -9,10 +9,8 @@ from collections.abc import Iterable
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import implements, real
+from karamelo_py.compiler import at_hand, implements, kernel, real
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel
 from karamelo_py.compiler.threads import by_team
 from karamelo_py.kernels import clock as clocks
 from karamelo_py.kernels import table

@@ -3,14 +3,12 @@
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import index
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.lanes.records import move_record
+from karamelo_py.compiler import at_hand, index
 from karamelo_py.compiler.threads import by_threads
-from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Buffers, Nodes, Tag
 from karamelo_py.kernels.equations import found
+from karamelo_py.kernels.records import move_record, put_at
 
 
 def adds(quantity: NamedTuple) -> bool:
@@ -58,7 +56,7 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
         array = found(nodes, name)
         if array is not None:
             like = (0,) * (end - first)
-            move_record(array, n, found(buffers, name), m, first, like, add or keep)
+            move_record((array, n), (found(buffers, name), m), first, like, add or keep)
 
 
 def _clear_record(quantities, kin, nodes, n):

@@ -13,9 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler import at_hand, noinline, point_function
 from karamelo_py.compiler.threads import Serial, by_threads
 from karamelo_py.points.kinematics import KINEMATICS, dot
 

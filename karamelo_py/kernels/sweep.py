@@ -10,19 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import (
+from karamelo_py.compiler import (
     all_lanes,
-    first_false_lane,
+    at_hand,
+    hold,
     index,
-    largest,
+    noinline,
     point_function,
     real,
     where,
 )
 from karamelo_py.compiler.fields import load, load_vector, store
-from karamelo_py.compiler.held import at_hand, hold
-from karamelo_py.compiler.lanes import room_for
-from karamelo_py.compiler.loops import noinline
+from karamelo_py.compiler.lanes import first_false_lane, largest, room_for
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels.arrays import Block, Index, Nodes, Number, Places, Points, Setup, Tag

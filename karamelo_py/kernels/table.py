@@ -11,10 +11,8 @@ F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler import kernel, point_function, real
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.clock import take_reports
@@ -23,6 +21,7 @@ from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain, Normal
 from karamelo_py.kernels.equations.move import Move
+from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.transfers import stores_moment

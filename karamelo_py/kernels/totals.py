@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import point_function
-from karamelo_py.compiler.loops import kernel, many_threads, noinline
-from karamelo_py.compiler.threads import add_among
+from karamelo_py.compiler import kernel, noinline, point_function
+from karamelo_py.compiler.threads import add_among, many_threads
 
 LIMBS = 68
 LOST = LIMBS - 1  # counts terms that are NaN or infinite

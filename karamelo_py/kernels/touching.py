@@ -9,10 +9,8 @@ from typing import NamedTuple
 
 from numba import types
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import caller_of, importable, noinline, point_function
 from karamelo_py.compiler.fields import field, load_vector, store
-from karamelo_py.compiler.loops import caller_of, noinline
-from karamelo_py.compiler.session import importable
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.surfaces import depth, slopes

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.algebra import algebra
-from karamelo_py.compiler.compile import Weighted, index, prefetch
+from karamelo_py.compiler import algebra, index
 from karamelo_py.compiler.fields import field, load, load_vector
 from karamelo_py.compiler.gpu import aligned_record
-from karamelo_py.compiler.loops import many_threads
-from karamelo_py.compiler.tuples import count_in, record, row
+from karamelo_py.compiler.lanes import prefetch
+from karamelo_py.compiler.threads import many_threads
+from karamelo_py.compiler.tuples import count_in, record
 from karamelo_py.kernels.arrays import (
     Index,
     Nodes,
@@ -25,7 +25,9 @@ from karamelo_py.kernels.arrays import (
     of_change,
     vector_at,
 )
+from karamelo_py.kernels.records import row
 from karamelo_py.points.basis import affine_weight, blank, entry, reach, support
+from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.frames import DeformationGradient
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import vector, zero

@@ -6,8 +6,8 @@ mu times as large, and at most what stops the motion. The wall is at rest along 
 
 from math import sqrt
 
+from karamelo_py.compiler import noinline
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.loops import noinline
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, counts

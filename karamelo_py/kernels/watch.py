@@ -13,16 +13,15 @@ energy (`note_crossing`): a linear basis in the updated frame loses stress by th
 
 from math import exp, inf, sqrt
 
-from karamelo_py.compiler.compile import added, all_lanes, of_present, real
+from karamelo_py.compiler import all_lanes, at_hand, kernel, noinline, real
 from karamelo_py.compiler.fields import field, load_vector
-from karamelo_py.compiler.held import at_hand
-from karamelo_py.compiler.loops import kernel, noinline
+from karamelo_py.compiler.lanes import added, of_present
 from karamelo_py.compiler.threads import shared_out
-from karamelo_py.compiler.tuples import put_at
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.lanes import lanes_with, points_from
+from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import state_at
 from karamelo_py.points.basis.linear import PER_CELL
 from karamelo_py.points.kinematics import dot, free_from

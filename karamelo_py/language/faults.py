@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.compiler.trace import CannotCompile, Undefined, places_of
+from karamelo_py.compiler import CannotCompile, Undefined, places_of
 from karamelo_py.language import registry
 from karamelo_py.script.errors import FAILURES, Place, Quit, ScriptError
 

@@ -3,7 +3,7 @@
 from math import pi, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import Axisymmetric, dot
 

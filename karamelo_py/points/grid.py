@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real, where
+from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
 Length = Any  # of one grid, and counts; in the setup of a scene they are arrays of all grids

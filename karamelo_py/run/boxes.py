@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.argument_buffer import forget
+from karamelo_py.compiler import forget_array
 from karamelo_py.compiler.fields import records
 from karamelo_py.kernels.arrays import Buffers, Nodes, Setup
 from karamelo_py.kernels.heat import Conducting
@@ -149,12 +149,12 @@ def room_of(rows: int, like: np.ndarray) -> np.ndarray:
 def give_up(array: np.ndarray) -> None:
     """Release the memory of an unused array."""
     if array.flags.owndata:
-        forget(array)
+        forget_array(array)
         array.resize((0,) * array.ndim, refcheck=False)
 
 
 def grow(array: np.ndarray, rows: int) -> None:
     """Give an array at least `rows` rows, in place, since setups hold it."""
     if len(array) < rows:
-        forget(array)
+        forget_array(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import Dual, slopes_of
 from karamelo_py.language.arguments import Named
 from karamelo_py.output.files import savefig, whole

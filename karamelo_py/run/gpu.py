@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from karamelo_py.compiler.choices import INTERPRETED
+from karamelo_py.compiler import INTERPRETED
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of

@@ -7,8 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from karamelo_py.compiler import cache
-from karamelo_py.compiler.loops import compilation
+from karamelo_py.compiler import compilation, files
 from karamelo_py.scene.hub import Hub
 
 COMPILING = "Compiling the loops of this kind of scene, once (the next run starts at once) ..."
@@ -44,7 +43,7 @@ class Timings:
     def telling_of_compilation(self) -> Iterator[None]:
         """Say so when kernels are compiled, and count the time."""
         self._told = False
-        telling = cache.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
+        telling = files.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
         with compilation.told_to(self), telling:
             yield
 

@@ -9,8 +9,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from karamelo_py.compiler import Undefined, places_of
 from karamelo_py.compiler.fields import columns_of
-from karamelo_py.compiler.trace import Undefined, places_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.heat import Supply
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces

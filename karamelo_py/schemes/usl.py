@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler import real
 from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.equations.node_updates import SquaredMass, UpdateToVelocity
 from karamelo_py.kernels.equations.strain import Strain

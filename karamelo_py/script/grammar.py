@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.compiler import cache
+from karamelo_py.compiler import files
 from karamelo_py.script import syntax
 from karamelo_py.script.syntax import Mistake
 
@@ -40,10 +40,10 @@ def parser_of(start: str) -> Any:
     text = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
     # The tables contain only numbers and strings, so that their bytes create no other objects.
     stamp = hashlib.sha256(f"{lark.__version__} {sys.version} {text}".encode()).hexdigest()[:24]
-    path = cache.folder().with_name("parsers") / f"{start}-{stamp}.tables"
+    path = files.folder().with_name("parsers") / f"{start}-{stamp}.tables"
     with suppress(OSError, ValueError, EOFError, TypeError):
         return lark.Lark._load_from_dict(
-            *marshal.loads(cache.read(path)), transformer=_TreeBuilder()
+            *marshal.loads(files.read(path)), transformer=_TreeBuilder()
         )
     made = lark.Lark(
         text, parser="lalr", start=start, keep_all_tokens=True, maybe_placeholders=False,
@@ -52,7 +52,7 @@ def parser_of(start: str) -> Any:
     data, memo = made.memo_serialize([TerminalDef, Rule])
     data["options"].pop("transformer")
     with suppress(OSError, ValueError):
-        cache.write(path, marshal.dumps((data, memo)))
+        files.write(path, marshal.dumps((data, memo)))
     return made
 
 

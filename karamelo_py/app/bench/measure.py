@@ -13,8 +13,7 @@ import numpy as np
 from numba import config
 
 from karamelo_py.app.launch import share
-from karamelo_py.compiler.compile import index
-from karamelo_py.compiler.loops import kernel
+from karamelo_py.compiler import index, kernel
 from karamelo_py.compiler.threads import Serial, Threaded, new_team, shared_out
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, Fused, StepKind, begin, step

@@ -10,11 +10,13 @@ from itertools import groupby
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import accumulate, of_present, point_function, real
+from karamelo_py.compiler import point_function, real
 from karamelo_py.compiler.fields import SummedField, field, scalar, vector
+from karamelo_py.compiler.lanes import of_present
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Nodes, Number, Tag, of_force
+from karamelo_py.kernels.records import accumulate
 from karamelo_py.kernels.views import NodeView, PointView, Work, node_of
 from karamelo_py.points import laws
 from karamelo_py.points.basis import reach

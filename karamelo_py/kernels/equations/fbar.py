@@ -7,11 +7,11 @@ methods", eq. 23; there over the points of a cell).
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import fma, real
+from karamelo_py.compiler import fma, real
 from karamelo_py.compiler.fields import Field, StepField, SummedField, field, pair
-from karamelo_py.compiler.tuples import row
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.records import row
 from karamelo_py.points import laws
 from karamelo_py.points.frames import force_stress, scaled_increment
 from karamelo_py.points.kinematics import I, nothing

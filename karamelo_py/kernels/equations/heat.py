@@ -6,8 +6,9 @@ Guilkey 2007 for points with gradients; Tao et al. 2016, "A generalized interpol
 method for coupled thermo-mechanical processes", for heat.
 """
 
-from karamelo_py.compiler.compile import fma, of_present, real, round_off, where
+from karamelo_py.compiler import fma, real, round_off, where
 from karamelo_py.compiler.fields import Field, StepField, pair, scalar, store, vector
+from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.arrays import of_force
 from karamelo_py.kernels.equations.fbar import NodalMean

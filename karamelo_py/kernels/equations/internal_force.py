@@ -3,8 +3,9 @@
 In the total frame with reference volume, first Piola-Kirchhoff stress and reference gradients.
 """
 
-from karamelo_py.compiler.compile import of_present, real
+from karamelo_py.compiler import real
 from karamelo_py.compiler.fields import Field, StepField, vector
+from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.fbar import FBar, NodalStress, mean_stress
 from karamelo_py.points import laws

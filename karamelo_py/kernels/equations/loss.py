@@ -22,12 +22,12 @@ are mapped differently after a move (not with splines), and that usl strains by 
 from collections import namedtuple
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, round_off, where
+from karamelo_py.compiler import real, round_off, where
 from karamelo_py.compiler.fields import StepField, SummedField, field, load, scalar, store, triple
-from karamelo_py.compiler.tuples import clear_first
 from karamelo_py.kernels.arrays import MASS, of_momentum, vector_at
 from karamelo_py.kernels.equations import whole
 from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.records import clear_first
 from karamelo_py.points import laws, transfers
 from karamelo_py.points.transfers.xpic import Reflected, Series
 

@@ -1,7 +1,7 @@
 """Mass and momentum of nodes: m_i = sum_p N_ip m_p, (m v)_i = sum_p N_ip m_p v_p(X_i)."""
 
-from karamelo_py.compiler.compile import of_present
 from karamelo_py.compiler.fields import SummedField, field, vector
+from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.loss import BROUGHT, energy_of
 from karamelo_py.kernels.equations.node_updates import SquaredMass

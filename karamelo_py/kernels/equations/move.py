@@ -2,7 +2,7 @@
 
 from math import inf, nan
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler import where
 from karamelo_py.compiler.fields import Field, forget, increase, store, vector
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations import Report, Task

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler import point_function, real
 from karamelo_py.compiler.fields import SummedField, field
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag

@@ -2,7 +2,7 @@
 
 from math import inf, sqrt
 
-from karamelo_py.compiler.compile import all_lanes, real, where
+from karamelo_py.compiler import all_lanes, real, where
 from karamelo_py.compiler.fields import store, store_from
 from karamelo_py.kernels.equations import Report, Task, fbar
 from karamelo_py.kernels.views import place_at

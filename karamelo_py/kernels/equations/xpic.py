@@ -3,7 +3,7 @@
 from collections import namedtuple
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler import real
 from karamelo_py.compiler.fields import field, store, vector
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq

@@ -13,7 +13,7 @@ A product of one function per direction only needs `along` and
 from math import inf
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.points.noise import Borne
 
 

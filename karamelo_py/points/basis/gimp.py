@@ -3,12 +3,13 @@
 from types import MappingProxyType
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, index
+from karamelo_py.compiler import index
 from karamelo_py.compiler.powers import power
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.product import Along, along, node_number, register, wide
+from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 

@@ -2,7 +2,8 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import beside, first_lane, is_one, point_function, real, where
+from karamelo_py.compiler import point_function, real, where
+from karamelo_py.compiler.lanes import beside, first_lane, is_one
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.grid import cells_along, in_cells

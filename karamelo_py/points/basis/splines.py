@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import all_lanes, point_function, where
+from karamelo_py.compiler import all_lanes, point_function, where
 from karamelo_py.points.basis import BasisTraits, first_node, product, walled
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC

@@ -22,8 +22,7 @@ from typing import NamedTuple
 
 from numba import config
 
-from karamelo_py.compiler.algebra import algebra
-from karamelo_py.compiler.compile import fma, real
+from karamelo_py.compiler import algebra, fma, real
 
 COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 

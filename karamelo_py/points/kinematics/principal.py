@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import implements, round_off, shared, where
+from karamelo_py.compiler import implements, round_off, shared, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.compiler.slopes import Dual, size_of, slopes_of, value_of
 from karamelo_py.points.kinematics import Space, dot

@@ -23,7 +23,7 @@ from collections import namedtuple
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, real
+from karamelo_py.compiler import point_function, real
 
 
 class LawTraits(NamedTuple):

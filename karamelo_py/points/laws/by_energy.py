@@ -9,16 +9,15 @@ stretches take points one by one.
 
 from collections import namedtuple
 from collections.abc import Sequence
+from hashlib import sha256
 from itertools import combinations
 from math import cos, cosh, isfinite, sin, sinh, sqrt, tan, tanh
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.cache import short_hash
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler import importable, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
-from karamelo_py.compiler.session import importable
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, total, tr
 from karamelo_py.points.kinematics.principal import PairLimits, from_principal, real_principal
@@ -210,7 +209,7 @@ def law_of(rho: float, energy: Expression) -> NamedTuple:
 
 def _class_of(kind: type, codes: dict, count: int) -> type:
     """The class of laws with these programs; a digest of them is its name."""
-    name = f"{kind.__name__}_{short_hash(repr((codes, count)))[:16]}"
+    name = f"{kind.__name__}_{sha256(repr((codes, count)).encode()).hexdigest()[:16]}"
 
     def made() -> type:
         fields = namedtuple(name, (*FIELDS, *[f"number{k}" for k in range(count)]))

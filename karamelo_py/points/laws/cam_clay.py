@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import implements, real, shared, where
+from karamelo_py.compiler import implements, real, shared, where
 from karamelo_py.compiler.powers import exponential as exp
 from karamelo_py.compiler.powers import logarithm as log
 from karamelo_py.compiler.slopes import Dual, value_of

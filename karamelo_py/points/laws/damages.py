@@ -7,7 +7,7 @@ equation of state and strength do not depend on it. Its memory is a tuple.
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import any_lane, point_function, where
+from karamelo_py.compiler import any_lane, point_function, where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation

@@ -9,7 +9,7 @@ from plug-ins, are chained (`karamelo_py.points.laws.further`).
 from math import log, sqrt
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler import where
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import known_failure, suggestion
 from karamelo_py.language.scene import Scene

@@ -8,7 +8,7 @@ from functools import reduce
 from math import sqrt
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, where
+from karamelo_py.compiler import point_function, where
 from karamelo_py.points import laws
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.strengths import equivalent_plastic_strain

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.points.kinematics.principal import exponential_of, logarithm_of
 
 

@@ -7,7 +7,7 @@ parts get as `heat`: () if the law has none.
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function, where
+from karamelo_py.compiler import point_function, where
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
 from karamelo_py.points.laws.parameters import check_temperatures

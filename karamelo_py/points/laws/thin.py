@@ -9,7 +9,7 @@ need no branches. The remaining stress enters the next step (de Borst 1991; Klin
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import real, where
+from karamelo_py.compiler import real, where
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, nothing
 

@@ -12,7 +12,7 @@ stored, only v is mapped.
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import Field, declared, planar
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import noise

@@ -8,7 +8,7 @@ angular momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler import where
 from karamelo_py.language.kinds import In
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import transfers

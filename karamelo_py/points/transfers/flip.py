@@ -4,7 +4,7 @@ from math import exp, pi
 from types import MappingProxyType
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler import real
 from karamelo_py.language.kinds import Constraint
 from karamelo_py.language.rules import gain, known_failure
 from karamelo_py.points import noise

@@ -4,7 +4,7 @@ import importlib.util
 from collections.abc import Iterator
 from typing import Any
 
-from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import declared
 from karamelo_py.compiler.slopes import NoSlope
 from karamelo_py.kernels.implicit import stress_and_tangent

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from karamelo_py.compiler.algebra import on_numbers
+from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import implicit as loops

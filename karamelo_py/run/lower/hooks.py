@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.choices import INTERPRETED
+from karamelo_py.compiler import INTERPRETED, address_of, address_of_python
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
-from karamelo_py.compiler.loops import address_of, address_of_python
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels import arrays, called
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup

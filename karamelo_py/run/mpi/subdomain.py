@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.compiler import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
-from karamelo_py.compiler.loops import address_of_python
 from karamelo_py.kernels import ranks
 from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, Setup
 from karamelo_py.kernels.ranks import Linked

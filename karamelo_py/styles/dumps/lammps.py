@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.text import rows
 from karamelo_py.output.files import continued, whole
+from karamelo_py.output.text import rows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
 

@@ -1,7 +1,7 @@
 """Memory of fixes for the points held by friction: see `points.bodies.rub`."""
 
+from karamelo_py.compiler import importable
 from karamelo_py.compiler.fields import Field, field
-from karamelo_py.compiler.session import importable
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.styles.fixes.formulas import judge_friction

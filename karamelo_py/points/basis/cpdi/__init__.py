@@ -14,12 +14,14 @@ from `CarriedDomain` and also defines `upright`.
 from math import inf
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import Weighted, beside, index, point_function, real, where
+from karamelo_py.compiler import index, point_function, real, where
+from karamelo_py.compiler.lanes import beside
 from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.product import digits, inverse_radius, item, node_number, with_hoop
+from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import cofactor, determinant, gradient, product, total, vector
 
@@ -118,7 +120,7 @@ class CornerStencil(NamedTuple):
 class AtCorners(NamedTuple):
     """Tag for code that uses weight or gradient of a node once, as a factor: corners as nodes.
 
-    A node number is then a :class:`~karamelo_py.compiler.compile.Weighted`.
+    A node number is then a `Weighted`.
     """
 
     basis: NamedTuple

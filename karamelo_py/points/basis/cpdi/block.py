@@ -7,7 +7,8 @@ are added to the nodes. In 3D this costs more than it saves: 27 nodes, eight cor
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, beside, first_lane, fma, is_one, shared
+from karamelo_py.compiler import all_lanes, fma, shared
+from karamelo_py.compiler.lanes import beside, first_lane, is_one
 from karamelo_py.points.basis import affine_weight, entry, reach, support
 from karamelo_py.points.basis.cpdi import CornerStencil, arm, solve
 from karamelo_py.points.basis.product import digits, item, node_number, with_hoop

@@ -1,6 +1,6 @@
 """Domains: parallelograms that deform with the point; elements whose corners move with the grid."""
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler import real
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis import cpdi
 from karamelo_py.points.kinematics import Space, cofactor, determinant, dot, total, vector

@@ -8,7 +8,7 @@ The memory is a tuple, empty for most. It has a `specific_volume`, like a law.
 
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.language.signature import Positive
 
 

@@ -3,7 +3,7 @@
 from math import inf, sqrt
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import round_off
+from karamelo_py.compiler import round_off
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive

@@ -3,7 +3,7 @@
 from math import inf, sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative, Positive

@@ -11,7 +11,7 @@ import sys
 from collections import namedtuple
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler.compile import point_function
+from karamelo_py.compiler import point_function
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import column
 

@@ -5,7 +5,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.compile import real
+from karamelo_py.compiler import real
 from karamelo_py.compiler.formula import CONSTANT, POINT, SPREAD, UNIFORM
 from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.language.arguments import Argument

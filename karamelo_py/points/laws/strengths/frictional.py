@@ -13,7 +13,7 @@ from functools import partial
 from math import asin, ceil, degrees, inf, log, radians, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import point_function, where
+from karamelo_py.compiler import point_function, where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import parameter

@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import (
+from karamelo_py.compiler import (
     any_lane,
     implements,
     point_function,

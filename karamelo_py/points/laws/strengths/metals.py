@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, NamedTuple
 
-from karamelo_py.compiler.compile import all_lanes, fma, real, round_off, where
+from karamelo_py.compiler import all_lanes, fma, real, round_off, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.language.rules import suggestion
 from karamelo_py.language.signature import NonNegative, Positive

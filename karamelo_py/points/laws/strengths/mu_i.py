@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.compile import where
+from karamelo_py.compiler import where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner

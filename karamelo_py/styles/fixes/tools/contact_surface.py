@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from karamelo_py.compiler.loops import address_of_python
+from karamelo_py.compiler import address_of_python
 from karamelo_py.kernels.touching import (
     ASIDE,
     CALL,

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler.compile import real, shared
+from karamelo_py.compiler import real, shared
 from karamelo_py.kernels.arrays import FINAL_INTEGRATE, INITIAL_INTEGRATE, MASS
 from karamelo_py.kernels.equations.node_updates import UpdateToVelocity
 from karamelo_py.kernels.equations.strain import Strain

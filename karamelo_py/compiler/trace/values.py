@@ -1,8 +1,4 @@
-"""Traced values: numbers, lanes, arrays and held tuples while a kernel is compiled.
-
-See :mod:`karamelo_py.compiler.trace`: Python runs a function on these, and every operation on one
-becomes code.
-"""
+"""Traced values: numbers, lanes, arrays and held tuples; every operation on one becomes code."""
 
 import contextvars
 import functools
@@ -15,8 +11,8 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.choices import choosers
-from karamelo_py.compiler.code import Lanes, scalar_of
+from karamelo_py.compiler.llvm import Lanes, scalar_of
+from karamelo_py.compiler.trace.choices import choosers, tag_class
 
 
 class Untraceable(BaseException):
@@ -26,13 +22,11 @@ class Untraceable(BaseException):
 def words(kind: types.Type) -> str:
     """Name a type for users."""
     if isinstance(kind, types.BaseTuple):
-        return getattr(getattr(kind, "instance_class", None), "__name__", "a tuple")
+        tag = tag_class(kind)
+        return tag.__name__ if tag else "a tuple"
     if isinstance(kind, Lanes):
         return f"numbers in lanes ({kind})"
-    for one, name in _WORDS:
-        if isinstance(kind, one):
-            return name
-    return str(kind)
+    return next((name for one, name in _WORDS if isinstance(kind, one)), str(kind))
 
 
 _WORDS = (
@@ -54,26 +48,23 @@ def _only_at_run_time(use: str) -> Callable:
     return ask
 
 
-# --- active lowering ----------------------------------------------------------------------------
-
 # Active lowerings, innermost last; separate for each Python thread.
 _lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", default=())
 
 
 def now() -> Any:
-    """Return the active writer of code (:mod:`karamelo_py.compiler.lowering`)."""
+    """Return the active `Lowering`."""
     return _lowerings.get()[-1]
 
 
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
     """Let operations become code of `lowering` within this context."""
-    before = _lowerings.get()
-    _lowerings.set((*before, lowering))
+    before = _lowerings.set((*_lowerings.get(), lowering))
     try:
         yield
     finally:
-        _lowerings.set(before)
+        _lowerings.reset(before)
 
 
 def at_work() -> bool:
@@ -82,7 +73,7 @@ def at_work() -> bool:
 
 
 def is_begun(key: tuple) -> bool:
-    """Tell whether the types of a formula are being determined."""
+    """Tell whether the result type of a function is being determined."""
     return any(lowering.key == key for lowering in _lowerings.get())
 
 
@@ -93,32 +84,28 @@ def _real_kind(thing: Any) -> Any:
 
 
 def alike(arguments: tuple) -> tuple:
-    """Convert literals and integers to the type of the real numbers among the arguments.
-
-    A literal adapts its precision: `2 * x` is single if x is.
-    """
+    """Convert literals and integers to the widest type of the real numbers among the arguments."""
     kinds = [kind for kind in map(_real_kind, arguments) if kind is not None]
     if not kinds:
         return arguments
     kind = max(kinds, key=lambda k: k.bitwidth)
-    like = next(a for a in arguments if _real_kind(a) is kind)
-    return tuple([_in_type_of(like, kind, a) for a in arguments])
+    model = next(a for a in arguments if _real_kind(a) is kind)
+    return tuple([_in_type_of(model, kind, a) for a in arguments])
 
 
-def _in_type_of(like: Any, kind: Any, thing: Any) -> Any:
+def _in_type_of(model: Any, kind: Any, thing: Any) -> Any:
     if type(thing) in (int, float):
         with np.errstate(over="ignore"):
             return thing if kind.bitwidth == 64 else np.float32(thing)
-    if not isinstance(thing, Value):
-        return thing
-    own = scalar_of(thing._kind)
-    if isinstance(own, types.Integer) and not isinstance(own, types.Boolean):
-        return now().in_type_of(thing, like)
+    if isinstance(thing, Value):
+        scalar = scalar_of(thing._kind)
+        if isinstance(scalar, types.Integer) and not isinstance(scalar, types.Boolean):
+            return now().in_type_of(thing, model)
     return thing
 
 
-# For modules that contain all they call: see `in_one`.
-_called: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
+# Replacements of functions called by address, in modules that contain all they call.
+_replacements: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
 
 
 @contextmanager
@@ -128,34 +115,30 @@ def in_one(called: dict[Any, Callable]) -> Iterator[None]:
     Kernels are inlined, and so are functions otherwise called by address: `called` has the function
     for each signature.
     """
-    before = _called.set(tuple(called.items()))
+    before = _replacements.set(tuple(called.items()))
     try:
         yield
     finally:
-        _called.reset(before)
+        _replacements.reset(before)
+
+
+all_called_in_one = _replacements.get  # None if modules call others
 
 
 def in_one_module() -> bool:
     """Tell whether a module contains all that it calls."""
-    return _called.get() is not None
-
-
-def all_called_in_one() -> tuple | None:
-    """List signatures and functions of `in_one`; None if modules call others."""
-    return _called.get()
+    return _replacements.get() is not None
 
 
 def called_in_one(signature: Any) -> Callable | None:
     """Return the replacement of a call by address, or None."""
-    return dict(_called.get() or ()).get(signature)
+    return dict(_replacements.get() or ()).get(signature)
 
 
 def emit(function: Callable, *arguments: Any) -> Any:
     """Write a call of an operation, or of a function selected by type."""
     return now().call(function, arguments)
 
-
-# --- functions with handwritten code --------------------------------------------------------------
 
 BUILTINS: dict[Callable, Callable] = {}
 
@@ -193,9 +176,6 @@ class Intrinsic:
 intrinsic = Intrinsic
 
 
-# --- values -------------------------------------------------------------------------------------
-
-
 class Value:
     """A number, lanes or an array of the function that is compiled."""
 
@@ -216,11 +196,11 @@ class Value:
         else:
             now().set_attribute(self, name, value)
 
-    def __getitem__(self, place: Any) -> Any:
-        return emit(operator.getitem, self, place)
+    def __getitem__(self, index: Any) -> Any:
+        return emit(operator.getitem, self, index)
 
-    def __setitem__(self, place: Any, value: Any) -> None:
-        emit(operator.setitem, self, place, value)
+    def __setitem__(self, index: Any, value: Any) -> None:
+        emit(operator.setitem, self, index, value)
 
     __bool__ = _only_at_run_time("a condition in an expression within an expression")
     __int__ = __index__ = __float__ = _only_at_run_time("a number that has to be written")
@@ -271,9 +251,9 @@ def _operators() -> None:
 _operators()
 
 
-def rebuilt(like: tuple, items: Iterable) -> tuple:
-    """Make a tuple of the class of another."""
-    return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
+def rebuilt(model: tuple, items: Iterable) -> tuple:
+    """Make a tuple of the class of `model`."""
+    return type(model)(*items) if hasattr(model, "_fields") else tuple(items)
 
 
 def mapped(change: Callable, thing: Any) -> Any:
@@ -305,23 +285,27 @@ class HeldValue:
         return (self[k] for k in range(len(self)))
 
     def __getattr__(self, name: str) -> Any:
-        fields = getattr(self._kind, "fields", ())
-        if name in fields:
-            return self[fields.index(name)]
-        found = getattr(self._kind.instance_class, name)
-        if callable(found) or isinstance(found, property):
+        if name in self._kind.fields:
+            return self[self._kind.fields.index(name)]
+        attribute = getattr(self._kind.instance_class, name)
+        if callable(attribute) or isinstance(attribute, property):
             raise Untraceable(f"'{name}' is a method of a tuple with arrays")
-        return now().seen(found) if isinstance(found, tuple) else found
+        return now().seen(attribute) if isinstance(attribute, tuple) else attribute
 
     __eq__ = __ne__ = __hash__ = __contains__ = _only_at_run_time("a tuple with arrays")
     __add__ = __radd__ = __eq__
+
+
+def implementations(kind: type) -> dict[Callable, Callable] | None:
+    """Return the functions that a number type implements; None for other classes."""
+    return getattr(kind, "implements", None)
 
 
 def implemented(function: Callable, arguments: tuple) -> Callable | None:
     """Return the implementation of a function for a tuple number type among the arguments."""
     for a in arguments:
         if isinstance(a, tuple):
-            table = getattr(type(a), "implements", None)
+            table = implementations(type(a))
             made = implemented(function, a) if table is None else table.get(function)
             if made is not None:
                 return made
@@ -341,13 +325,13 @@ class Emitted:
 
     def __call__(self, *arguments: Any) -> Any:
         if self.seen in OF_WHOLE and all(isinstance(a, int) for a in arguments):
-            return self.seen(*arguments)  # known numbers, such as loop lengths
+            return self.seen(*arguments)
         made = implemented(self.seen, arguments)
         if made is not None:
             return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
             if self.seen not in choosers and all(map(is_literal, arguments)):
-                return self.seen(*arguments)  # already known
+                return self.seen(*arguments)
             arguments = alike(arguments)
         return emit(self.seen, *arguments)
 

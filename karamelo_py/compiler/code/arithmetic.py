@@ -13,8 +13,9 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code, failing, machine
-from karamelo_py.compiler.code import Lanes, scalar_of
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import exceptions, machine
+from karamelo_py.compiler.llvm import Lanes, scalar_of
 
 
 class Operation(NamedTuple):
@@ -152,13 +153,12 @@ def _compared(sign: str, kind: types.Type) -> Callable:
 
 
 def _mixed(sign: str, first_signed: bool) -> Callable:
-    """Compare a signed with an unsigned integer."""
 
     def compared(builder: Any, values: list) -> Any:
-        values = [v if v.type.width == 64 else builder.sext(v, code.I64) for v in values]
-        negative = builder.icmp_signed("<", values[not first_signed], code.I64(0))
+        values = [v if v.type.width == 64 else builder.sext(v, llvm.I64) for v in values]
+        negative = builder.icmp_signed("<", values[not first_signed], llvm.I64(0))
         below = builder.icmp_signed(
-            sign, *((code.I64(-1), code.I64(0))[:: 1 if first_signed else -1])
+            sign, *((llvm.I64(-1), llvm.I64(0))[:: 1 if first_signed else -1])
         )
         return builder.select(negative, below, builder.icmp_unsigned(sign, *values))
 
@@ -211,7 +211,7 @@ def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, A
     quotient = builder.select(turn, builder.fsub(quotient, one), quotient)
     sign = builder.select(below, real(-0.0), zero)
     rest = builder.select(left, builder.select(turn, builder.fadd(rest, y), rest), sign)
-    floor = _call(builder, "llvm.floor", real, [quotient])
+    floor = llvm.call(builder, "llvm.floor", real, [quotient])
     high = builder.fcmp_ordered(">", builder.fsub(quotient, floor), real(0.5))
     floor = builder.select(high, builder.fadd(floor, one), floor)
     square = builder.fmul(quotient, quotient)
@@ -234,7 +234,7 @@ def _power(a: types.Type, b: types.Type) -> Operation | None:
     kind = common(types.unliteral(a), types.unliteral(b))
     if _is_whole(kind):
         return None
-    return Operation(kind, (kind, kind), of_library("llvm.pow"))
+    return Operation(kind, (kind, kind), llvm.of_library("llvm.pow"))
 
 
 def _product(kind: types.Type, exponent: int) -> Callable:
@@ -278,7 +278,7 @@ def _sized(a: types.Type) -> types.Type | None:
 
 def _size(builder: Any, kind: types.Type, value: Any) -> Any:
     if not _is_whole(kind):
-        return _call(builder, "llvm.fabs", value.type, [value])
+        return llvm.call(builder, "llvm.fabs", value.type, [value])
     below = builder.icmp_signed("<", value, value.type(0))
     return builder.select(below, builder.neg(value), value) if kind.signed else value
 
@@ -318,38 +318,19 @@ def _real_of(kind: types.Type) -> types.Type | None:
     return kind if isinstance(kind, types.Float) else types.float64
 
 
-def _call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
-    """Call a function of LLVM (whose name contains the type) or of the C library."""
-    kinds = [value.type for value in values]
-    if name.startswith("llvm."):
-        name += f".{code.overloaded(kinds[0])}"
-    elif isinstance(kinds[0], ir.FloatType):
-        name += "f"
-    function = code.external(builder, name, result, kinds)
-    if not name.startswith("llvm."):
-        function.attributes.add("nounwind")
-        if not any(isinstance(kind, ir.PointerType) for kind in kinds):
-            function.attributes.add("readonly")
-    return builder.call(function, values)
-
-
-def of_library(name: str) -> Callable:
-    return lambda builder, values: _call(builder, name, values[0].type, values)
-
-
 def _of_reals(name: str, count: int = 1) -> Callable:
     def operation(*kinds: types.Type) -> Operation | None:
         if len(kinds) != count:
             return None
         kind = _real_of(common(*kinds))
-        return kind and Operation(kind, (kind,) * count, of_library(name))
+        return kind and Operation(kind, (kind,) * count, llvm.of_library(name))
 
     return operation
 
 
 def _rounding(name: str) -> Callable:
     def rounded(builder: Any, kind: types.Type, value: Any) -> Any:
-        return builder.fptosi(_call(builder, name, value.type, [value]), code.I64)
+        return builder.fptosi(llvm.call(builder, name, value.type, [value]), llvm.I64)
 
     return _unary(_real_of, rounded, types.int64)
 
@@ -372,16 +353,16 @@ def _frexp(a: types.Type) -> Operation:
     result = types.Tuple((kind, types.int32))
 
     def parts(builder: Any, values: list) -> Any:
-        place = code.room(builder, code.I32)
-        fraction = _call(builder, "frexp", values[0].type, [*values, place])
-        return code.make_tuple(builder, result, [fraction, builder.load(place)])
+        place = llvm.room(builder, llvm.I32)
+        fraction = llvm.call(builder, "frexp", values[0].type, [*values, place])
+        return llvm.make_tuple(builder, result, [fraction, builder.load(place)])
 
     return Operation(result, (kind,), parts)
 
 
 def _ldexp(a: types.Type, b: types.Type) -> Operation:
     kind = _real_of(a)
-    return Operation(kind, (kind, types.int32), of_library("ldexp"))
+    return Operation(kind, (kind, types.int32), llvm.of_library("ldexp"))
 
 
 def _scaled(factor: float) -> Callable:
@@ -417,18 +398,18 @@ def _gamma_of_python(x: float) -> float:
 
 
 _OF_DOUBLE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
-machine.publish_python("karamelo_gamma", _OF_DOUBLE, failing.never_raising(_gamma_of_python))
+machine.publish_python("karamelo_gamma", _OF_DOUBLE, exceptions.never_raising(_gamma_of_python))
 _TOLD = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int64)
-machine.publish_python("karamelo_told_gamma", _TOLD, failing.noting(_gamma_of_python))
+machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of_python))
 
 
 def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
     """Python's gamma function, whose bits do not depend on the C library."""
-    double = code.cast(builder, x, kind, types.float64)
-    given = failing.passed_to(builder, builder.function)
+    double = llvm.cast(builder, x, kind, types.float64)
+    given = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if given else "karamelo_gamma"  # Ctrl-C may interrupt it
-    found = _call(builder, name, double.type, [double, *given])
-    return code.cast(builder, found, types.float64, kind)
+    found = llvm.call(builder, name, double.type, [double, *given])
+    return llvm.cast(builder, found, types.float64, kind)
 
 
 _HYPOT = "_hypot" if sys.platform == "win32" else "hypot"
@@ -442,8 +423,8 @@ for _name, (_real, _ending) in product(
     _IN_C, ((ctypes.c_double, ""), (ctypes.c_float, "f"))
 ):  # missing in this C library
     if not machine.is_known(_name + _ending):
-        _kind = ctypes.CFUNCTYPE(_real, _real)
-        machine.publish_python(_name + _ending, _kind, failing.never_raising(getattr(math, _name)))
+        _kind, _plain = ctypes.CFUNCTYPE(_real, _real), getattr(math, _name)
+        machine.publish_python(_name + _ending, _kind, exceptions.never_raising(_plain))
 
 OPERATIONS: dict[Any, Callable] = {
     operator.add: _sum("fadd", "add"),

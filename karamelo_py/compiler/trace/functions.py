@@ -1,8 +1,7 @@
 """Select functions by argument types, and compile them where they are called.
 
-Each number is a :class:`~karamelo_py.compiler.values.Value`; every operation that meets one is
-lowered at once, into the function that calls. Tuples and classes are Python's: what only takes them
-apart costs nothing. The walk through the text is in :mod:`~karamelo_py.compiler.statements`.
+Each number is a `Value`; every operation on one is lowered at once, into the calling function.
+Tuples and classes are Python's and leave no code. `statements` compiles the text of a function.
 """
 
 import functools
@@ -15,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler import choices, values
-from karamelo_py.compiler.arithmetic import OPERATIONS
-from karamelo_py.compiler.choices import (
+from karamelo_py.compiler.code.arithmetic import OPERATIONS
+from karamelo_py.compiler.trace import choices, values
+from karamelo_py.compiler.trace.choices import (
     INTERPRETED,
     choosers,
     modules_noted,
@@ -25,9 +24,9 @@ from karamelo_py.compiler.choices import (
     note,
     tag_class,
 )
-from karamelo_py.compiler.lowering import Lowering, name_of, numbers_of
-from karamelo_py.compiler.session import current, one_at_a_time
-from karamelo_py.compiler.statements import AstFunction
+from karamelo_py.compiler.trace.lowering import Lowering, name_of, numbers_of
+from karamelo_py.compiler.trace.session import one_at_a_time, session
+from karamelo_py.compiler.trace.statements import AstFunction
 
 
 class CannotCompile(TypeError):
@@ -40,16 +39,15 @@ class CannotCompile(TypeError):
 
 
 class Undefined(TypeError):
-    """A point function is not defined for classes that need it."""
+    """A point function is not defined for these classes (or words for other types)."""
 
     def __init__(self, function: str, classes: tuple):
-        names = ", ".join(getattr(c, "__name__", str(c)) for c in classes)
+        names = ", ".join(c.__name__ if isinstance(c, type) else str(c) for c in classes)
         super().__init__(f"{function} is not defined for ({names})")
         self.classes = classes
 
 
 def _reason(error: BaseException) -> str:
-    """Describe an error in one line."""
     if isinstance(error, values.Untraceable):
         return str(error)
     return ": ".join(filter(None, (type(error).__name__, str(error))))
@@ -61,7 +59,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
-    yield from vars(error).get("places", ())  # in the text that was walked
+    yield from vars(error).get("places", ())  # in the text that was compiled
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
 
@@ -83,12 +81,17 @@ _NO_TYPES = "a kernel cannot ask for the type of a number: ask for that of a tag
 def _class_of(thing: Any) -> type:
     if isinstance(thing, values.Value):
         raise values.Untraceable(_NO_TYPES)
-    kind = getattr(thing, "_kind", None)
-    return type(thing) if kind is None else getattr(kind, "instance_class", tuple)
+    if isinstance(thing, values.HeldValue):
+        return tag_class(thing._kind) or tuple
+    return type(thing)
+
+
+def _plain_class(kind: Any) -> Any:
+    return kind.seen if isinstance(kind, values.Emitted) else kind
 
 
 def _is_instance(thing: Any, kind: Any) -> bool:
-    kinds = tuple(getattr(k, "seen", k) for k in (kind if isinstance(kind, tuple) else (kind,)))
+    kinds = tuple(map(_plain_class, kind if isinstance(kind, tuple) else (kind,)))
     if not isinstance(thing, values.Value):
         return issubclass(_class_of(thing), kinds)
     if not all(issubclass(k, tuple) for k in kinds):
@@ -112,7 +115,7 @@ _AS_THEY_ARE = (*_CONSTANT, values.Emitted, Module)
 
 
 def _seen(thing: Any) -> Any:
-    """Return the replacement of a global in functions that are run here."""
+    """Return the replacement of a global in traced functions."""
     if isinstance(thing, _AS_THEY_ARE):
         return thing
     if isinstance(thing, python.ModuleType):
@@ -125,54 +128,51 @@ def _seen(thing: Any) -> Any:
         return values.now().constant(thing)
     if type(thing).__hash__ is None:
         raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
-    known = current().seen
-    if thing not in known:
-        known[thing] = _copy(thing), modules_of(thing)
-    made, modules = known[thing]
+    cached = session.seen
+    if thing not in cached:
+        cached[thing] = _copy(thing), modules_of(thing)
+    made, modules = cached[thing]
     note(modules)
     return made
 
 
 def _copy(thing: Any) -> Any:
-    """Make the replacement of a called thing."""
     if thing in INSTEAD:
         return INSTEAD[thing]
-    if thing in _SAFE:
+    if thing in _SAFE or (isinstance(thing, type) and issubclass(thing, tuple)):
         return thing
-    if isinstance(thing, type) and issubclass(thing, tuple):
-        return thing
-    known = thing in choosers or thing in values.BUILTINS or thing in OPERATIONS
-    if known or isinstance(thing, values.Intrinsic | type):
+    is_emitted = thing in choosers or thing in values.BUILTINS or thing in OPERATIONS
+    if is_emitted or isinstance(thing, values.Intrinsic | type):
         return values.Emitted(thing)
     if isinstance(thing, python.FunctionType):
         return _copied(thing)
-    raise values.Untraceable(f"kernels do not know {getattr(thing, '__name__', repr(thing))}")
+    name = thing.__name__ if hasattr(thing, "__name__") else repr(thing)
+    raise values.Untraceable(f"kernels do not know {name}")
 
 
 def _copied(function: Callable) -> AstFunction:
-    """Return the compiler of a function's text."""
-    walked = current().walked
+    walked = session.walked
     if function not in walked:
         walked[function] = AstFunction(function, _seen)
     return walked[function]
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """Call a point function for one that is opaque, as methods do."""
+    """Trace a method, or a point function, that plain Python calls."""
     return _seen(dispatch)(*arguments)
 
 
-class _Formula(NamedTuple):
-    """A function to run for argument types, its result type, and its dependencies."""
+class TracedFunction(NamedTuple):
+    """A function to run for argument types."""
 
     run: Callable
     result: types.Type
-    modules: frozenset[str]
-    plain: bool  # whether the type says all that is known of the result
+    modules: frozenset[str]  # outside `choices.ROOMS`
+    plain: bool  # whether the result's type determines it
     name: str
 
 
-MOST_FORMULAS = 4000  # cached: about 12 kB each, 800 for a scene with contact
+MOST_FUNCTIONS = 4000  # cached: about 12 kB each, 800 for a scene with contact
 not_inlined: set[Callable] = set()
 
 
@@ -182,8 +182,8 @@ def _is_plain(thing: Any) -> bool:
     return thing is None or isinstance(thing, values.Value | values.HeldValue)
 
 
-def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
-    """Determine what :func:`formula` returns, by running the function."""
+def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | None:
+    """Determine the result type of a function by tracing it without code."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen)
@@ -194,45 +194,45 @@ def _written(key: tuple, dispatch: Callable, kinds: tuple) -> _Formula | None:
                 return None
             run = _seen(chosen) if isinstance(chosen, values.Intrinsic) else _copied(chosen)
             note(modules_of(chosen))
-            found = run(*(lowering.wrapped(kind, None) for kind in kinds))
-            result = types.unliteral(lowering.kind_of(found))
-        return _Formula(run, result, frozenset(modules), _is_plain(found), dispatch.__qualname__)
+            made = run(*(lowering.wrapped(kind, None) for kind in kinds))
+            result = types.unliteral(lowering.kind_of(made))
+        name = dispatch.__qualname__
+        return TracedFunction(run, result, frozenset(modules), _is_plain(made), name)
     except (CannotCompile, Undefined):
         raise
     except (Exception, values.Untraceable) as why:
         raise CannotCompile(_reason(why), chosen or dispatch) from why
 
 
-def formula(dispatch: Callable, kinds: tuple) -> _Formula | None:
-    """Return what to run for arguments of these types; None if nothing is selected."""
+def traced(dispatch: Callable, kinds: tuple) -> TracedFunction | None:
+    """Return the function to run for arguments of these types; None if none is selected."""
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
-        session = current()
-        known = session.functions
-        if not values.at_work() and (session.outdated or len(known) > MOST_FORMULAS):
+        cached = session.functions
+        if not values.at_work() and (session.outdated or len(cached) > MOST_FUNCTIONS):
             session.outdated = False
-            for cleared in (known, session.seen, session.walked):
-                cleared.clear()
-        if key not in known:
+            for one in (cached, session.seen, session.walked):
+                one.clear()
+        if key not in cached:
             if values.is_begun(key):
                 raise CannotCompile("it calls itself", dispatch)
-            known[key] = _written(key, dispatch, kinds)
-        if (found := known[key]) is not None:
-            note(found.modules)
-        return found
+            cached[key] = _trace(key, dispatch, kinds)
+        if (function := cached[key]) is not None:
+            note(function.modules)
+        return function
 
 
 def forget() -> None:
-    """Drop cached selections: a point function has a new implementation."""
+    """Drop cached selections: a function has a new implementation."""
     if values.at_work():
-        current().functions.clear()
+        session.functions.clear()
     else:  # another Python thread may be compiling
-        current().outdated = True
+        session.outdated = True
 
 
 def outdate_kernels() -> None:
     """Let kernels be looked up again: some of their functions have changed."""
-    current().changes += 1
+    session.changes += 1
 
 
 class PointFunction:
@@ -249,18 +249,18 @@ class PointFunction:
         self._nearest: dict[tuple[type, ...], Callable | None] = {}
 
     def find(self, classes: tuple) -> Callable | None:
-        """Find the implementation for these classes: their own, or the nearest of their bases."""
-        known = self._nearest  # another thread of Python may add implementations meanwhile
-        if classes not in known:
-            ways = itertools.product(*(getattr(one, "__mro__", (one,)) for one in classes))
-            found = (self._table[way] for way in ways if way in self._table)
-            known[classes] = next(found, self._fallback)
-        return known[classes]
+        """Find the implementation for these classes, or for the nearest of their bases."""
+        nearest = self._nearest  # another thread of Python may add implementations meanwhile
+        if classes not in nearest:
+            bases = [c.__mro__ if isinstance(c, type) else (c,) for c in classes]
+            matches = (self._table[b] for b in itertools.product(*bases) if b in self._table)
+            nearest[classes] = next(matches, self._fallback)
+        return nearest[classes]
 
     def _plain(self, *arguments: Any) -> Any:
         classes = tuple([a.__class__ for a in arguments[: self.tags]])
-        known = self._nearest
-        chosen = known[classes] if classes in known else self.find(classes)
+        nearest = self._nearest
+        chosen = nearest[classes] if classes in nearest else self.find(classes)
         if chosen is None:
             raise Undefined(self.__name__, classes)
         return chosen(*arguments)
@@ -278,7 +278,7 @@ class PointFunction:
             choices.register(implementation)
             before, self._nearest = self._nearest, {}
             forget()
-            if any(self.find(asked) is not found for asked, found in before.items()):
+            if any(self.find(asked) is not chosen for asked, chosen in before.items()):
                 outdate_kernels()
             return implementation
 
@@ -290,26 +290,24 @@ class PointFunction:
 
 
 def _number_types(kinds: Iterable[types.Type]) -> Iterator[type]:
-    """Yield the number types among types, and in tuples, that implement functions."""
     for kind in kinds:
         one = tag_class(kind) or type(kind)
-        if hasattr(one, "implements"):
+        if values.implementations(one) is not None:
             yield one
         elif isinstance(kind, types.BaseTuple):
             yield from _number_types(kind)
 
 
 def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
-    """Return the implementation of a function for argument types; None if there is none."""
     for one in _number_types(kinds):
         if dispatch in one.implements:
             return one.implements[dispatch]
     if dispatch not in choosers:
         return dispatch
     for chooser in choosers[dispatch]:
-        found = chooser(*kinds)
-        if found is not None:
-            return found
+        chosen = chooser(*kinds)
+        if chosen is not None:
+            return chosen
     if isinstance(dispatch, PointFunction):
         classes = [tag_class(kind) or values.words(kind) for kind in kinds[: dispatch.tags]]
         raise Undefined(dispatch.__name__, tuple(classes))
@@ -324,14 +322,14 @@ def _call(function: Callable, arguments: tuple) -> Any:
     kinds = tuple(map(lowering.kind_of, arguments))
     if function in not_inlined:  # one serves all numbers
         kinds = tuple(map(types.unliteral, kinds))
-    found = formula(function, kinds)
-    if found is None:
+    chosen = traced(function, kinds)
+    if chosen is None:
         return NotImplemented
     if function in not_inlined:
-        return lowering.call_own(found.name, found.run, kinds, found.result, arguments)
-    if lowering.builder is None and found.plain:
-        return lowering.wrapped(found.result, None)
-    return found.run(*arguments)
+        return lowering.call_own(chosen, kinds, arguments)
+    if lowering.builder is None and chosen.plain:
+        return lowering.wrapped(chosen.result, None)
+    return chosen.run(*arguments)
 
 
 Lowering.dispatch = staticmethod(_call)

@@ -7,21 +7,17 @@ A function of numbers is defined first, then its version for lanes
 import math
 import operator
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import arithmetic, choices, code
-from karamelo_py.compiler.arithmetic import common
-from karamelo_py.compiler.code import I64, Lanes, lane, scalar_of
-from karamelo_py.compiler.trace import (
-    INSTEAD,
-    PointFunction,
-    forget,
-    outdate_kernels,
-)
-from karamelo_py.compiler.values import (
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code.arithmetic import common
+from karamelo_py.compiler.llvm import I64, Lanes, scalar_of
+from karamelo_py.compiler.trace import choices
+from karamelo_py.compiler.trace.functions import INSTEAD, PointFunction, forget, outdate_kernels
+from karamelo_py.compiler.trace.values import (
     OF_REALS,
     Untraceable,
     Value,
@@ -127,7 +123,7 @@ def _of_width(width: int, scalar: types.Type) -> types.Type:
 def _real(value, like):
     scalar = scalar_of(like) if isinstance(like, Lanes | types.Float) else types.float64
     made = _of_width(lanes_of((value, like)), scalar)
-    return made(value, like), lambda builder, given, _: code.cast(builder, given, value, made)
+    return made(value, like), lambda builder, given, _: llvm.cast(builder, given, value, made)
 
 
 @implements(int, Lanes)
@@ -136,7 +132,7 @@ def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
     whole = Lanes(types.int32, a.width)  # supported by every processor, and large enough for cells
-    return whole(a), lambda builder, given: code.cast(builder, given, a, whole)
+    return whole(a), lambda builder, given: llvm.cast(builder, given, a, whole)
 
 
 def round_off(like: Any) -> Any:
@@ -151,8 +147,8 @@ def _round_off(like):
     made = _of_width(lanes_of(like), scalar)
 
     def codegen(builder, _):
-        error = code.constant(builder, scalar, 2.0**-23 if scalar == types.float32 else 2.0**-52)
-        return code.cast(builder, error, scalar, made)
+        error = llvm.constant(builder, scalar, 2.0**-23 if scalar == types.float32 else 2.0**-52)
+        return llvm.cast(builder, error, scalar, made)
 
     return made(like), codegen
 
@@ -170,17 +166,6 @@ implements(index)(lambda i: types.uint64(i))
 implements(index, Lanes)(lambda i: i)
 
 
-def beside(first: int, steps: int) -> int:
-    """Return `first` + `steps` as a node number: an array index, like `index`.
-
-    For lanes both parts are stored, so that neighbours of the first nodes are addressed from these.
-    """
-    return first + steps
-
-
-implements(beside)(lambda first, steps: types.uint64(first + steps))
-
-
 @shared
 def fma(a: float, b: float, c: float) -> float:
     """Add a b to c with one rounding when compiled, in any context."""
@@ -190,7 +175,7 @@ def fma(a: float, b: float, c: float) -> float:
 @intrinsic
 def _fused(a, b, c):
     kind = common(a, b, c)
-    call = arithmetic.of_library("llvm.fma")
+    call = llvm.of_library("llvm.fma")
     return kind(kind, kind, kind), lambda builder, *values: call(builder, values)
 
 
@@ -255,7 +240,7 @@ def _any(mask):
 
 def all_same(builder: Any, value: Any) -> Any:
     """Check that all lanes contain the same integer."""
-    first = code.shuffle(builder, value, value, [0] * value.type.count)
+    first = llvm.shuffle(builder, value, value, [0] * value.type.count)
     return _all_bits(builder, builder.icmp_signed("==", value, first), "==", -1)
 
 
@@ -271,74 +256,7 @@ def _branch(value):
 # --- lane after lane ---------------------------------------------------------------------------
 
 
-@shared
-def largest(a: float) -> float:
-    """Return the maximum over the lanes; for a number, itself."""
-    return a
-
-
-@implements(largest, Lanes)
-@intrinsic
-def _largest_lane(a):
-    def codegen(builder, given):
-        best = lane(builder, given, 0)
-        for k in range(1, a.width):
-            value = lane(builder, given, k)
-            best = builder.select(builder.fcmp_ordered(">", value, best), value, best)
-        return best
-
-    return a.scalar(a), codegen
-
-
-@shared
-def first_false_lane(condition: bool) -> int:
-    """Return the first lane where a condition is false; 0 without lanes."""
-    return 0
-
-
-@implements(first_false_lane, Lanes)
-@intrinsic
-def _first_false(mask):
-    def codegen(builder, given):
-        found = I64(0)
-        for k in reversed(range(mask.width)):
-            found = builder.select(lane(builder, given, k), found, I64(k))
-        return found
-
-    return types.int64(mask), codegen
-
-
-@shared
-def first_lane(number: int) -> int:
-    """Return the number in the first lane; for a number, itself."""
-    return number
-
-
-@implements(first_lane, Lanes)
-@intrinsic
-def _first(a):
-    return a.scalar(a), lambda builder, given: lane(builder, given, 0)
-
-
-@shared
-def added(total: float, value: float) -> float:
-    """Add a value to `total`; lanes are added one after another, like numbers."""
-    return total + value
-
-
-@implements(added, Lanes)
-@intrinsic
-def _added_lanes(total, a):
-    def codegen(builder, so_far, given):
-        for k in range(a.width):
-            so_far = builder.fadd(so_far, lane(builder, given, k))
-        return so_far
-
-    return total(total, a), codegen
-
-
 def _lanes_changed(thing: Any, change: Callable) -> Any:
-    """Replace each number in lanes in nested tuples."""
 
     def changed(item: Any) -> Any:
         return change(item) if isinstance(item, Value) and isinstance(item._kind, Lanes) else item
@@ -348,12 +266,11 @@ def _lanes_changed(thing: Any, change: Callable) -> Any:
 
 def _room(builder: Any, lanes: Lanes) -> Any:
     """Allocate memory for lanes; booleans take bytes there."""
-    kind = ir.VectorType(code.memory_type(lanes.scalar), lanes.width)
-    return builder and code.room(builder, kind)
+    kind = ir.VectorType(llvm.memory_type(lanes.scalar), lanes.width)
+    return builder and llvm.room(builder, kind)
 
 
 def _in_memory(builder: Any, value: Value) -> Value:
-    """Store lanes, to be read one by one."""
     room, bits = _room(builder, value._kind), value._value
     if builder:
         wanted = room.type.pointee
@@ -362,13 +279,12 @@ def _in_memory(builder: Any, value: Value) -> Value:
 
 
 def _from_memory(builder: Any, stored: Value) -> Value:
-    bits, wanted = builder.load(stored._value), code.register_type(stored._kind)
+    bits, wanted = builder.load(stored._value), llvm.register_type(stored._kind)
     return Value(stored._kind, bits if bits.type == wanted else builder.trunc(bits, wanted))
 
 
 def _place(builder: Any, stored: Value, k: Any) -> Any:
-    """Return the address of one lane in memory."""
-    scalar = code.memory_type(stored._kind.scalar)
+    scalar = llvm.memory_type(stored._kind.scalar)
     return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
 
 
@@ -390,7 +306,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
         def of_lane(value: Value) -> Value:
             scalar = value._kind.scalar
             place = builder and _place(builder, value, k)
-            return Value(scalar, builder and code.get(builder, scalar, place))
+            return Value(scalar, builder and llvm.get(builder, scalar, place))
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
@@ -399,7 +315,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))
             if builder:
-                code.put(builder, scalar, lowering.lowered(thing, scalar), _place(builder, made, k))
+                llvm.put(builder, scalar, lowering.lowered(thing, scalar), _place(builder, made, k))
             return made
 
         read, lowering.read = lowering.read, dict(lowering.read)
@@ -413,7 +329,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
     if not unrolled:
         # Hides the count from LLVM, so that the loop remains, with one copy of the function.
         count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
-    with code.counted(builder, count) as k:
+    with llvm.counted(builder, count) as k:
         found = run(k)
     return _lanes_changed(found, lambda value: _from_memory(builder, value))
 
@@ -423,46 +339,3 @@ for _function in (
     operator.pow, operator.floordiv, operator.mod,
 ):  # fmt: skip
     implements(_function, Lanes)(lambda *given, do=_function: lane_by_lane(do, True, given))
-
-
-# --- groups of points, and nodes; for lanes see `lanes/` ---------------------------------------
-
-
-@shared
-def of_present(p: int, value: float) -> float:
-    """Return `value`, with 0 in the lanes of a group that have no point."""
-    return value
-
-
-@shared
-def is_one(number: int) -> bool:
-    """Tell whether all lanes contain the same number."""
-    return True
-
-
-class Weighted(NamedTuple):
-    """Rows of an array used as one: reading gives their weighted sum, writing distributes."""
-
-    rows: tuple[int, ...]
-    weights: tuple[float, ...]
-
-
-@shared
-def prefetch(array: Any, at: tuple) -> None:
-    """Prefetch items that a loop over groups of points will read after this one."""
-
-
-@shared
-def prefetch_records(array: Any, i: Any) -> None:
-    """Prefetch node records some nodes after those of number `i`, in lanes."""
-
-
-@shared
-def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
-    """array[i, first + k] += values[k], lane after lane."""
-    if isinstance(i, Weighted):
-        for one, weight in zip(i.rows, i.weights, strict=True):
-            accumulate(array, one, first, tuple([weight * value for value in values]))
-    else:
-        for k, value in enumerate(values):
-            array[i, first + k] += value

@@ -1,6 +1,6 @@
 """Arguments of kernels, written to memory by Python and passed as one address.
 
-The memory has the layout of held tuples (:mod:`karamelo_py.compiler.held`).
+The memory has the layout of held tuples (:mod:`karamelo_py.compiler.trace.held`).
 """
 
 import ctypes
@@ -14,9 +14,10 @@ import numpy as np
 from llvmlite import ir
 from numba import typeof, types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.held import HeldTuple, held_type, is_held
-from karamelo_py.compiler.session import current
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.trace.choices import tag_class
+from karamelo_py.compiler.trace.held import HeldTuple, held_type, is_held
+from karamelo_py.compiler.trace.session import session
 
 
 class _Array(NamedTuple):
@@ -30,7 +31,7 @@ class _Array(NamedTuple):
 
 
 def _array(array: np.ndarray) -> _Array:
-    number, session = id(array), current()
+    number = id(array)
     known = session.arrays.get(number)
     if (
         known is None
@@ -54,14 +55,14 @@ def _array(array: np.ndarray) -> _Array:
 
 def _drop(number: int, alive: weakref.ref) -> None:
     """Remove a deleted array, unless another one has its id."""
-    known = current().arrays.get(number)
+    known = session.arrays.get(number)
     if known is not None and known.alive is alive:
-        current().arrays.pop(number, None)
+        session.arrays.pop(number, None)
 
 
-def forget(array: np.ndarray) -> None:
+def forget_array(array: np.ndarray) -> None:
     """Remove an array before it is resized in place."""
-    current().arrays.pop(id(array), None)
+    session.arrays.pop(id(array), None)
 
 
 class Address(int):
@@ -205,12 +206,12 @@ def plan_for(arguments: tuple) -> Plan:
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
     """Return the size in bytes of a result, and a function that reads it."""
     places: list[tuple[int, str]] = []
-    size, _ = _lay(code.memory_type(kind), 0, places)
+    size, _ = _lay(llvm.memory_type(kind), 0, places)
 
     def made(kind: types.Type, numbers: Iterator) -> Any:
         if isinstance(kind, types.BaseTuple):
             items = [made(item, numbers) for item in kind]
-            named = getattr(kind, "instance_class", None)
+            named = tag_class(kind)
             return named(*items) if named else tuple(items)
         number = next(numbers)
         if isinstance(kind, types.NoneType):

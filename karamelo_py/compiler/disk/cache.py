@@ -12,33 +12,30 @@ is compiled as if it were not there, and the user told once.
 """
 
 import contextlib
-import contextvars
-import errno
 import functools
 import hashlib
 import os
 import pickle
 import platform
 import re
-import stat
 import sys
 import sysconfig
-import tempfile
 import time
 import types as python
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
-import platformdirs
 from numba import types
 
-from karamelo_py.compiler import choices, compile_lock, machine
-from karamelo_py.compiler.choices import name_of
+from karamelo_py.compiler import files
+from karamelo_py.compiler.code import machine
+from karamelo_py.compiler.disk import lock
+from karamelo_py.compiler.trace import choices
+from karamelo_py.compiler.trace.choices import name_of
 
 ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
 
@@ -47,83 +44,11 @@ _VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, 
 _INSTALLED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
 _NAMED = (python.FunctionType, python.ModuleType, type)  # their sources say what they are
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, np.number, np.bool_)
-_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_AS_IT_IS = (  # not a link, without waiting for a pipe
-    getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-)
 _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
 
 class Unknown(Exception):
     """Tell that a kernel depends on what has no name that is the same in another run."""
-
-
-def folder() -> Path:
-    """Return the cache folder."""
-    home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
-    return Path(home) / "kernels"
-
-
-def _refuse_of_others(about: os.stat_result) -> None:
-    """Refuse a file that another user may have written."""
-    if hasattr(os, "geteuid"):
-        if about.st_uid not in (0, os.geteuid()):
-            raise PermissionError(errno.EACCES, "it belongs to another user")
-        if about.st_mode & _BY_OTHERS:
-            raise PermissionError(errno.EACCES, "other users may write there")
-
-
-def _guard(place: Path) -> None:
-    """Refuse a folder that others can write to; close this user's folders to others."""
-    for one in (place, place.parent):
-        about = one.stat()
-        if about.st_mode & stat.S_ISVTX:  # others may not delete files there
-            continue
-        if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
-            one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)
-            about = one.stat()
-        _refuse_of_others(about)
-
-
-def read(path: Path) -> bytes:
-    """Read a file that only this user or the administrator can have written.
-
-    Raises OSError if it belongs to another user, and ValueError if its content is damaged.
-    """
-    with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
-        _guard(path.parent)
-        _refuse_of_others(os.fstat(file.fileno()))
-        data = file.read()
-    if hashlib.sha256(data[32:]).digest() != data[:32]:
-        raise ValueError("not what was written")
-    return data[32:]
-
-
-# Python shows a warning once for each text.
-_warn = functools.partial(warnings.warn, category=RuntimeWarning)
-_told = contextvars.ContextVar[Callable[[str], None]]("told", default=_warn)
-
-
-def _trouble(error: OSError) -> None:
-    _told.get()(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
-
-
-@contextlib.contextmanager
-def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Report problems with the folder through `tell`, once, within this context."""
-    told: list[str] = []
-
-    def tell_once(text: str) -> None:
-        if not told:
-            told.append(text)
-            tell(text)
-
-    before = _told.get()
-    _told.set(tell_once)
-    try:
-        yield
-    finally:
-        _told.set(before)
 
 
 # --- first level: by the sources ------------------------------------------------------------------
@@ -147,7 +72,7 @@ def _source(path: Path) -> str:
 @functools.cache
 def _sources() -> str:
     """Hash the sources of the rooms of this package that write kernels."""
-    package = Path(__file__).parents[1]
+    package = Path(__file__).parents[2]
     paths = sorted(path for room in choices.ROOMS for path in (package / room).rglob("*.py"))
     return short_hash(*(f"{path.relative_to(package)} {_source(path)}" for path in paths))
 
@@ -261,7 +186,7 @@ class KernelFiles:
             return compiled()
         found = self._found(key)
         if found is None:
-            with compile_lock.lock(folder() / f"{key}.lock"):
+            with lock.lock(files.folder() / f"{key}.lock"):
                 # Another process may have compiled it since the first look.
                 found = self._found(key)
                 if found is None:
@@ -283,7 +208,7 @@ class KernelFiles:
         return f"{name}.{short_hash(*words)}"
 
     def _found(self, key: str) -> Any:
-        path = folder() / f"{key}.kernel"
+        path = files.folder() / f"{key}.kernel"
         content = _content(path)
         if content is None:
             return None
@@ -302,7 +227,7 @@ class KernelFiles:
     def _save(self, key: str, unit: Any) -> None:
         with contextlib.suppress(Unknown):
             stamps = {name: _stamp(name) for name in sorted(unit.modules)}
-            _keep(folder() / f"{key}.kernel", pickle.dumps((stamps, _without_code(unit))))
+            _keep(files.folder() / f"{key}.kernel", pickle.dumps((stamps, _without_code(unit))))
 
 
 def _without_code(unit: Any) -> Any:
@@ -314,7 +239,7 @@ def _without_code(unit: Any) -> Any:
 
 def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
     """Read the code of a text, whose hash is in the `name`; where there is none, make it."""
-    path = folder() / f"{name}.code"
+    path = files.folder() / f"{name}.code"
     code = _content(path)
     if code is None:
         code = make()
@@ -324,7 +249,7 @@ def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
 
 def code_of(name: str) -> bytes:
     """Read code that was there when its kernel was kept; FileNotFoundError if it no longer is."""
-    code = _content(folder() / f"{name}.code")
+    code = _content(files.folder() / f"{name}.code")
     if code is None:
         raise FileNotFoundError(name)
     return code
@@ -333,11 +258,11 @@ def code_of(name: str) -> bytes:
 def _content(path: Path) -> bytes | None:
     """Read a file; warn of a damaged one and delete it. None if nothing can be read."""
     try:
-        content = read(path)
+        content = files.read(path)
     except (FileNotFoundError, NotADirectoryError):  # told of where a file is to be written
         return None
     except OSError as error:
-        _trouble(error)
+        files.report_error(error)
         return None
     except ValueError:
         _damaged(path)
@@ -348,7 +273,7 @@ def _content(path: Path) -> bytes | None:
 
 
 def _damaged(path: Path) -> None:
-    _told.get()(f"a file in {folder()} is damaged; the loop in it is compiled anew")
+    files.report(f"a file in {files.folder()} is damaged; the loop in it is compiled anew")
     with contextlib.suppress(OSError):
         path.unlink()
 
@@ -356,9 +281,9 @@ def _damaged(path: Path) -> None:
 def _keep(path: Path, content: bytes) -> None:
     """Write a file; forget those that were used least recently where all take too much room."""
     try:
-        write(path, content)
+        files.write(path, content)
         ages = []
-        for one in folder().iterdir():
+        for one in files.folder().iterdir():
             if _OURS.fullmatch(one.name):
                 with contextlib.suppress(FileNotFoundError):
                     about = one.stat()
@@ -369,18 +294,4 @@ def _keep(path: Path, content: bytes) -> None:
             if room < 0:
                 one.unlink(missing_ok=True)
     except OSError as error:
-        _trouble(error)
-
-
-def write(path: Path, content: bytes) -> None:
-    """Write a file for `read`, completely or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    _guard(path.parent)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")
-    try:
-        with open(handle, "wb") as file:
-            file.write(hashlib.sha256(content).digest() + content)
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+        files.report_error(error)

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from karamelo_py.compiler.session import current
+from karamelo_py.compiler.trace.session import session
 
 try:
     import fcntl
@@ -35,7 +35,6 @@ def lock(path: Path) -> Iterator[None]:
 
 def _take(path: Path, held: contextlib.ExitStack) -> None:
     """Take the lock; `held` releases it."""
-    session = current()
     if fcntl is None:
         return
     path.parent.mkdir(parents=True, exist_ok=True)

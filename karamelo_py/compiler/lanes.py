@@ -1,4 +1,15 @@
-"""Arrays of points, and items at numbers in lanes."""
+"""Several points at once: lanes of a vector register as a number type of point functions.
+
+A kernel that indexes point arrays (components, points) with a `LaneGroup` instead of a number gets
+`Lanes`: one number for each of 4 or 8 consecutive points. Lanes add, multiply and compare like
+numbers; node numbers in lanes gather from node arrays (nodes, components). Point functions are
+unaware of it; those that a class lists in ``scalarised`` are called lane by lane. Each lane has the
+bits of the same operations on numbers; sums at nodes differ from sums over single points by
+round-off.
+
+The last group of a tile may have fewer points than lanes: missing lanes load the first point, and
+store and contribute nothing. Interpreted kernels process points one by one.
+"""
 
 import operator
 from collections.abc import Callable
@@ -8,23 +19,117 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, splat
-from karamelo_py.compiler.compile import (
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import machine
+from karamelo_py.compiler.llvm import I32, I64, Lanes, lane, pack, shuffle, splat
+from karamelo_py.compiler.trace.primitives import (
     all_same,
-    beside,
     implements,
     index,
-    is_one,
     lanes_of,
-    of_present,
-    prefetch,
     real,
     select,
+    shared,
 )
-from karamelo_py.compiler.values import intrinsic
+from karamelo_py.compiler.trace.values import intrinsic
 
+# LLVM splits wider vectors in two, and narrow registers are too few for that.
+REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays prefetched ahead
+
+
+@shared
+def largest(a: float) -> float:
+    """Return the maximum over the lanes; for a number, itself."""
+    return a
+
+
+@implements(largest, Lanes)
+@intrinsic
+def _largest_lane(a):
+    def codegen(builder, given):
+        best = lane(builder, given, 0)
+        for k in range(1, a.width):
+            value = lane(builder, given, k)
+            best = builder.select(builder.fcmp_ordered(">", value, best), value, best)
+        return best
+
+    return a.scalar(a), codegen
+
+
+@shared
+def first_false_lane(condition: bool) -> int:
+    """Return the first lane where a condition is false; 0 without lanes."""
+    return 0
+
+
+@implements(first_false_lane, Lanes)
+@intrinsic
+def _first_false(mask):
+    def codegen(builder, given):
+        found = I64(0)
+        for k in reversed(range(mask.width)):
+            found = builder.select(lane(builder, given, k), found, I64(k))
+        return found
+
+    return types.int64(mask), codegen
+
+
+@shared
+def first_lane(number: int) -> int:
+    """Return the number in the first lane; for a number, itself."""
+    return number
+
+
+@implements(first_lane, Lanes)
+@intrinsic
+def _first(a):
+    return a.scalar(a), lambda builder, given: lane(builder, given, 0)
+
+
+@shared
+def added(total: float, value: float) -> float:
+    """Add a value to `total`; lanes are added one after another, like numbers."""
+    return total + value
+
+
+@implements(added, Lanes)
+@intrinsic
+def _added_lanes(total, a):
+    def codegen(builder, so_far, given):
+        for k in range(a.width):
+            so_far = builder.fadd(so_far, lane(builder, given, k))
+        return so_far
+
+    return total(total, a), codegen
+
+
+def beside(first: int, steps: int) -> int:
+    """Return `first` + `steps` as a node number: an array index, like `index`.
+
+    For lanes both parts are stored, so that neighbours of the first nodes are addressed from these.
+    """
+    return first + steps
+
+
+implements(beside)(lambda first, steps: types.uint64(first + steps))
+
+
+@shared
+def of_present(p: int, value: float) -> float:
+    """Return `value`, with 0 in the lanes of a group that have no point."""
+    return value
+
+
+@shared
+def is_one(number: int) -> bool:
+    """Tell whether all lanes contain the same number."""
+    return True
+
+
+@shared
+def prefetch(array: Any, at: tuple) -> None:
+    """Prefetch items that a loop over groups of points will read after this one."""
 
 
 class LaneGroup(types.Type):
@@ -48,7 +153,7 @@ class Beside(types.Type):
 
     def register_type(self) -> ir.Type:
         """LLVM type: the nodes, and the distance."""
-        return ir.LiteralStructType([code.register_type(self.nodes), I64])
+        return ir.LiteralStructType([llvm.register_type(self.nodes), I64])
 
 
 class FourLanes(NamedTuple):
@@ -74,7 +179,7 @@ def group(tag, first, count):
     made = LaneGroup(tag.instance_class.width)
 
     def codegen(builder, _, *numbers):
-        return code.make_struct(builder, made.register_type(), numbers)
+        return llvm.make_struct(builder, made.register_type(), numbers)
 
     return made(tag, types.int64, types.int64), codegen
 
@@ -103,22 +208,21 @@ def _room_for(points, numbers):
     shape = len(numbers), points.literal_value
 
     def codegen(builder, *_):
-        number = code.memory_type(array.dtype)
-        memory = code.room(builder, ir.ArrayType(number, shape[0] * shape[1]))
+        number = llvm.memory_type(array.dtype)
+        memory = llvm.room(builder, ir.ArrayType(number, shape[0] * shape[1]))
         memory.align = 64  # bytes of a cache line
         size = array.dtype.bitwidth // 8
         data = builder.bitcast(memory, number.as_pointer())
         strides = shape[1] * size, size
-        return code.make_array(builder, array, data, [*map(I64, shape)], [*map(I64, strides)])
+        return llvm.make_array(builder, array, data, [*map(I64, shape)], [*map(I64, strides)])
 
     return array(points, numbers), codegen
 
 
 def _masked(builder: Any, p: Any, width: int) -> Any:
-    """Make the mask of the lanes of a group that have a point."""
     numbers = Lanes(types.int64, width)
     count = splat(builder, builder.extract_value(p, 1), numbers)
-    all_of_them = ir.Constant(code.register_type(numbers), list(range(width)))
+    all_of_them = ir.Constant(llvm.register_type(numbers), list(range(width)))
     return builder.icmp_signed("<", all_of_them, count)
 
 
@@ -156,12 +260,12 @@ def _all_or_masked(
     `partly` gets the LLVM name of the vectors, the address, the alignment and the mask.
     """
     size = lanes.scalar.bitwidth // 8
-    vector = code.register_type(lanes)
+    vector = llvm.register_type(lanes)
     at = builder.bitcast(pointer, vector.as_pointer())
     full = builder.icmp_signed("==", builder.extract_value(p, 1), I64(lanes.width))
 
     def masked() -> Any:
-        name = f"{code.overloaded(vector)}.p0"
+        name = f"{llvm.overloaded(vector)}.p0"
         return partly(name, at, I32(size), _masked(builder, p, lanes.width))
 
     return _either(builder, full, lambda: whole(at, size), masked)
@@ -174,24 +278,23 @@ def _points_at(builder: Any, array: types.Array, value: Any, at: Any, place: Any
     # Points are contiguous in each row, for any distance between rows.
     size = I64(array.dtype.bitwidth // 8)
     indices = [*_as_places(builder, kinds[:-1], values[:-1]), first]
-    return code.item_pointer(builder, array, value, indices, size), values[-1]
+    return llvm.item_pointer(builder, array, value, indices, size), values[-1]
 
 
 def _indices(builder: Any, at: Any, value: Any) -> tuple[list, list]:
-    """Types and values of the indices of an item, one or a tuple."""
     if isinstance(at, types.BaseTuple):
-        return list(at), code.unpack(builder, value)
+        return list(at), llvm.unpack(builder, value)
     return [at], [value]
 
 
 def _as_places(builder: Any, kinds: list, values: list) -> list:
-    return [code.cast(builder, v, k, types.intp) for k, v in zip(kinds, values, strict=True)]
+    return [llvm.cast(builder, v, k, types.intp) for k, v in zip(kinds, values, strict=True)]
 
 
 @intrinsic
 def _load_points(array, at):
     lanes = Lanes(array.dtype, lanes_of(at))
-    vector = code.register_type(lanes)
+    vector = llvm.register_type(lanes)
 
     def codegen(builder, value, place):
         pointer, p = _points_at(builder, array, value, at, place)
@@ -199,7 +302,7 @@ def _load_points(array, at):
         def partly(name, here, align, mask):
             """Lanes without a point get the first point's number."""
             kinds = [here.type, I32, mask.type, vector]
-            load = code.external(builder, f"llvm.masked.load.{name}", vector, kinds)
+            load = llvm.external(builder, f"llvm.masked.load.{name}", vector, kinds)
             loaded = builder.call(load, [here, align, mask, ir.Constant(vector, None)])
             first = shuffle(builder, loaded, loaded, [0] * lanes.width)
             return builder.select(mask, loaded, first)
@@ -221,7 +324,7 @@ def _store_points(array, at, value):
 
         def partly(name, here, align, mask):
             kinds = [number.type, here.type, I32, mask.type]
-            store = code.external(builder, f"llvm.masked.store.{name}", ir.VoidType(), kinds)
+            store = llvm.external(builder, f"llvm.masked.store.{name}", ir.VoidType(), kinds)
             builder.call(store, [number, here, align, mask])
 
         def whole(here, size):
@@ -234,9 +337,9 @@ def _store_points(array, at, value):
 
 def ask(builder: Any, pointer: Any, ahead: Any) -> None:
     """Prefetch data at this offset from an address."""
-    at = builder.gep(builder.bitcast(pointer, code.NOTHING), [ahead])
-    kinds = [code.NOTHING, I32, I32, I32]
-    function = code.external(builder, "llvm.prefetch.p0", ir.VoidType(), kinds)
+    at = builder.gep(builder.bitcast(pointer, llvm.NOTHING), [ahead])
+    kinds = [llvm.NOTHING, I32, I32, I32]
+    function = llvm.external(builder, "llvm.prefetch.p0", ir.VoidType(), kinds)
     read, near, data = I32(0), I32(3), I32(1)
     builder.call(function, [at, read, near, data])
 
@@ -257,17 +360,17 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     For a number without lanes it is the same for all.
     """
     if not lanes_of(of):
-        return code.item_pointer(builder, kind, array, [at, *rest])
+        return llvm.item_pointer(builder, kind, array, [at, *rest])
     steps = None
     if isinstance(of, Beside):
         of, at, steps = of.nodes, *(builder.extract_value(at, part) for part in (0, 1))
-    first = code.cast(builder, lane(builder, at, k), of.scalar, types.intp)
-    found = code.item_pointer(builder, kind, array, [first, *rest])
+    first = llvm.cast(builder, lane(builder, at, k), of.scalar, types.intp)
+    found = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return found
     # Relative to the first node, whose address is computed once for its neighbours.
-    stride = code.ArrayParts(builder, kind, array).strides[0]
-    return code.byte_pointer(builder, found, builder.mul(steps, stride))
+    stride = llvm.ArrayParts(builder, kind, array).strides[0]
+    return llvm.byte_pointer(builder, found, builder.mul(steps, stride))
 
 
 @intrinsic
@@ -326,7 +429,7 @@ def _beside(first, steps):
     made = Beside(first)
 
     def codegen(builder, *given):
-        return code.make_struct(builder, made.register_type(), given)
+        return llvm.make_struct(builder, made.register_type(), given)
 
     return made(first, types.intp), codegen
 

@@ -299,6 +299,25 @@ def external(builder: Any, name: str, result: ir.Type, arguments: Sequence[ir.Ty
     return known if known is not None else ir.Function(builder.module, kind, name)
 
 
+def call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
+    """Call a function of LLVM (whose name contains the type) or of the C library."""
+    kinds = [value.type for value in values]
+    if name.startswith("llvm."):
+        name += f".{overloaded(kinds[0])}"
+    elif isinstance(kinds[0], ir.FloatType):
+        name += "f"
+    function = external(builder, name, result, kinds)
+    if not name.startswith("llvm."):
+        function.attributes.add("nounwind")
+        if not any(isinstance(kind, ir.PointerType) for kind in kinds):
+            function.attributes.add("readonly")
+    return builder.call(function, values)
+
+
+def of_library(name: str) -> Callable:
+    return lambda builder, values: call(builder, name, values[0].type, values)
+
+
 @contextmanager
 def counted(builder: Any, count: Any) -> Iterator[Any]:
     """Write a loop: what is written within is done for each number below `count`."""

@@ -17,10 +17,7 @@ import numpy as np
 from llvmlite import ir
 from numba import config, types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.compile import fma, index
-from karamelo_py.compiler.loops import kernel
-from karamelo_py.compiler.values import intrinsic
+from karamelo_py.compiler import fma, index, intrinsic, kernel, llvm
 
 ROWS = 1024  # written at a time
 # The longest: -1.23456789e-308 and -4611686018427387903, a blank, and surplus digits.
@@ -205,7 +202,7 @@ def _put_eight(text, at, word):
     """Write the bytes of an integer, unaligned."""
 
     def codegen(builder, array, at, number):
-        data = code.ArrayParts(builder, text, array).data
+        data = llvm.ArrayParts(builder, text, array).data
         place = builder.bitcast(builder.gep(data, [at]), ir.IntType(64).as_pointer())
         builder.store(number, place, align=1)
 

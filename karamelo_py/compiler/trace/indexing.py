@@ -7,9 +7,9 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.arithmetic import OPERATIONS
-from karamelo_py.compiler.values import Untraceable, Value
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code.arithmetic import OPERATIONS
+from karamelo_py.compiler.trace.values import Untraceable, Value
 
 
 def _places(place: Any) -> tuple:
@@ -51,16 +51,16 @@ def _index(lowering: Any, thing: Any, count: Any) -> Any:
 
 
 def _from_the_end(builder: Any, value: Any, count: Any) -> Any:
-    negative = builder.icmp_signed("<", value, code.I64(0))
+    negative = builder.icmp_signed("<", value, llvm.I64(0))
     return builder.select(negative, builder.add(value, count), value)
 
 
 def item_place(lowering: Any, array: Value, place: Any) -> Any:
     """Compute the address of an item."""
-    parts = code.ArrayParts(lowering.builder, array._kind, array._value)
+    parts = llvm.ArrayParts(lowering.builder, array._kind, array._value)
     pairs = zip(_places(place), parts.shape, strict=True)
     indices = [_index(lowering, one, count) for one, count in pairs]
-    return code.item_pointer(lowering.builder, array._kind, array._value, indices)
+    return llvm.item_pointer(lowering.builder, array._kind, array._value, indices)
 
 
 def _align(kind: types.Array) -> int | None:
@@ -79,8 +79,8 @@ def get(lowering: Any, array: Value, place: Any) -> Any:
         return lowering.wrapped(kind.dtype, None)
     at = item_place(lowering, array, place)
     if isinstance(kind.dtype, types.Record):
-        return Value(kind.dtype, builder.bitcast(at, code.NOTHING))
-    return lowering.wrapped(kind.dtype, code.get(builder, kind.dtype, at, _align(kind)))
+        return Value(kind.dtype, builder.bitcast(at, llvm.NOTHING))
+    return lowering.wrapped(kind.dtype, llvm.get(builder, kind.dtype, at, _align(kind)))
 
 
 def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
@@ -95,7 +95,7 @@ def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
         return
     if not is_part(kind, place):
         number = lowering.lowered(value, kind.dtype)
-        code.put(builder, kind.dtype, number, item_place(lowering, array, place), _align(kind))
+        llvm.put(builder, kind.dtype, number, item_place(lowering, array, place), _align(kind))
         return
     made = part_type(kind, place)
     _fill(lowering, Value(made, _part(lowering, array, place, made)), value)
@@ -104,25 +104,24 @@ def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
 def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
     """Set each item of an array to a number, or to the item of another array."""
     builder, kind = lowering.builder, array._kind
-    parts = code.ArrayParts(builder, kind, array._value)
+    parts = llvm.ArrayParts(builder, kind, array._value)
     if len(outer) < kind.ndim:
         if not outer and not isinstance(lowering.kind_of(value), types.Array):
             value = Value(kind.dtype, lowering.lowered(value, kind.dtype))
-        with code.counted(builder, parts.shape[len(outer)]) as index:
+        with llvm.counted(builder, parts.shape[len(outer)]) as index:
             _fill(lowering, array, value, (*outer, index))
         return
     if isinstance(value._kind, types.Array):
         own = value._kind
-        at = code.item_pointer(builder, own, value._value, outer[kind.ndim - own.ndim :])
-        value = Value(own.dtype, code.get(builder, own.dtype, at, _align(own)))
-    at = code.item_pointer(builder, kind, array._value, outer)
-    code.put(builder, kind.dtype, lowering.lowered(value, kind.dtype), at, _align(kind))
+        at = llvm.item_pointer(builder, own, value._value, outer[kind.ndim - own.ndim :])
+        value = Value(own.dtype, llvm.get(builder, own.dtype, at, _align(own)))
+    at = llvm.item_pointer(builder, kind, array._value, outer)
+    llvm.put(builder, kind.dtype, lowering.lowered(value, kind.dtype), at, _align(kind))
 
 
 def _bounds(lowering: Any, one: slice, count: Any) -> tuple[Any, Any, Any]:
-    """Compute start, number of items and step of a slice."""
     builder = lowering.builder
-    zero = code.I64(0)
+    zero = llvm.I64(0)
     step = 1 if one.step is None else one.step
     if not isinstance(step, int) or step < 1:
         raise Untraceable("a slice with a step that is not known, or below 1")
@@ -137,15 +136,15 @@ def _bounds(lowering: Any, one: slice, count: Any) -> tuple[Any, Any, Any]:
     first, last = bound(one.start, zero), bound(one.stop, count)
     size = builder.sub(last, first)
     if step > 1:
-        size = builder.sdiv(builder.add(size, code.I64(step - 1)), code.I64(step))
+        size = builder.sdiv(builder.add(size, llvm.I64(step - 1)), llvm.I64(step))
     size = builder.select(builder.icmp_signed("<", size, zero), zero, size)
-    return first, size, code.I64(step)
+    return first, size, llvm.I64(step)
 
 
 def _part(lowering: Any, array: Value, place: Any, made: types.Array) -> Any:
     builder = lowering.builder
-    parts = code.ArrayParts(builder, array._kind, array._value)
-    shape, strides, offset = [], [], code.I64(0)
+    parts = llvm.ArrayParts(builder, array._kind, array._value)
+    shape, strides, offset = [], [], llvm.I64(0)
     places = _places(place)
     for k, (count, stride) in enumerate(zip(parts.shape, parts.strides, strict=True)):
         one = places[k] if k < len(places) else slice(None)
@@ -156,8 +155,8 @@ def _part(lowering: Any, array: Value, place: Any, made: types.Array) -> Any:
         else:
             first = _index(lowering, one, count)
         offset = builder.add(offset, builder.mul(first, stride))
-    data = code.byte_pointer(builder, parts.data, offset)
-    return code.make_array(builder, made, data, shape, strides)
+    data = llvm.byte_pointer(builder, parts.data, offset)
+    return llvm.make_array(builder, made, data, shape, strides)
 
 
 def attribute(lowering: Any, thing: Value, name: str) -> Any:
@@ -174,7 +173,7 @@ def attribute(lowering: Any, thing: Value, name: str) -> Any:
 
 def _of_array(lowering: Any, thing: Value, name: str) -> Any:
     kind, builder = thing._kind, lowering.builder
-    parts = code.ArrayParts(builder, kind, thing._value)
+    parts = llvm.ArrayParts(builder, kind, thing._value)
     if name in ("shape", "strides"):
         found = getattr(parts, name) if builder else [None] * kind.ndim
         return tuple(Value(types.intp, one) for one in found)
@@ -193,23 +192,23 @@ def _of_record(lowering: Any, thing: Value, name: str) -> Any:
     if name not in kind.fields:
         raise AttributeError(f"a record has no field '{name}'")
     found = kind.typeof(name)
-    at = builder and builder.gep(thing._value, [code.I64(kind.offset(name))])
+    at = builder and builder.gep(thing._value, [llvm.I64(kind.offset(name))])
     if isinstance(found, types.NestedArray):
         made = types.Array(found.dtype, found.ndim, "C", aligned=False)
         if builder is None:
             return Value(made, None)
-        size = code.memory_type(found.dtype)
+        size = llvm.memory_type(found.dtype)
         strides = [
             math.prod(found.shape[k + 1 :]) * found.dtype.bitwidth // 8 for k in range(found.ndim)
         ]
-        return Value(made, code.make_array(
+        return Value(made, llvm.make_array(
             builder, made, builder.bitcast(at, size.as_pointer()),
-            list(map(code.I64, found.shape)), list(map(code.I64, strides)),
+            list(map(llvm.I64, found.shape)), list(map(llvm.I64, strides)),
         ))  # fmt: skip
     if builder is None:
         return lowering.wrapped(found, None)
-    at = builder.bitcast(at, code.memory_type(found).as_pointer())
-    return lowering.wrapped(found, code.get(builder, found, at, 1))
+    at = builder.bitcast(at, llvm.memory_type(found).as_pointer())
+    return lowering.wrapped(found, llvm.get(builder, found, at, 1))
 
 
 def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
@@ -219,18 +218,17 @@ def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
         raise AttributeError(f"{kind} has no attribute '{name}' that can be set")
     found = kind.typeof(name)
     if builder is not None:
-        at = builder.gep(thing._value, [code.I64(kind.offset(name))])
-        at = builder.bitcast(at, code.memory_type(found).as_pointer())
-        code.put(builder, found, lowering.lowered(value, found), at, 1)
+        at = builder.gep(thing._value, [llvm.I64(kind.offset(name))])
+        at = builder.bitcast(at, llvm.memory_type(found).as_pointer())
+        llvm.put(builder, found, lowering.lowered(value, found), at, 1)
 
 
 def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
-    """Reinterpret the bits of a number as another type."""
     wanted = OPERATIONS[getattr(number, "seen", number)](types.int64).result
     if wanted.bitwidth != thing._kind.bitwidth:
         raise Untraceable("numbers of other widths have other bits")
     builder = lowering.builder
-    return Value(wanted, builder and builder.bitcast(thing._value, code.register_type(wanted)))
+    return Value(wanted, builder and builder.bitcast(thing._value, llvm.register_type(wanted)))
 
 
 def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
@@ -242,9 +240,9 @@ def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
     if builder is None:
         return lowering.wrapped(kind, None)
     values = [lowering.lowered(thing, kind) for thing in things]
-    index = _index(lowering, place, code.I64(len(values)))
-    room = code.room(builder, ir.ArrayType(code.memory_type(kind), len(values)))
+    index = _index(lowering, place, llvm.I64(len(values)))
+    room = llvm.room(builder, ir.ArrayType(llvm.memory_type(kind), len(values)))
     for k, value in enumerate(values):
-        code.put(builder, kind, value, code.at(builder, room, 0, k))
-    found = builder.gep(room, [code.I64(0), index], inbounds=True)
-    return lowering.wrapped(kind, code.get(builder, kind, found))
+        llvm.put(builder, kind, value, llvm.at(builder, room, 0, k))
+    found = builder.gep(room, [llvm.I64(0), index], inbounds=True)
+    return lowering.wrapped(kind, llvm.get(builder, kind, found))

@@ -22,15 +22,14 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler import values
-from karamelo_py.compiler.choices import codes_in
-from karamelo_py.compiler.flow import Edge, Flow, Grows, Range, is_value
-from karamelo_py.compiler.values import LONG, Untraceable, emit
+from karamelo_py.compiler.trace import values
+from karamelo_py.compiler.trace.choices import codes_in
+from karamelo_py.compiler.trace.flow import Edge, Flow, Grows, Range, is_value
+from karamelo_py.compiler.trace.values import LONG, Untraceable, emit
 
 
 @functools.cache
 def _stored(node: ast.AST) -> frozenset[str]:
-    """List the names that a statement assigns."""
     return frozenset(
         n.id for n in ast.walk(node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
     )
@@ -71,7 +70,6 @@ def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast
 
 
 def _has(node: ast.expr, code: python.CodeType) -> bool:
-    """Tell whether the code of a lambda is within an expression."""
     begin, end = (node.lineno, node.col_offset), (node.end_lineno, node.end_col_offset)
     places = [p for p in code.co_positions() if None not in p and p[3]]
     return all(begin <= (p[0], p[2]) and (p[1], p[3]) <= end for p in places)

@@ -9,12 +9,15 @@ import numpy as np
 from llvmlite import ir
 from numba import typeof, types
 
-from karamelo_py.compiler import arithmetic, code, failing, indexing
-from karamelo_py.compiler import values as traced
-from karamelo_py.compiler.held import HeldTuple, item_of
-from karamelo_py.compiler.session import current
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import arithmetic, exceptions
+from karamelo_py.compiler.trace import indexing
+from karamelo_py.compiler.trace import values as traced
+from karamelo_py.compiler.trace.choices import tag_class
+from karamelo_py.compiler.trace.held import HeldTuple, item_of
+from karamelo_py.compiler.trace.session import session
 
-MOST_OPERATIONS = 10_000  # of one formula; above it, a loop is better left to LLVM
+MOST_OPERATIONS = 10_000  # of one function; above it, a loop is better left to LLVM
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
@@ -43,7 +46,7 @@ class Lowering:
     """
 
     dispatch: Callable  # calls functions selected by type
-    key: tuple | None = None  # of the formula whose types are being determined
+    key: tuple | None = None  # of the function whose result type is being determined
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
@@ -68,7 +71,7 @@ class Lowering:
                 self.wrapped(item, value and self.builder.extract_value(value, k))
                 for k, item in enumerate(kind)
             ]
-            made = getattr(kind, "instance_class", None)
+            made = tag_class(kind)
             return made(*inner) if made else tuple(inner)
         if isinstance(kind, types.NamedTupleClass):
             return kind.instance_class
@@ -94,21 +97,21 @@ class Lowering:
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
         """Return the code of a wrapped thing in the type `wanted`."""
         if isinstance(thing, _TRACED):
-            return code.cast(self.builder, thing._value, thing._kind, wanted)
+            return llvm.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
-            return code.make_tuple(self.builder, wanted, items)
+            return llvm.make_tuple(self.builder, wanted, items)
         if isinstance(thing, int | float | np.generic):
-            scalar = types.unliteral(code.scalar_of(wanted))
+            scalar = types.unliteral(llvm.scalar_of(wanted))
             if isinstance(scalar, types.Number | types.Boolean):
-                made = code.constant(self.builder, scalar, thing)
-                return code.cast(self.builder, made, scalar, wanted)
-        return code.nothing()
+                made = llvm.constant(self.builder, scalar, thing)
+                return llvm.cast(self.builder, made, scalar, wanted)
+        return llvm.nothing()
 
     def constant(self, array: np.ndarray) -> traced.Value:
         """Return a constant array."""
         kind = typeof(array)
-        return traced.Value(kind, self.builder and code.constant(self.builder, kind, array))
+        return traced.Value(kind, self.builder and llvm.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
         """Return the common type of several types, or None."""
@@ -150,7 +153,7 @@ class Lowering:
     def operation(self, function: Callable, kinds: tuple) -> arithmetic.Operation | None:
         """Return the operation of a function for arguments of these types."""
         key = function, numbers_of(kinds)
-        known = current().operations
+        known = session.operations
         if key not in known:
             if isinstance(function, traced.Intrinsic):
                 known[key] = _of_intrinsic(function, kinds)
@@ -179,10 +182,10 @@ class Lowering:
 
     def in_type_of(self, thing: Any, like: Any) -> Any:
         """Convert an integer to the real type of `like`."""
-        kind = code.scalar_of(like._kind)
-        if isinstance(thing._kind, code.Lanes):
-            kind = code.Lanes(kind, thing._kind.width)
-        value = self.builder and code.cast(self.builder, thing._value, thing._kind, kind)
+        kind = llvm.scalar_of(like._kind)
+        if isinstance(thing._kind, llvm.Lanes):
+            kind = llvm.Lanes(kind, thing._kind.width)
+        value = self.builder and llvm.cast(self.builder, thing._value, thing._kind, kind)
         return traced.Value(kind, value)
 
     def cast(self, thing: Any, kind: types.Type) -> Any:
@@ -220,36 +223,35 @@ class Lowering:
         given = iter(values)
         with traced.writing(self):
             found = run(
-                *(self.wrapped(k, None if code.is_empty(k) else next(given)) for k in kinds)
+                *(self.wrapped(k, None if llvm.is_empty(k) else next(given)) for k in kinds)
             )
-            if code.is_empty(result):
+            if llvm.is_empty(result):
                 self.builder.ret_void()
             else:
                 self.builder.ret(self.lowered(found, result))
 
-    def call_own(
-        self, name: str, run: Callable, kinds: tuple, result: types.Type, arguments: tuple
-    ) -> Any:
-        """Call the separate function that does what `run` does."""
+    def call_own(self, traced: Any, kinds: tuple, arguments: tuple) -> Any:
+        """Call a separate function of this module, made from a `TracedFunction`."""
         if self.builder is None:
-            return self.wrapped(result, None)
-        return self.call_function(self.function(name, run, kinds, result), kinds, result, arguments)
+            return self.wrapped(traced.result, None)
+        function = self.function(traced.name, traced.run, kinds, traced.result)
+        return self.call_function(function, kinds, traced.result, arguments)
 
     def call_function(
         self, function: Any, kinds: tuple, result: types.Type, arguments: tuple
     ) -> Any:
         """Call an LLVM function."""
         pairs = zip(arguments, kinds, strict=True)
-        values = [self.lowered(a, k) for a, k in pairs if not code.is_empty(k)]
-        made = self.builder.call(function, values + failing.passed_to(self.builder, function))
-        failing.go_on(self.builder, function, self.regardless)
-        return self.wrapped(result, None if code.is_empty(result) else made)
+        values = [self.lowered(a, k) for a, k in pairs if not llvm.is_empty(k)]
+        made = self.builder.call(function, values + exceptions.passed_to(self.builder, function))
+        exceptions.go_on(self.builder, function, self.regardless)
+        return self.wrapped(result, None if llvm.is_empty(result) else made)
 
 
 def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
     """LLVM type of a function of values of these types; empty ones are not passed."""
-    gives = ir.VoidType() if code.is_empty(result) else code.register_type(result)
-    given = [code.register_type(k) for k in kinds if not code.is_empty(k)]
+    gives = ir.VoidType() if llvm.is_empty(result) else llvm.register_type(result)
+    given = [llvm.register_type(k) for k in kinds if not llvm.is_empty(k)]
     return ir.FunctionType(gives, [*given, *more])
 
 
@@ -257,7 +259,7 @@ def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str)
     """Start an LLVM function; except on GPUs it gets the address of a `Failure`."""
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
-    return failing.told(ir.Function(module, function_type(kinds, result, code.I64), name))
+    return exceptions.told(ir.Function(module, function_type(kinds, result, llvm.I64), name))
 
 
 _OF_ITEMS = {operator.getitem, operator.setitem}

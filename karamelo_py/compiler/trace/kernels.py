@@ -17,15 +17,18 @@ from typing import Any, NamedTuple
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import cache, choices, code, compile_lock, machine, trace
-from karamelo_py.compiler.argument_buffer import Address, ArgumentBuffer, plan_for, reader
-from karamelo_py.compiler.compile import shared
-from karamelo_py.compiler.failing import Failure, failure_at, noting
-from karamelo_py.compiler.held import HeldTuple, hold, item_of
-from karamelo_py.compiler.lowering import function_type, new_function
-from karamelo_py.compiler.session import current, one_at_a_time
-from karamelo_py.compiler.trace import formula, not_inlined, write_into
-from karamelo_py.compiler.values import (
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import machine
+from karamelo_py.compiler.code.arguments import Address, ArgumentBuffer, plan_for, reader
+from karamelo_py.compiler.code.exceptions import Failure, failure_at, noting
+from karamelo_py.compiler.disk import cache, lock
+from karamelo_py.compiler.trace import choices, functions
+from karamelo_py.compiler.trace.functions import not_inlined, traced, write_into
+from karamelo_py.compiler.trace.held import HeldTuple, hold, item_of
+from karamelo_py.compiler.trace.lowering import function_type, new_function
+from karamelo_py.compiler.trace.primitives import shared
+from karamelo_py.compiler.trace.session import one_at_a_time, session
+from karamelo_py.compiler.trace.values import (
     Untraceable,
     builtin,
     called_in_one,
@@ -52,7 +55,7 @@ class Unit(NamedTuple):
 def load(unit: Unit) -> list[int]:
     """Load a unit; return the addresses of its function and its entry."""
     with one_at_a_time:
-        loaded = current().loaded
+        loaded = session.loaded
         if unit.name not in loaded:
             for needed in unit.needs:
                 load(needed)
@@ -81,7 +84,6 @@ class Compilation:
 
     @contextmanager
     def __call__(self, name: str = "") -> Iterator[None]:
-        """Report that a kernel is being compiled here or by another process."""
         listeners = self._listeners.get()
         for listener in listeners:
             listener.on_start(name)
@@ -93,7 +95,7 @@ class Compilation:
 
 
 compilation = Compilation()
-compile_lock.waiting = compilation
+lock.waiting = compilation
 
 
 @contextmanager
@@ -108,16 +110,6 @@ def _no_collections() -> Iterator[None]:
             gc.enable()
 
 
-def many_threads() -> bool:
-    """Tell whether many threads may write to one number at a time: see `values.in_one`."""
-    return False
-
-
-@builtin(many_threads)
-def _many_threads(lowering: Any) -> bool:
-    return in_one_module()
-
-
 def written(
     function: Callable,
     kinds: tuple,
@@ -130,8 +122,8 @@ def written(
     ``entry(module, main, kinds, result)`` writes an entry other than Python's.
     """
     with one_at_a_time:
-        found = formula(function, kinds)
-        result = found.result if result is None else result
+        chosen = traced(function, kinds)
+        result = chosen.result if result is None else result
         module = ir.Module(NAME)
         module.needs = {}
         main = new_function(module, kinds, result, NAME)
@@ -139,16 +131,15 @@ def written(
         main.attributes.add("nounwind")
         lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
         try:
-            lowering.give_back(found.run, kinds, main.args, result)
+            lowering.give_back(chosen.run, kinds, main.args, result)
         except Untraceable as why:
-            raise trace.CannotCompile(str(why), function) from why
+            raise functions.CannotCompile(str(why), function) from why
         (entry or _write_entry)(module, main, kinds, result)
         module.raises = hasattr(main, "raises")
         return module, result
 
 
 def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> Unit:
-    """Trace a function, and compile what no file has."""
     with compilation(function.__name__), _no_collections(), choices.modules_noted() as modules:
         choices.note(choices.modules_of(function))
         module, result = written(function, kinds, result)
@@ -164,7 +155,7 @@ def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
     """Write code that reads arguments of these types from memory."""
     held = HeldTuple(kinds)
     place = builder.inttoptr(address, held.register_type())
-    full = (k for k, kind in enumerate(kinds) if not code.is_empty(kind))
+    full = (k for k, kind in enumerate(kinds) if not llvm.is_empty(kind))
     return [item_of(builder, held, place, k) for k in full]
 
 
@@ -173,12 +164,12 @@ def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: typ
 
     It is called with the addresses of these, and of a `Failure`.
     """
-    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [code.I64] * 3), NAME + ENTRY)
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [llvm.I64] * 3), NAME + ENTRY)
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
     given = builder.call(main, [*items_at(builder, kinds, entry.args[0]), entry.args[2]])
-    if not code.is_empty(result):
-        room = builder.inttoptr(entry.args[1], code.memory_type(result).as_pointer())
-        code.put(builder, result, given, room, 1)
+    if not llvm.is_empty(result):
+        room = builder.inttoptr(entry.args[1], llvm.memory_type(result).as_pointer())
+        llvm.put(builder, result, given, room, 1)
     builder.ret_void()
 
 
@@ -194,7 +185,7 @@ class Kernel:
         self.files = cache.KernelFiles(function, load)
         self.units: dict[tuple, Unit] = {}
         self._plans: dict[tuple, tuple] = {}
-        self._changes = current().changes
+        self._changes = session.changes
         builtin(self)(self.in_kernel)
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
@@ -208,10 +199,9 @@ class Kernel:
             return self.units[kinds]
 
     def _find_changes(self) -> None:
-        """Drop compiled code if implementations have changed."""
-        if self._changes != current().changes:
+        if self._changes != session.changes:
             with one_at_a_time:
-                self._changes = current().changes
+                self._changes = session.changes
                 self.units, self._plans = {}, {}
 
     def __call__(self, *arguments: Any) -> Any:
@@ -246,8 +236,7 @@ class Kernel:
         held = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
         if in_one_module():
-            own = formula(self.function, kinds)
-            return lowering.call_own(own.name, own.run, kinds, own.result, held)
+            return lowering.call_own(traced(self.function, kinds), kinds, held)
         unit = self.unit(kinds)
         choices.note(unit.modules)
         if lowering.builder is None:
@@ -286,8 +275,8 @@ def address_of(function: Callable, signature: types.Type) -> int:
     Callers do not contain it: they need not be compiled again for another function, and it is
     compiled once for all of them.
     """
-    key = function, signature, current().changes
-    addresses = current().addresses
+    key = function, signature, session.changes
+    addresses = session.addresses
     if key not in addresses:
         if choices.INTERPRETED:
             addresses[key] = address_of_python(function, signature)
@@ -304,8 +293,8 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
     """
     if choices.INTERPRETED:
         callback: Any = functools.partial(function)  # a bound method would be freed at once
-        address = Address(next(current().numbers))
-        current().interpreted[int(address)] = callback
+        address = Address(next(session.numbers))
+        session.interpreted[int(address)] = callback
     else:
         count = len(signature.args) + 1  # the last one is for exceptions
         callback = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
@@ -319,12 +308,12 @@ def caller_of(signature: Any) -> Callable:
     result, parameters = signature.return_type, signature.args
 
     if choices.INTERPRETED:
-        return lambda address, *arguments: current().interpreted[address](*arguments)
+        return lambda address, *arguments: session.interpreted[address](*arguments)
 
     @intrinsic
     def by_address(address, *arguments):
         def codegen(builder, place, *values):
-            kind = function_type(parameters, result, code.I64)
+            kind = function_type(parameters, result, llvm.I64)
             pointer = builder.inttoptr(place, kind.as_pointer())
             return builder.call(pointer, [*values, failure_at(builder)])
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from llvmlite import ir
 
-from karamelo_py.compiler import code, machine
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.code import machine
 
 
 class Failure(ctypes.Structure):
@@ -93,7 +94,7 @@ def told(function: ir.Function) -> ir.Function:
 def failure_at(builder: ir.IRBuilder) -> Any:
     """Return the address of the `Failure` in the present function, or 0."""
     own = builder.function
-    return own.args[-1] if hasattr(own, "told") else code.I64(0)
+    return own.args[-1] if hasattr(own, "told") else llvm.I64(0)
 
 
 def passed_to(builder: ir.IRBuilder, called: Any) -> list:
@@ -112,11 +113,11 @@ def _return(builder: ir.IRBuilder) -> None:
 def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
     """Write code that records an exception and returns."""
     text = pickle.dumps((kind, arguments))
-    constant = ir.Constant(ir.ArrayType(code.I8, len(text)), bytearray(text))
-    place = code.in_module(builder, constant, "exception")
-    function = code.external(builder, "karamelo_fail", ir.VoidType(), [code.I64] * 3)
-    at = builder.ptrtoint(place, code.I64)
-    builder.call(function, [at, code.I64(len(text)), failure_at(builder)])
+    constant = ir.Constant(ir.ArrayType(llvm.I8, len(text)), bytearray(text))
+    place = llvm.in_module(builder, constant, "exception")
+    function = llvm.external(builder, "karamelo_fail", ir.VoidType(), [llvm.I64] * 3)
+    at = builder.ptrtoint(place, llvm.I64)
+    builder.call(function, [at, llvm.I64(len(text)), failure_at(builder)])
     builder.function.raises = True
     _return(builder)
 
@@ -131,7 +132,7 @@ def go_on(builder: ir.IRBuilder, called: Any, regardless: bool) -> None:
     builder.function.raises = True
     if regardless:
         return
-    flag = builder.inttoptr(failure_at(builder), code.I64.as_pointer())
-    raised = builder.icmp_signed("!=", builder.load(flag), code.I64(0))
+    flag = builder.inttoptr(failure_at(builder), llvm.I64.as_pointer())
+    raised = builder.icmp_signed("!=", builder.load(flag), llvm.I64(0))
     with builder.if_then(raised, likely=False):
         _return(builder)

@@ -1,10 +1,9 @@
 """Tuples of arrays stored in memory and passed as one pointer.
 
-A setup has about forty arrays of seven to nine numbers. Passed separately, they would be three
-hundred arguments of each call, and half of the code to compile. Therefore a kernel holds its setup
-when it starts: a tuple with arrays becomes a pointer to its items, and so do nested tuples. The
-type of a held tuple is still a tuple type (items by name and index, selection by class); tuples
-without arrays remain values.
+A setup has about forty arrays of seven to nine numbers: three hundred arguments of each call, and
+half of the code to compile. Therefore a kernel holds its setup when it starts: a tuple with arrays
+becomes a pointer to its items, and so do nested tuples. Its type is still a tuple type (items by
+name and index, selection by class); tuples without arrays remain values.
 """
 
 import hashlib
@@ -14,21 +13,24 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import code
-from karamelo_py.compiler.values import HeldValue, builtin
+from karamelo_py.compiler import llvm
+from karamelo_py.compiler.trace.choices import tag_class
+from karamelo_py.compiler.trace.values import HeldValue, builtin
 
 
-def _words(numba_type: Any) -> str:
+def _words(kind: Any) -> str:
     """Name a type, with the modules of its classes, which Numba's names omit."""
-    if isinstance(numba_type, types.BaseTuple) and not isinstance(numba_type, HeldTuple):
-        kind = getattr(numba_type, "instance_class", tuple)
-        inner = ", ".join(_words(item) for item in numba_type)
-        return f"{kind.__module__}.{kind.__qualname__}({inner})"
-    return str(numba_type)
+    if isinstance(kind, types.BaseTuple) and not isinstance(kind, HeldTuple):
+        tag = tag_class(kind) or tuple
+        return f"{tag.__module__}.{tag.__qualname__}({', '.join(map(_words, kind))})"
+    return str(kind)
 
 
 class HeldTuple(types.BaseTuple):
     """Type of a pointer to the items of a tuple or NamedTuple."""
+
+    fields: tuple[str, ...] = ()
+    instance_class: Any = None
 
     def __init__(self, items: tuple, instance_class: type | None = None):
         self.types = items
@@ -37,17 +39,17 @@ class HeldTuple(types.BaseTuple):
         if instance_class is not None:
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
-        text = f"{word}({', '.join(_words(item) for item in items)})"
+        text = f"{word}({', '.join(map(_words, items))})"
         # Short, because it is part of function names.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
     def key(self):
-        return getattr(self, "instance_class", None), self.types
+        return self.instance_class, self.types
 
     def register_type(self) -> ir.Type:
         """LLVM type: a pointer to a structure of the items."""
-        return ir.LiteralStructType(map(code.memory_type, self.types)).as_pointer()
+        return ir.LiteralStructType(map(llvm.memory_type, self.types)).as_pointer()
 
     def __getitem__(self, k: int) -> types.Type:
         return self.types[k]
@@ -59,22 +61,18 @@ class HeldTuple(types.BaseTuple):
         return iter(self.types)
 
 
-def _has_arrays(numba_type: Any) -> bool:
-    if isinstance(numba_type, types.BaseTuple):
-        return isinstance(numba_type, HeldTuple) or any(_has_arrays(item) for item in numba_type)
-    return isinstance(numba_type, types.Array)
+def _has_arrays(kind: Any) -> bool:
+    if isinstance(kind, types.BaseTuple):
+        return isinstance(kind, HeldTuple) or any(map(_has_arrays, kind))
+    return isinstance(kind, types.Array)
 
 
-def held_type(numba_type: Any) -> Any:
+def held_type(kind: Any) -> Any:
     """Return the type of a value when held; unchanged without tuples that contain arrays."""
-    if (
-        not isinstance(numba_type, types.BaseTuple)
-        or isinstance(numba_type, HeldTuple)
-        or not _has_arrays(numba_type)
-    ):
-        return numba_type
-    items = tuple(held_type(item) for item in numba_type)
-    return HeldTuple(items, getattr(numba_type, "instance_class", None))
+    is_tuple = isinstance(kind, types.BaseTuple) and not isinstance(kind, HeldTuple)
+    if not is_tuple or not _has_arrays(kind):
+        return kind
+    return HeldTuple(tuple(map(held_type, kind)), tag_class(kind))
 
 
 def hold(value: Any) -> Any:
@@ -96,16 +94,16 @@ def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
     """Store things in memory as a held tuple of this type."""
     builder = lowering.builder
     items = [_hold(lowering, thing) for thing in things]
-    place = builder and code.room(builder, held.register_type().pointee)
+    room = builder and llvm.room(builder, held.register_type().pointee)
     if builder:
-        for k, (item, part) in enumerate(zip(held, items, strict=True)):
-            code.put(builder, item, lowering.lowered(part, item), code.at(builder, place, 0, k))
-    return HeldValue(held, place)
+        for k, (kind, item) in enumerate(zip(held, items, strict=True)):
+            llvm.put(builder, kind, lowering.lowered(item, kind), llvm.at(builder, room, 0, k))
+    return HeldValue(held, room)
 
 
-def item_of(builder: Any, held: HeldTuple, place: Any, k: int) -> Any:
-    """Write code that reads item `k` of a held tuple."""
-    return code.get(builder, held[k], code.at(builder, place, 0, k))
+def item_of(builder: Any, held: HeldTuple, pointer: Any, k: int) -> Any:
+    """Load item `k` of a held tuple."""
+    return llvm.get(builder, held[k], llvm.at(builder, pointer, 0, k))
 
 
 def at_hand(held: Any) -> Any:
@@ -123,17 +121,16 @@ def _at_hand(lowering: Any, held: Any) -> Any:
     return HeldValue(held._kind, _copy(lowering.builder, held._kind, held._value))
 
 
-def _copy(builder: Any, held: HeldTuple, there: Any) -> Any:
-    """Write code that copies a held tuple and the held tuples in it."""
-    place = code.room(builder, there.type.pointee)
-    builder.store(builder.load(there), place)
+def _copy(builder: Any, held: HeldTuple, source: Any) -> Any:
+    room = llvm.room(builder, source.type.pointee)
+    builder.store(builder.load(source), room)
     for k, item in enumerate(held):
         if is_held(item):
-            at = code.at(builder, place, 0, k)
+            at = llvm.at(builder, room, 0, k)
             builder.store(_copy(builder, item, builder.load(at)), at)
-    return place
+    return room
 
 
-def is_held(numba_type: Any) -> bool:
+def is_held(kind: Any) -> bool:
     """Tell whether a type is a held tuple."""
-    return isinstance(numba_type, HeldTuple)
+    return isinstance(kind, HeldTuple)

@@ -1,7 +1,7 @@
-"""Functions that choose by type, and the modules in which what they choose was written.
+"""Implementations selected by type, and the modules in which they were written.
 
-The key of a kernel on disk contains the sources of these modules, and the versions of libraries
-(`cache.py`).
+The key of a kernel on disk contains the sources of these modules (`cache`). Both lists are filled
+by decorators when modules are imported.
 """
 
 import contextvars
@@ -19,20 +19,24 @@ INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
-ROOMS = "compiler", "kernels", "points", "schemes", "styles"  # whose sources are in every key
+ROOMS = (
+    "compiler",
+    "kernels",
+    "points",
+    "schemes",
+    "styles",
+)  # whose sources all keys have
 
-choosers: dict[Callable, list[Callable]] = {}  # of what kernels choose by type
-# What says what functions are in kernels, and is more than the sources of the rooms tell.
-registered: list[Callable] = []
+choosers: dict[Callable, list[Callable]] = {}  # of functions: implementations by argument types
+registered: list[Callable] = []  # implementations that the sources of `ROOMS` do not determine
 
-# Modules elsewhere that functions are made of that are compiled, innermost last; in each thread of
-# Python its own.
+# Modules outside `ROOMS` of the functions that are being compiled, innermost last.
 _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("noted", default=())
 
 
 @functools.cache
 def is_elsewhere(module: str) -> bool:
-    """Tell whether a module is neither of a library nor of the rooms that every key has."""
+    """Tell whether a module is neither of a library nor in `ROOMS`."""
     top, _, rest = module.partition(".")
     return top not in LIBRARIES and not (top == _PACKAGE and rest.partition(".")[0] in ROOMS)
 
@@ -47,28 +51,28 @@ def modules_of(*things: Any) -> set[str]:
 
 
 def register(made: Callable) -> None:
-    """Note what a function is in kernels for some types: all keys have it."""
+    """Put an implementation into all keys, unless the sources of `ROOMS` determine it."""
     is_function = isinstance(made, python.FunctionType)
-    given = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
-    if given or modules_of(made):
+    has_values = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
+    if has_values or modules_of(made):
         registered.append(made)
 
 
 def note(modules: Iterable[str]) -> None:
-    """Note modules elsewhere that the function consists of that is compiled now."""
+    """Record modules elsewhere that the present function contains."""
     if noted := _noted.get():
         noted[-1].update(modules)
 
 
 @contextmanager
 def modules_noted() -> Iterator[set[str]]:
-    """Collect what is noted meanwhile."""
-    before, modules = _noted.get(), set()
-    _noted.set((*before, modules))
+    """Collect the modules that are recorded within this context."""
+    modules: set[str] = set()
+    before = _noted.set((*_noted.get(), modules))
     try:
         yield modules
     finally:
-        _noted.set(before)
+        _noted.reset(before)
 
 
 def name_of(thing: Any) -> str:
@@ -77,7 +81,7 @@ def name_of(thing: Any) -> str:
 
 
 def tag_class(numba_type: Any) -> Any:
-    """Return the class of a tag, by which point functions are selected, from its type."""
+    """Return the class of a NamedTuple type, by which point functions are selected, or None."""
     return getattr(numba_type, "instance_class", None)
 
 

@@ -1,6 +1,9 @@
-"""Memory of the compiler: functions, types, arrays and machine code found so far."""
+"""Memory of the compiler: functions, types, arrays and machine code of this process.
 
-import contextvars
+There is one, because LLVM's engine, the implementations of point functions and the names by which
+machine code calls other machine code belong to the process, too.
+"""
+
 import itertools
 import sys
 import threading
@@ -10,27 +13,25 @@ from weakref import WeakValueDictionary
 
 
 class Session:
-    """Memory of the compiler; one thread of Python at a time compiles (`one_at_a_time`)."""
+    """Caches; one thread of Python at a time compiles (`one_at_a_time`)."""
 
     def __init__(self) -> None:
-        self.seen: dict[Any, Any] = {}
-        self.walked: dict[Callable, Any] = {}
-        self.functions: dict[tuple, Any] = {}  # compiled for types of arguments
+        self.seen: dict[Any, Any] = {}  # replacements of globals
+        self.walked: dict[Callable, Any] = {}  # texts of functions
+        self.functions: dict[tuple, Any] = {}  # with result types, by types of arguments
         self.operations: dict[tuple, Any] = {}
-        self.outdated = False  # functions have to be found anew
+        self.outdated = False  # whether functions have to be selected again
         self.changes = 0  # of implementations that compiled kernels may contain
         self.loaded: dict[str, list[int]] = {}  # addresses, by names of kernels
         self.addresses: dict[tuple, int] = {}
         self.interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
-        # Arrays that kernels were called with, by id, and numbers of their types.
-        self.arrays: dict[int, Any] = {}
+        self.arrays: dict[int, Any] = {}  # that kernels were called with, by id
         self.array_types: dict[tuple, int] = {}
         self.numbers = itertools.count()  # safe in threads
         self.waits = True  # for other processes that compile; False after a timeout
 
 
-_session = contextvars.ContextVar("session", default=Session())  # noqa: B039
-current = _session.get
+session = Session()
 one_at_a_time = threading.RLock()
 
 

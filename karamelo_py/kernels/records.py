@@ -1,4 +1,4 @@
-"""Node records (nodes, components), read and written in lanes."""
+"""Node records: rows of node arrays (nodes, components), read and written for numbers and lanes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,29 +6,99 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from karamelo_py.compiler import arithmetic, code, machine
-from karamelo_py.compiler.choices import tag_class
-from karamelo_py.compiler.code import I32, I64, Lanes, lane, pack, shuffle, splat
-from karamelo_py.compiler.compile import (
-    Weighted,
-    accumulate,
-    implements,
-    lanes_of,
-    prefetch_records,
-)
-from karamelo_py.compiler.lanes.arrays import Beside, ask, at_lane
-from karamelo_py.compiler.tuples import row
-from karamelo_py.compiler.values import intrinsic
-
-# Bytes of a record written at once: a register. LLVM splits wider vectors in two, and narrow
-# registers are too few for that.
-_AT_ONCE = 64 if "+avx512f" in machine.features() else 32
+from karamelo_py.compiler import fma, implements, intrinsic, llvm, shared, tag_class
+from karamelo_py.compiler.lanes import REGISTER_BYTES, Beside, ask, at_lane, lanes_of
+from karamelo_py.compiler.llvm import I32, I64, Lanes, lane, pack, shuffle, splat
+from karamelo_py.points.basis.weighted import Weighted
 
 AHEAD = 16  # nodes whose records are prefetched ahead
 
 
+def put_at(array, i, first, values):
+    """array[i, first + k] = values[k]."""
+    for k, value in enumerate(values):
+        array[i, first + k] = value
+
+
+def clear_first(array, i):
+    """Set the first component of record `i` to zero, unless `array` is None."""
+    if array is not None:
+        array[i, 0] = 0
+
+
+@shared
+def row(array, i, first, like):
+    """(array[i, first], ..., array[i, first + len(like) - 1])."""
+    if isinstance(i, Weighted):
+        total = [a - a for a in like]
+        for one, weight in zip(i.rows, i.weights, strict=True):
+            record = row(array, one, first, like)
+            total = [fma(weight, x, t) for x, t in zip(record, total, strict=True)]
+        return tuple(total)
+    return tuple([array[i, first + k] for k in range(len(like))])
+
+
+@shared
+def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
+    """array[i, first + k] += values[k], lane after lane."""
+    if isinstance(i, Weighted):
+        for one, weight in zip(i.rows, i.weights, strict=True):
+            accumulate(array, one, first, tuple([weight * value for value in values]))
+    else:
+        for k, value in enumerate(values):
+            array[i, first + k] += value
+
+
+def accumulate_affine(array, nodes, first, weights, field):
+    """Add an affine field times the weights to nodes: components from `first` on.
+
+    `field` is the value at the first node, and the slopes. The value grows by ``slopes[d]`` to the
+    next node in direction `d` (nodes form a square or cube, last direction fastest); without slopes
+    it is constant.
+    """
+    value, slopes = field
+    width = _width(nodes, slopes)
+    for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
+        for c, number in enumerate(value):
+            for d, slope in enumerate(reversed(slopes)):
+                number = number + (k // width**d % width) * slope[c]
+            array[node, first + c] += weight * number
+
+
+def move_record(target, source, first, like, keep):
+    """Add components of a record to one of another array, as many as `like` has, and zero them.
+
+    `target` and `source` are arrays with a row. If not `keep`, the old content is replaced.
+    """
+    array, i = target
+    other, j = source
+    for k in range(first, first + len(like)):
+        array[i, k] = (array[i, k] if keep else 0) + other[j, k]
+        other[j, k] = 0
+
+
+@shared
+def prefetch_records(array: Any, i: Any) -> None:
+    """Prefetch the records `AHEAD` nodes after those in lanes."""
+
+
+# --- code for lanes -------------------------------------------------------------------------------
+
+
+def _width(nodes: Any, slopes: Any) -> int:
+    """Return the number of nodes per direction."""
+    return round(len(nodes) ** (1 / max(1, len(slopes))))
+
+
+def _size(array: Any) -> int:
+    return array.dtype.bitwidth // 8
+
+
+_fma = llvm.of_library("llvm.fma")  # a b + c of vectors, rounded once
+
+
 def _transposed(builder: Any, rows: list) -> list:
-    """Transpose four vectors of four numbers, or of two: lanes from records."""
+    """Transpose four vectors of four or two numbers: lanes from records."""
     if rows[0].type.count == 2:
         ab = shuffle(builder, rows[0], rows[1], [0, 2, 1, 3])
         cd = shuffle(builder, rows[2], rows[3], [0, 2, 1, 3])
@@ -43,8 +113,8 @@ def _transposed(builder: Any, rows: list) -> list:
 
 
 def _record(builder: Any, kind: Any, pointer: Any, components: int) -> Any:
-    """Address of some components of a record, as a vector."""
-    vector = ir.VectorType(code.register_type(kind.dtype), components)
+    """Cast an address to that of a vector of components."""
+    vector = ir.VectorType(llvm.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())
 
 
@@ -62,7 +132,7 @@ def _chunks(count: int) -> list[tuple[int, int]]:
 
 
 def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
-    """Lanes of `count` components from the records of the points."""
+    """Return lanes of `count` components from the records of the points."""
     if count == 1:
         return [pack(builder, [lane(builder, row, 0) for row in rows], lanes)]
     parts = [_transposed(builder, rows[k : k + 4]) for k in range(0, lanes.width, 4)]
@@ -72,18 +142,18 @@ def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
 
 
 def _gathered(builder: Any, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
-    """Components of records in lanes: ``read(lane, column, count)`` returns some of one point."""
-    found: list = []
+    """Gather records; ``read(lane, column, count)`` loads components of one point."""
+    components: list = []
     for begin, count in _chunks(len(like)):
         column = builder.add(first, I64(begin))
         rows = [read(k, column, count) for k in range(lanes.width)]
-        found += _lanes_from(builder, rows, lanes, count)
-    return found[: len(like)]
+        components += _lanes_from(builder, rows, lanes, count)
+    return components[: len(like)]
 
 
 @intrinsic
 def _gather_row(array, nodes, first, like):
-    """Components of node records, as many as `like` has."""
+    """Load components of node records, as many as `like` has."""
     lanes = Lanes(array.dtype, nodes.width)
     made = types.UniTuple(lanes, len(like))
 
@@ -92,49 +162,43 @@ def _gather_row(array, nodes, first, like):
             pointer = at_lane(builder, array, table, nodes, at, k, column)
             return builder.load(_record(builder, array, pointer, count), align=_size(array))
 
-        return code.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
+        return llvm.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
 
     return made(array, nodes, types.int64, like), codegen
 
 
 @intrinsic
 def _gather_weighted(array, nodes, first, weights, like):
-    """The same for the weighted sum of some node records, each read where it is."""
+    """Load the weighted sums of node records, summed before they become lanes."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
-    def codegen(builder, table, places, first, shares, _):
+    def codegen(builder, *values):
+        table, places, first, factors, _ = values
         size = _size(array)
-        spread = _kept_in_memory(builder, code.unpack(builder, shares))
-        at = code.unpack(builder, places)
+        factor_at = _kept_in_memory(builder, llvm.unpack(builder, factors))
+        at = llvm.unpack(builder, places)
 
         def read(j, column, count):
             record = Lanes(array.dtype, count)
-            total = ir.Constant(code.register_type(record), None)
+            total = ir.Constant(llvm.register_type(record), None)
             for k, node in enumerate(at):
                 pointer = at_lane(builder, array, table, nodes[k], node, j, column)
                 pointer = _record(builder, array, pointer, count)
-                weight = splat(builder, builder.load(spread(k, j), align=size), record)
+                weight = splat(builder, builder.load(factor_at(k, j), align=size), record)
                 total = _fma(builder, [weight, builder.load(pointer, align=size), total])
             return total
 
-        return code.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
+        return llvm.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
 
     return made(array, nodes, types.int64, weights, like), codegen
-
-
-def _size(array: types.Array) -> int:
-    return array.dtype.bitwidth // 8
-
-
-_fma = arithmetic.of_library("llvm.fma")  # a b + c of vectors, rounded once
 
 
 @implements(prefetch_records, Lanes, Beside)
 @intrinsic
 def _prefetch_records(array, nodes):
     def codegen(builder, table, at):
-        ahead = builder.mul(code.ArrayParts(builder, array, table).strides[0], I64(AHEAD))
+        ahead = builder.mul(llvm.ArrayParts(builder, array, table).strides[0], I64(AHEAD))
         for k in range(nodes.width):
             ask(builder, at_lane(builder, array, table, nodes, at, k, I64(0)), ahead)
 
@@ -157,7 +221,7 @@ def _scatter(array, nodes, first, values):
     at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
     def codegen(builder, table, at, first, numbers):
-        size, parts = _size(array), code.unpack(builder, numbers)
+        size, parts = _size(array), llvm.unpack(builder, numbers)
         for begin in range(0, len(parts), 4):
             some = parts[begin : begin + 4]
             count = _chunks(len(some))[0][1]
@@ -176,24 +240,21 @@ def _scatter(array, nodes, first, values):
     return types.void(array, place, types.int64, at_once), codegen
 
 
-def move_record(array, i, other, j, first, like, keep):
-    """Add components of a node record of another array, as many as `like` has, and zero them there.
-
-    If not `keep`, they replace the old content.
-    """
-    for k in range(first, first + len(like)):
-        array[i, k] = (array[i, k] if keep else 0) + other[j, k]
-        other[j, k] = 0
-
-
 @implements(move_record)
+def _move_record(target, source, first, like, keep):
+    _move(*target, *source, first, like, keep)
+
+
 @intrinsic
-def _move_record(array, i, other, j, first, like, keep):
-    def codegen(builder, here, i, there, j, first, _, keep):
+def _move(*kinds):
+    array, _, other, _, _, like, _ = kinds
+
+    def codegen(builder, *values):
+        here, i, there, j, first, _, keep = values
         size = _size(array)
 
         def place(kind, table, node):
-            pointer = code.item_pointer(builder, kind, table, [node, first])
+            pointer = llvm.item_pointer(builder, kind, table, [node, first])
             return _record(builder, kind, pointer, len(like))
 
         to, of = place(array, here, i), place(other, there, j)
@@ -208,7 +269,7 @@ def _move_record(array, i, other, j, first, like, keep):
 
 
 def _records(builder: Any, parts: list) -> list:
-    """Four records from the lanes of their components: four, two, or one."""
+    """Make four records of four, two or one components from lanes."""
     if len(parts) == 4:
         return _transposed(builder, parts)
     if len(parts) == 2:
@@ -219,7 +280,7 @@ def _records(builder: Any, parts: list) -> list:
 @implements(accumulate, by_type=True)
 def _accumulate(array, i, first, values):
     if tag_class(i) is Weighted and lanes_of(i):
-        return lambda array, i, first, values: _accumulate_affine(
+        return lambda array, i, first, values: _scatter_affine(
             array, i.rows, first, i.weights, values, ()
         )
     if isinstance(array, types.Array) and (lanes_of(i) or lanes_of(values)):
@@ -227,44 +288,32 @@ def _accumulate(array, i, first, values):
     return None
 
 
-def accumulate_affine(array, nodes, first, weights, value, slopes):
-    """Add an affine field times the weights to nodes: components from `first` on.
-
-    `value` is the field at the first node. It grows by ``slopes[d]`` to the next node in direction
-    `d` (nodes form a square or cube, last direction fastest); without slopes it is constant.
-    """
-    width = round(len(nodes) ** (1 / max(1, len(slopes))))
-    for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
-        for c, number in enumerate(value):
-            for d, slope in enumerate(reversed(slopes)):
-                number = number + (k // width**d % width) * slope[c]
-            array[node, first + c] += weight * number
-
-
 @implements(accumulate_affine)
+def _accumulate_affine(array, nodes, first, weights, field):
+    _scatter_affine(array, nodes, first, weights, *field)
+
+
 @intrinsic
-def _accumulate_affine(array, nodes, first, weights, value, slopes):
-    """The records of the points as vectors, with weights read one by one.
+def _scatter_affine(*kinds):
+    """Make records of the points as vectors once per point, not per node; weights from memory."""
+    array, nodes, _, weights, value, slopes = kinds
+    lanes, width = weights[0], _width(nodes, slopes)
 
-    So records are made once per point, not per node.
-    """
-    lanes = weights[0]
-
-    def codegen(builder, table, places, first, shares, numbers, growth):
+    def codegen(builder, *values):
+        table, places, first, factors, numbers, growth = values
         size = _size(array)
-        spread = _kept_in_memory(builder, code.unpack(builder, shares))
-        values = code.unpack(builder, numbers)
-        growths = [code.unpack(builder, slope) for slope in code.unpack(builder, growth)]
-        width = round(len(nodes) ** (1 / max(1, len(growths))))
-        widest = min(_AT_ONCE // size, 8)
-        for begin in range(0, len(values), widest):
+        factor_at = _kept_in_memory(builder, llvm.unpack(builder, factors))
+        components = llvm.unpack(builder, numbers)
+        growths = [llvm.unpack(builder, slope) for slope in llvm.unpack(builder, growth)]
+        widest = min(REGISTER_BYTES // size, 8)
+        for begin in range(0, len(components), widest):
             some = slice(begin, begin + widest)
-            left = len(values[some])
+            left = len(components[some])
             count = widest if left > 4 else _chunks(left)[0][1]
             column = builder.add(first, I64(begin))
             one = Lanes(array.dtype, count)
             # By the position of the node in the first directions.
-            at = {(): _records_of(builder, values[some], lanes, count)}
+            at = {(): _records_of(builder, components[some], lanes, count)}
             grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
 
             def field_at(*place, at=at, grow=grow):
@@ -276,7 +325,7 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
                         at[place] = [builder.fadd(*pair) for pair in pairs]
                 return at[place]
 
-            for k, node in enumerate(code.unpack(builder, places)):
+            for k, node in enumerate(llvm.unpack(builder, places)):
                 place = tuple(k // width**d % width for d in reversed(range(len(grow))))
                 total = pointer = None
                 for j, record in enumerate(field_at(*place)):
@@ -284,7 +333,7 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
                         pointer = at_lane(builder, array, table, nodes[k], node, j, column)
                         pointer = _record(builder, array, pointer, count)
                         total = builder.load(pointer, align=size)
-                    weight = splat(builder, builder.load(spread(k, j), align=size), one)
+                    weight = splat(builder, builder.load(factor_at(k, j), align=size), one)
                     total = _fma(builder, [weight, record, total])
                     if lanes_of(nodes[k]):
                         builder.store(total, pointer, align=size)
@@ -296,7 +345,7 @@ def _accumulate_affine(array, nodes, first, weights, value, slopes):
 
 def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
     """Make a record of `count` components for each lane."""
-    parts = [*parts, *[ir.Constant(code.register_type(lanes), None)] * 8][:count]
+    parts = [*parts, *[ir.Constant(llvm.register_type(lanes), None)] * 8][:count]
     rows = []
     for k in range(0, lanes.width, 4):
         four = parts
@@ -311,14 +360,15 @@ def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
 
 
 def _kept_in_memory(builder: Any, vectors: list) -> Callable:
-    """Store vectors in memory that is opaque to LLVM; return the address of a lane.
+    """Store vectors in memory that is opaque to LLVM; return a function of vector and lane.
 
-    Broadcasting from memory is part of the load; from a register it costs a shuffle.
+    It gives the address of a number. Broadcasting from memory is part of the load; from a register
+    it costs a shuffle.
     """
-    room = code.room(builder, ir.ArrayType(vectors[0].type, len(vectors)))
+    room = llvm.room(builder, ir.ArrayType(vectors[0].type, len(vectors)))
     room.align = 64
     for k, vector in enumerate(vectors):
-        builder.store(vector, code.at(builder, room, 0, k))
+        builder.store(vector, llvm.at(builder, room, 0, k))
     hidden = ir.FunctionType(ir.VoidType(), [room.type])
     builder.asm(hidden, "", "r,~{memory}", [room], side_effect=True)
     scalars = builder.bitcast(room, vectors[0].type.element.as_pointer())

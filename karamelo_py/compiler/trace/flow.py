@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler import failing
-from karamelo_py.compiler.code import scalar_of
-from karamelo_py.compiler.values import (
+from karamelo_py.compiler.code import exceptions
+from karamelo_py.compiler.llvm import scalar_of
+from karamelo_py.compiler.trace.values import (
     HeldValue,
     Untraceable,
     Value,
@@ -99,7 +99,6 @@ def is_number_type(thing: Any) -> bool:
 
 
 def _counter(kinds: tuple) -> types.Integer:
-    """The type of the numbers of a range."""
     if not all(isinstance(kind, types.Integer) for kind in kinds):
         raise Untraceable("the ends of a range are no whole numbers")
     alike = all(kind == kinds[0] for kind in kinds)
@@ -212,7 +211,7 @@ class Flow:
     def fail(self, kind: type, arguments: tuple) -> None:
         """Write code by which the kernel raises an exception."""
         if self.builder:
-            failing.fail(self.builder, kind, arguments)
+            exceptions.fail(self.builder, kind, arguments)
 
     # --- loops
 

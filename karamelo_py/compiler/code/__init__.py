@@ -1,0 +1,1 @@
+"""Back end: operations, machine code, arguments and exceptions of kernels."""

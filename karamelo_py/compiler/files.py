@@ -1,0 +1,106 @@
+"""Files in the cache folder: only those that this user or the administrator can write are read."""
+
+import contextlib
+import contextvars
+import errno
+import functools
+import hashlib
+import os
+import stat
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import platformdirs
+
+_BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+_AS_IT_IS = (  # not a link, without waiting for a pipe
+    getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+)
+
+
+def folder() -> Path:
+    """Return the cache folder."""
+    home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
+    return Path(home) / "kernels"
+
+
+def _refuse_of_others(about: os.stat_result) -> None:
+    if hasattr(os, "geteuid"):
+        if about.st_uid not in (0, os.geteuid()):
+            raise PermissionError(errno.EACCES, "it belongs to another user")
+        if about.st_mode & _BY_OTHERS:
+            raise PermissionError(errno.EACCES, "other users may write there")
+
+
+def _guard(place: Path) -> None:
+    """Refuse a folder that others can write to; close this user's folders to others."""
+    for one in (place, place.parent):
+        about = one.stat()
+        if about.st_mode & stat.S_ISVTX:  # others may not delete files there
+            continue
+        if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
+            one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)
+            about = one.stat()
+        _refuse_of_others(about)
+
+
+def read(path: Path) -> bytes:
+    """Read a file that only this user or the administrator can have written.
+
+    Raises OSError if it belongs to another user, and ValueError if its content is damaged.
+    """
+    with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
+        _guard(path.parent)
+        _refuse_of_others(os.fstat(file.fileno()))
+        data = file.read()
+    if hashlib.sha256(data[32:]).digest() != data[:32]:
+        raise ValueError("not what was written")
+    return data[32:]
+
+
+# Python shows a warning once for each text.
+_warn = functools.partial(warnings.warn, category=RuntimeWarning)
+_reporter = contextvars.ContextVar[Callable[[str], None]]("reporter", default=_warn)
+
+
+def report(text: str) -> None:
+    """Tell the user of a problem, by `telling` or as a warning of Python."""
+    _reporter.get()(text)
+
+
+def report_error(error: OSError) -> None:
+    """Tell the user that the cache folder cannot be used."""
+    report(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
+
+
+@contextlib.contextmanager
+def telling(tell: Callable[[str], None]) -> Iterator[None]:
+    """Report problems with the folder through `tell`, once, within this context."""
+    told: list[str] = []
+
+    def tell_once(text: str) -> None:
+        if not told:
+            told.append(text)
+            tell(text)
+
+    before = _reporter.set(tell_once)
+    try:
+        yield
+    finally:
+        _reporter.reset(before)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file for `read`, completely or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    _guard(path.parent)
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")
+    try:
+        with open(handle, "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,1 @@
+"""Front end: what a function writes while it is traced."""
