@@ -1,6 +1,5 @@
 """Troubles of a run: what went wrong, the likely cause and the fix."""
 
-
 import numpy as np
 
 from karamelo_py.advice import energy
