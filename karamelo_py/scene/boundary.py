@@ -35,10 +35,9 @@ def check(hub: Scene) -> None:
 
 
 def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
-    """Delete the points that left the domain in a failed step, if ``boundary(delete)``.
+    """Delete the points that left the domain in a failed step; restore its start.
 
-    Restores the start of the step. The choice depends on the state only, not on threads or on how a
-    run is divided.
+    The choice depends on the state only, not on threads or on how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False
@@ -66,8 +65,8 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
 
 
 def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
-    """Delete points (ids, ascending); return their mass and energy (kinetic + stored + dissipated),
-    negative work in the energy balance.
+    """Delete points (ids, ascending); return their mass and total energy, which the balance counts
+    as negative work.
     """
     simulation = hub.simulation
     if len(ids) == np.count_nonzero(simulation.present):

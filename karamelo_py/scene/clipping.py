@@ -1,8 +1,7 @@
 """Clip the boxes of points at the edge of a region: volumes and centroids.
 
-`Region.depth` bounds the distance to the surface, so only boxes that the surface may cross are
-clipped. There the surface is a plane, fitted to the depth at the corners and the centre; a box
-whose surface is not plane is halved, up to `HALVED` times.
+The surface in a box is a plane, fitted to `Region.depth` at corners and centre; boxes where it is
+not plane are halved, up to `HALVED` times.
 """
 
 import itertools
@@ -43,11 +42,9 @@ class Pieces(NamedTuple):
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Find the boxes of edge length `size` around `x` (n, d) that lie in a region or cross its
-    edge.
+    """Boxes of edge `size` around `x` (n, d) in a region: mask, and pieces at its edge.
 
-    Returns the mask of boxes, numbered from `first`, and the pieces at the edge. The domain clips,
-    too. Boxes end at the region's bounding box, so that faces along the axes are exact.
+    Boxes end at the domain and at the region's bounding box: faces along the axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -74,7 +71,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger piece in an adjacent box, if there is one.
+    """Merge small pieces into the nearest larger one in an adjacent box, if any.
 
     Merged pieces get the fraction 0; whole boxes that receive a piece are added.
     """
@@ -119,9 +116,7 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
 def _measure(
     region: Region, lo: np.ndarray, edges: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the volume fraction (n,) and moment (n, d) of boxes clipped by a surface, relative to
-    a whole box, and `Pieces.rough`.
-    """
+    """Volume fraction (n,), moment (n, d) and `Pieces.rough` of boxes clipped by a surface."""
     n, d = lo.shape
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
@@ -168,8 +163,7 @@ def _measure(
 
 
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return area times outward normal (n, d) of a region's surface in boxes of edge `size` around
-    `x` (n, d), and positions (n, d) on the surface.
+    """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
 
     The vector is the difference of the covered areas of opposite faces: its sum over boxes is
     exact.
@@ -195,8 +189,8 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return fraction (n,) and centroid (d, n) of the part of a unit cube where a linear function,
-    `mean` (n,) at the centre, is positive.
+    """Fraction (n,) and centroid (d, n) of the part of a unit cube where a linear function (`mean`
+    at its centre) is positive.
     """
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
@@ -211,10 +205,10 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_plane` for a function that decreases by `m` > 0 (d, n) along each edge.
+    """`_plane` for slopes -`m` < 0 (d, n).
 
-    It is positive in a simplex at the lowest corner, minus or plus simplices at the other corners,
-    which lie outside the cube.
+    The part is a simplex at the lowest corner, with simplices at the other corners, outside the
+    cube, alternately subtracted and added.
     """
     d = len(m)
     top = mean + m.sum(axis=0) / 2

@@ -17,7 +17,7 @@ class SerialComm:
 
     rank, size = 0, 1
     beside = 1  # processes on this one's cores, including it
-    on_machine = 1  # processes on this machine
+    on_machine = 1
     waited = 0.0  # seconds of steps spent waiting
     failed_within = False
     at_end = False  # all processes have ended the run alike
@@ -44,12 +44,11 @@ class SerialComm:
         pass
 
     def end_together(self) -> None:
-        """Wait at the end of a run, which all processes report alike."""
         self.barrier()
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Gather a word (size,) of each process; None if one is late by `patience` seconds."""
+        """Words (size,) of all processes; None if one is late by `patience` seconds."""
         return np.array([word])
 
     def bcast(self, thing: Any = None) -> Any:
@@ -63,7 +62,7 @@ class SerialComm:
         return [thing]
 
     def everyone(self, request: str, thing: Any) -> list:
-        """Gather objects; raise ScriptError unless all processes ask for the same `what`."""
+        """Gather objects of the same `request`, else raise ScriptError."""
         asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
@@ -75,7 +74,7 @@ class SerialComm:
         return list(answers)
 
     def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
-        """Gather objects at rank 0, and scatter an answer for each."""
+        """Let rank 0 answer all processes."""
         gathered = self.gather(thing)
         return self.scatter(None if gathered is None else make(gathered))
 
@@ -101,9 +100,7 @@ class SerialComm:
         return array
 
     def allreduce_max(self, array: np.ndarray) -> np.ndarray:
-        """In place."""
         return array
 
     def in_turn(self, act: Callable[[], None]) -> None:
-        """Rank 0 acts first."""
         act()

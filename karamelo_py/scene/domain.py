@@ -45,7 +45,7 @@ class Domain:
         return x[:, 0].astype(float) if self.axisymmetric else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which `x` (n, >= dimension) lie in the closed box: (n,) bool."""
+        """(n,) bool: `x` (n, >= dimension) in the closed box."""
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
             inside &= x[:, axis] >= self.lo[axis] - self.tolerance
@@ -54,7 +54,6 @@ class Domain:
 
 
 def _around(hub: Scene, dimension: int) -> str | None:
-    """Suggest a domain around the block or cylinder of the current statement."""
     _, *words = words_of(hub.interpreter.statement) or [""]
     if words[:1] == ["block"]:
         ends = words[1 : 1 + 2 * dimension]

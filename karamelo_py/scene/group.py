@@ -21,9 +21,8 @@ NOTHING_THERE = "what acts on this group does nothing there"
 class AnyGroup(Named):
     """A group of points or nodes; `all` includes later ones.
 
-    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members of
-    other groups than `all`; and ``add(region, solids)``, which adds the points or nodes of these
-    solids (None: any) in a region and returns their number (0 if the region is not known yet).
+    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, members other than
+    `all`; ``add(region, solids)``, which returns the number added (0: region not known yet).
     """
 
     kind = ""
@@ -101,7 +100,7 @@ class ParticleGroup(AnyGroup):
                 yield ids[self.has(ids)]
 
     def has(self, ids: np.ndarray) -> np.ndarray:
-        """(n,) bool, of points by number."""
+        """(n,) bool, by point number."""
         if self.all:
             return np.ones(len(ids), np.bool_)
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)
@@ -110,7 +109,7 @@ class ParticleGroup(AnyGroup):
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Membership of `count` points, one bit each, as bytes of whole 64-bit words."""
+        """Membership of `count` points, one bit each, in whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -123,7 +122,6 @@ class ParticleGroup(AnyGroup):
         return self._take(self._found(region, solids))
 
     def add_numbers(self, ids: np.ndarray) -> None:
-        """Add ascending numbers."""
         self._take([ids])
 
     def _take(self, pieces: Iterable[np.ndarray]) -> int:
@@ -155,11 +153,7 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
 
 
 class NodeGroup(AnyGroup):
-    """Nodes by position.
-
-    Stored as a definition: solids and methods may add grids later, whose nodes in the region are
-    members, too.
-    """
+    """Nodes by position, stored as a definition: later grids have members, too."""
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"

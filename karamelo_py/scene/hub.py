@@ -92,7 +92,7 @@ class Settings:
         self.threads: int | None = None
         self.precision = "double"
         self.engine = "processor"
-        self.card: Any = None  # the GPU
+        self.card: Any = None
         self.ranks = 1  # processes requested
         self.comm = SerialComm()
         self.debug = False
@@ -155,16 +155,15 @@ class Update:
 
     @property
     def dt(self) -> float:
-        """Length of the next step."""
         return self.values.get("dt")
 
     def transfer_tag(self, real: type) -> Any:
-        """Transfer with its numbers in the run's precision."""
+        """In the run's precision."""
         return type(self.transfer)(*(real(x) if isinstance(x, float) else x for x in self.transfer))
 
 
 def _with_numbers(name: str, tag: NamedTuple) -> str:
-    """Format as ``FLIP (alpha 0.99)``."""
+    """``FLIP (alpha 0.99)``."""
     numbers = ", ".join(
         f"{key} {value:g}" if isinstance(value, (int, float)) else f"{key} {value}"
         for key, value in tag._asdict().items()
@@ -181,7 +180,7 @@ class Hub:
         # Nothing runs and nothing is written in a rehearsal.
         self.rehearsing = False
         self.rehearsed = False
-        self.begun = 0  # runs, including a rehearsal's
+        self.begun = 0  # with a rehearsal's
         self.answered = False  # the script printed, wrote or ended something
         self.checking = False  # ``karamelo-py check``: the first run only reports
         self.pausing = False  # stops before runs, which a program controls
@@ -193,7 +192,7 @@ class Hub:
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
-        self.parts = Parts(self)  # of composed materials
+        self.parts = Parts(self)
         self.materials = Catalogue("material", self)
         self.load_paths = Catalogue("load path", self)
         self.elements = Catalogue("element", self)
@@ -210,7 +209,7 @@ class Hub:
         self.in_run = 0  # number of the active run, else 0
         self.listeners: list[Any] = []  # `run.listening.Listener`
         self._fits_run = 0  # last run whose arrays fit the scene
-        self.runs: list[dict[str, float]] = []  # published values at each end
+        self.runs: list[dict[str, float]] = []  # values at each end
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []  # times and messages, for live pages
         self.later: list[Any] = []  # `known_failures.Step` of later runs, from the rehearsal
@@ -229,7 +228,7 @@ class Hub:
 
     @property
     def simulation(self) -> Any:
-        """Arrays of the current scene, made on demand; a run changes none of its parts."""
+        """Arrays of the current scene, made on demand."""
         run, current = self.in_run, self._simulation
         if current is not None and run and run == self._fits_run:
             return current
@@ -242,10 +241,7 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """The grids of the method, or of the domain if there is no method yet.
-
-        The list object changes only if the grids change.
-        """
+        """Grids of the method, or of the domain; a new list only if they change."""
         key, method = self._key_of_lattices, self.update.method
         if self._lattices is None or self._lattices[0] != key:
             self._lattices = key, method.lattices(self) if method else [self.domain.lattice]
@@ -260,7 +256,6 @@ class Hub:
         self._lattices = None
 
     def refresh_values(self) -> None:
-        """Publish values of the present state."""
         for catalogue in (self.computes, self.fixes):
             for item in catalogue.values():
                 name = f"{catalogue.kind} {item.style}"
@@ -328,11 +323,7 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """Copy for trying the rest of the script without side effects.
-
-        Copies what commands may change; fixes, computes, regions and materials are shared, because
-        commands only make new ones.
-        """
+        """Copy for trying the rest of the script; objects that commands never change are shared."""
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)

@@ -14,18 +14,17 @@ from karamelo_py.script.errors import ScriptError
 RELATIVE_TOLERANCE = 1e-9
 # Kernels pack node numbers into 32 bits.
 MAX_NODES = 2**31 - 1
-# Points or nodes per batch: large enough for NumPy, small enough for caches and memory.
+# Points or nodes per batch: large for NumPy, small for caches and memory.
 CHUNK = 1 << 18
 
 
 class Lattice:
     """A grid of square cells of size `h` from the lower corner of a box.
 
-    It extends past the upper corner by less than a cell if a side is not a multiple of `h`.
-    `nodes_per_cell` is 1, or 2 with nodes at cell centres. Nodes are numbered from `first`, cells
-    from `first_cell`. Nodes added to reach `least_nodes` per direction have no mass. `cells` and
-    `shape` (3,) count cells and nodes, 1 in unused directions. Raises ScriptError for more than
-    `MAX_NODES` nodes.
+    It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
+    cell centres; nodes added for `least_nodes` per direction have no mass. Nodes are numbered from
+    `first`, cells from `first_cell`; `shape` and `cells` (3,) count them, 1 in unused directions.
+    Raises ScriptError for more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -58,7 +57,6 @@ class Lattice:
 
     @property
     def spacing(self) -> float:
-        """Between nodes."""
         return self.h / self.nodes_per_cell
 
     @property
@@ -66,7 +64,7 @@ class Lattice:
         return math.prod(self.shape)
 
     def places(self, numbers: np.ndarray) -> np.ndarray:
-        """Indices (n, 3) of nodes: node (i, j, k) has the number `first` + (i ny + j) nz + k."""
+        """Indices (n, 3): node (i, j, k) has the number `first` + (i ny + j) nz + k."""
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
@@ -76,11 +74,7 @@ class Lattice:
         return self.lo + self.places(numbers) * self.spacing
 
     def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield numbers (m,) and positions (m, dimension) of the nodes in a box, in ascending
-        chunks.
-
-        `lo` and `hi` (3,) may be infinite.
-        """
+        """Yield numbers (m,) and positions (m, d) of the nodes in a box, ascending, in chunks."""
         used = slice(self.dimension)
         corner, shape = self.lo[used], self.shape[used]
         below = (lo[used] - corner) / self.spacing - 1e-6
@@ -94,13 +88,13 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Cell indices (n, dimension) of positions; outside the grid, the nearest cell."""
+        """Cell indices (n, d) of positions, or of the nearest cell."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
 
     def around(self, cells: np.ndarray, steps: Sequence[int]) -> np.ndarray:
-        """Numbers (k, n) of the nodes at `steps` along each axis from the first node of `cells`."""
+        """Numbers (k, n) of nodes at `steps` along each axis from the first node of `cells`."""
         shape = np.array(self.shape[: self.dimension])
         places = (
             np.clip((cells + np.array(step)) * self.nodes_per_cell, 0, shape - 1)
@@ -134,7 +128,6 @@ def table(lattices: Sequence[Lattice], real: type) -> Grid:
 
 
 def numbered(lattices: Sequence[Any]) -> list[Lattice]:
-    """Number nodes and cells consecutively."""
     first = first_cell = 0
     for lattice in lattices:
         lattice.first, lattice.first_cell = first, first_cell
@@ -148,16 +141,12 @@ def numbered(lattices: Sequence[Any]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Yield int64 index arrays (m, d) from `first` to `last` (inclusive), last axis fastest.
-
-    A chunk has about CHUNK / `weight` rows: `weight` items per index need bounded memory.
-    """
+    """Yield indices (m, d) from `first` to `last`, last axis fastest, m about CHUNK / `weight`."""
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 
 
 def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple[int, int]]:
-    """Begin and end of each chunk."""
     total = math.prod(b - a + 1 for a, b in zip(first, last, strict=True))
     step = max(1, CHUNK // weight)
     return [(begin, min(begin + step, total)) for begin in range(0, total, step)]

@@ -30,21 +30,16 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Free and total bytes of a machine or a job, with swap.
-
-    More than `free` may be available if the system does not report all it can release (ZFS caches);
-    more than `whole` may not.
-    """
+    """Bytes with swap; `free` lacks what the system does not report (ZFS caches)."""
 
     free: float
     whole: float
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Memory available, caches and swap included; None if the system does not report it.
+    """Memory with caches and swap; None if the system does not report it.
 
-    The least of the machine's memory, the limits of containers and batch jobs (cgroup, both
-    versions), and the limit of each of `processes` on this machine (ulimit -v).
+    Least of the machine's, of containers and jobs (cgroups), and of each process (ulimit -v).
     """
     import psutil
 
@@ -153,8 +148,8 @@ class Room(NamedTuple):
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
     """Room for points whose law has `state` numbers.
 
-    A point has two positions, a velocity, a mass, the state and three integers. The last good state
-    of a run stores position, velocity and state again.
+    A point has two positions, a velocity, a mass, the state and three integers; the last good state
+    of a run has position, velocity and state again.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

@@ -39,7 +39,7 @@ __all__ = [
 
 
 FIRST, USUAL, LAST = range(3)  # at a stage; USUAL: as in the script
-FROM_PYTHON = 3e-4  # seconds per call of a Python hook, without its work
+FROM_PYTHON = 3e-4  # seconds per call of a Python hook
 
 
 class Publisher:
@@ -61,7 +61,7 @@ class Publisher:
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
     def publish_components(self, vector: np.ndarray) -> None:
-        """Publish ID_x, ID_y, ID_z, those in `published`."""
+        """Publish ID_x, ID_y, ID_z."""
         for name, value in zip("xyz", vector, strict=False):
             if name in self.published:
                 self.publish(name, value)
@@ -125,9 +125,9 @@ class Fix(Publisher):
         return self.group.nodes
 
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mask (m, k) of prescribed components of `nodes` at `x` (m, d), and their values.
+        """Mask (m, k) of prescribed components of `nodes` at `x` (m, d), and values.
 
-        By default where there are `formulas`. For implicit schemes, which do not call hooks for it.
+        For implicit schemes, which do not call hooks for it. Default: `formulas`.
         """
         acts = np.isin(nodes, self.nodes)
         mask = np.outer(acts, [formula is not None for formula in self.formulas])

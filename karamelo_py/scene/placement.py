@@ -37,9 +37,9 @@ class Placement(NamedTuple):
 
 
 class Filled:
-    """Positions (n, d) of selected points in a box of cells, computed on request.
+    """Positions (n, d) of the selected points in a box of cells, computed on request.
 
-    Stores one bit per candidate position, or nothing if all or none are selected.
+    Stored as one bit per candidate, or nothing if all or none are selected.
     """
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
@@ -69,9 +69,7 @@ class Filled:
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Numbers (n,) of the positions shifted by `step` (n, d) in the equidistant pattern; -1:
-        outside.
-        """
+        """Numbers (n,) of the positions `step` (n, d) away in the equidistant pattern, or -1."""
         cell, index_in_cell = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[index_in_cell] + step
         none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
@@ -122,9 +120,7 @@ class Filled:
 
 
 def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
-    """Cells that `region` is filled in: of the domain's grid, or `own` cells from the corner of its
-    bounding box, clipped to the domain.
-    """
+    """Cells of the domain's grid, or `own` cells from the corner of the region's bounding box."""
     d = domain.dimension
     if not own:
         return Lattice(d, domain.lo, domain.hi, h)
@@ -134,10 +130,10 @@ def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattic
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of `ppc` points along a unit cell, relative to its centre, and lengths: (ppc,).
+    """Positions of `ppc` points along a unit cell, from its centre, and lengths: (ppc,).
 
-    ``regular`` and ``cut`` are equally spaced; ``gauss`` is Gauss-Legendre points and weights. The
-    default is Karamelo's: equally spaced, but for 3 its rounded Gauss points with equal lengths.
+    ``gauss``: Gauss-Legendre. Default as in Karamelo: equally spaced, but for 3 its rounded Gauss
+    points with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)
@@ -151,9 +147,10 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and sizes (m, d) of `ppc`^dimension points of a unit cell; equal sizes are (d,).
+    """Positions and sizes (m, d) of points of a unit cell in Karamelo's order; equal sizes are
+    (d,).
 
-    In Karamelo's order: x before y; in 3D the lowest z first.
+    x before y; in 3D the lowest z first.
     """
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
@@ -173,11 +170,10 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill `region` within the domain.
+    """Fill `region` within the domain, in chunks of cells, x outermost, z innermost.
 
-    Cells are visited in chunks from the lower corner of the lattice, x outermost, z innermost,
-    within the region's bounding box. Raises ScriptError for more points than can be numbered, or
-    than memory has `room` for (called if there may be many).
+    Raises ScriptError for too many points to be numbered, or for `room`, called if there may be
+    many.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -193,7 +189,7 @@ def fill(
     last_cell = np.array(lattice.cells[used]) - 1
     if region.unknown or (lo > hi).any():
         return placed
-    # One more cell on each side: round-off loses no point on a face.
+    # Round-off loses no point on a face.
     first = np.floor((lo - corner) / h) - 1
     last = np.floor((hi - corner) / h) + 1
     # An open side ends at the domain; a closed one beyond it causes a warning.
@@ -265,9 +261,8 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Lower bound of the number of points in a region, by sampling.
-
-    The sample grows until it decides whether there are more than `most`.
+    """Lower bound of the number of points, by a sample that grows until it is above or below
+    `most`.
     """
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
@@ -288,7 +283,6 @@ def _least(region: Region, domain: Domain, spacing: float, most: float) -> float
 def _cut_off(
     placed: Placement, region: Region, size: float, left: list[tuple[np.ndarray, Pieces]]
 ) -> Placement:
-    """Replace boxes at the edge of the region by their pieces (`clip`)."""
     x0, d = placed.x0, region.dimension
     pieces = Pieces(*map(np.concatenate, zip(*(piece for _, piece in left), strict=True)))
     pieces = join(region, x0, pieces)

@@ -49,7 +49,7 @@ ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelli
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:
-    """Raise ScriptError for wrong hooks or fields, naming the fix, its package and its place."""
+    """Raise ScriptError, naming package and place, for wrong hooks or fields."""
     name = f"fix {fix.style}"
     for error in _wrong_hooks(fix):
         raise faults.fault(name, error, fix.place)
@@ -144,7 +144,6 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
 
 
 def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
-    """Yield unknown reads and writes of a hook on whole points or nodes."""
     readable, fields, written_too = WORDS, fix.point_fields, "velocity"
     if hook.on_nodes:
         readable, fields = NODE_WORDS, fix.node_fields
@@ -217,7 +216,7 @@ def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
 
 
 def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
-    """Refuse wrong field declarations, and columns already used with another meaning."""
+    """Refuse wrong declarations, and columns with another meaning."""
     for attribute in ("point_fields", "node_fields"):
         kinds = getattr(owner, attribute, ())
         if not isinstance(kinds, tuple):
@@ -236,7 +235,7 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
 
 
 def check_law(hub: Scene, name: str, law: Any) -> None:
-    """Refuse a law (or part) with wrong traits, or columns already used with another meaning."""
+    """Refuse wrong traits, and columns with another meaning."""
     if is_foreign(type(law)) and (error := _wrong_traits(type(law), law_traits(law), LawTraits)):
         raise faults.fault(name, error, hub.place)
     for column in laws.columns_of(law):
@@ -258,7 +257,6 @@ def _wrong_field(kind: Any) -> str:
 
 
 def _wrong_size(kind: type, domain: Any) -> str:
-    """Describe a wrong number of components, in the possible dimensions."""
     for dimension in [domain.dimension] if domain else KINEMATICS:
         kin = KINEMATICS[dimension]()
         size, start = kind.shape(kin), getattr(kind, "start", 0.0)
@@ -270,7 +268,7 @@ def _wrong_size(kind: type, domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
-    """Describe the present use of a column, unless by this field (None: a law)."""
+    """Present use of a column, unless by this field (None: a law)."""
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
@@ -295,7 +293,6 @@ class PartInUse(NamedTuple):
 
 
 def is_foreign(kind: type) -> bool:
-    """Tell whether a class belongs to a plug-in."""
     return not kind.__module__.startswith(registry.PREFIX)
 
 
@@ -320,9 +317,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Convert an exception in plug-in code to a ScriptError naming the part; `usual` if the
-    traceback shows none.
-    """
+    """Make exceptions in plug-in code ScriptErrors naming the part (else `usual`)."""
     try:
         yield
     except faults.KNOWN:
@@ -345,7 +340,7 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
 
 
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
-    """The part defined in a file, or else in its package."""
+    """Part defined in a file, or else in its package."""
     path = Path(file).resolve()
     for part in parts:
         file_of_module = getattr(sys.modules.get(part.kind.__module__), "__file__", None)

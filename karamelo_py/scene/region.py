@@ -20,8 +20,8 @@ HALVINGS = 12  # bisections to a surface
 class Region(Named):
     """Base of region styles, which override `contains`.
 
-    `lo` and `hi` (d,) bound the shape, infinite if open. `exterior` inverts it; `parts` are the
-    regions that it combines.
+    `lo` and `hi` (d,) bound the shape, infinite if open; `exterior` inverts it; `parts` are the
+    regions it combines.
     """
 
     radius = 0.0
@@ -52,17 +52,17 @@ class Region(Named):
 
     @property
     def tolerance(self) -> float:
-        """Distance outside a face that counts as inside (round-off)."""
+        """Round-off allowed outside a face."""
         return self.domain.tolerance
 
     @property
     def lo(self) -> np.ndarray:
-        """Lower corner (3,), clipped to the domain."""
+        """(3,) within the domain."""
         return np.clip(self.box_lo, self.domain.lo, self.domain.hi)
 
     @property
     def hi(self) -> np.ndarray:
-        """Upper corner (3,), clipped to the domain."""
+        """(3,) within the domain."""
         return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
 
     @property
@@ -72,7 +72,7 @@ class Region(Named):
 
     @property
     def flat(self) -> bool:
-        """Consists of lines or surfaces without an inside, at least in part."""
+        """Some part consists of lines or surfaces without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -81,24 +81,23 @@ class Region(Named):
 
     @property
     def volume(self) -> float | None:
-        """Length, area or volume in the domain; None if unknown."""
+        """In the domain; None if unknown."""
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which `x` (n, >= dimension) are in or on the shape: (n,) bool."""
+        """(n,) bool: `x` (n, >= d) in or on the shape."""
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Test which `x` (n, >= dimension) belong to the region: (n,) bool."""
+        """(n,) bool: `x` (n, >= d) in the region."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Depth (n,) of `x` (n, >= dimension) in the shape, negative outside; ignores `exterior`.
+        """Depth (n,) of `x` (n, >= d) in the shape, negative outside; ignores `exterior`.
 
-        A lower bound of the distance to the surface, up to `reach`; linear in `x` near plane parts
-        of the surface. The default tests `contains` along the axes, and misses what is thinner than
-        `reach`.
+        A lower bound of the distance to the surface, up to `reach`; linear near plane parts of it.
+        The default tests `contains` along the axes, and misses what is thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -124,20 +123,19 @@ class Region(Named):
         return Outside(shape) if self.exterior and shape is not None else shape
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Depth (n,) of positions in the region, see `distance`."""
+        """Depth (n,) in the region, see `distance`."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
 
 
 def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], bool]:
-    """Split off a final word ``exterior``."""
     if arguments and arguments[-1].word() == EXTERIOR:
         return arguments[:-1], True
     return arguments, False
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Refuse a lower end (`argument` is its number) above the upper end, the next argument."""
+    """Refuse a lower end, argument number `argument`, above the upper end, the next one."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

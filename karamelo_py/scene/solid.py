@@ -39,12 +39,10 @@ class Solid(Named):
 
     catalogue = "solids"
     source = "region"  # argument that gives the points, for messages
-    # Of the points and of the shape from a file that they fill; per radian if axisymmetric.
+    # Of points, and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
-    region: Region | None = (
-        None  # that it fills, with `ppc` points per cell and direction, perhaps `cut`
-    )
-    ppc, cut = 0, False
+    region: Region | None = None  # that it fills
+    ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
     warm = False  # points have individual temperatures
 
     def __init__(
@@ -75,7 +73,6 @@ class Solid(Named):
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        """Warn of a missing or impossible temperature."""
         # Karamelo scripts give T0 in mechanical runs, too.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
@@ -158,16 +155,15 @@ class Solid(Named):
 
     @property
     def count(self) -> int:
-        """Number of points."""
         return len(self.places)
 
     @property
     def x0(self) -> np.ndarray:
-        """(n, d) reference positions; computed on each access for large solids."""
+        """(n, d); computed on each access for large solids."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
-        """(n, d) reference positions by ascending numbers."""
+        """(n, d) by ascending numbers."""
         positions = np.empty((len(numbers), self.domain.dimension))
         for begin in range(0, len(numbers), CHUNK):
             some = numbers[begin : begin + CHUNK]
@@ -175,23 +171,22 @@ class Solid(Named):
         return positions
 
     def pieces(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Yield the first number and the reference positions of each piece."""
+        """Yield the first number and reference positions of each piece."""
         for first in range(0, self.count, CHUNK):
             yield first, self.places[first : first + CHUNK]
 
 
 def solid_with(hub: Scene, number: int) -> Solid:
-    """The solid of a point."""
     return [solid for solid in hub.solids.values() if solid.first_id <= number][-1]
 
 
 def named(hub: Scene, number: int) -> str:
-    """Name of a point in messages."""
+    """``point 3 of solid 'disk'``."""
     return f"point {number + 1} of solid '{solid_with(hub, number).id}'"
 
 
 def words_of_volumes(hub: Scene) -> str:
-    """Volumes of points and of their shapes from files, in words; empty without such shapes."""
+    """Volumes of points and of their shapes from files."""
     volumes = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
     words = [
         f"{name} {volume:.6g} of {whole:.6g} in its file"
@@ -201,12 +196,11 @@ def words_of_volumes(hub: Scene) -> str:
 
 
 def own_grids(hub: Scene) -> bool:
-    """Each solid has a separate grid."""
     return hub.update.method is not None and hub.update.method.own_grids
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
-    """Cell size of a solid; the first one may set the domain's."""
+    """The first solid may set the domain's."""
     if domain.h is None:
         domain.set_cell_size(h)
     if own_grids(hub):
@@ -223,7 +217,6 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
 
 
 def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
-    """Warn if points of `new`, to be named `ID`, coincide with another solid's."""
     for other in hub.solids.values():
         if other is not new and coinciding(new, other):
             hub.warn(

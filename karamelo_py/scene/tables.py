@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Annotation: named columns."""
+    """Annotation: columns of a file, or of arrays passed to `Simulation`."""
 
     script_kind = "the name of a file of columns"
 
@@ -26,7 +26,6 @@ class FileColumns:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "FileColumns":
-        """Read the file, or take the arrays passed to `Simulation`."""
         arrays = hub.functions.get(argument.text)
         if isinstance(arrays, Mapping):
             return cls(
@@ -37,7 +36,7 @@ class FileColumns:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Read columns by the names in the first row (or "1", "2", ...).
+    """Read columns named by the first row (or "1", "2", ...).
 
     Separators are commas, semicolons or blanks; # begins a comment line.
     """

@@ -127,7 +127,6 @@ class View:
         self[kind][...] = value
 
     def _no_column(self, name: Any) -> KeyError:
-        """Make the error for a column in brackets, with the attribute to use."""
         kind = type(self).__name__
         attribute, *k = _VECTORS.get(str(name), (str(name),))
         if self._shows(attribute):
@@ -149,8 +148,6 @@ NO_HEAT = "no heat flows: the method has to be thermo-mechanical"
 
 
 def _declared(kind: type, of: str, missing: str = "") -> Callable:
-    """Make the getter of a declared field of points or nodes."""
-
     def find(arrays: Any) -> np.ndarray:
         array = field(arrays.fields, kind)
         if array is None:
@@ -273,11 +270,11 @@ class NodesView(View):
 
 
 class PointsView(View):
-    """The points of a group at one stage of a step: in the order of their ids, or local ones.
+    """Points of a group at one stage of a step, ordered by id.
 
-    Hooks that treat each point separately (`Fix.point_by_point`) get local points: `pieces` of
-    blocks, with their rows, in storage order and with read-only positions. Before the first step
-    (`in_steps` False) they are only some of the local points.
+    Or local ones, if hooks treat each point separately (`Fix.point_by_point`): `pieces` of blocks,
+    with rows, in storage order and with read-only positions; before the first step (`in_steps`
+    False) only some of them.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
@@ -327,7 +324,6 @@ class PointsView(View):
         return self._simulation.points.summed(np.asarray(terms, float))
 
     def column(self, name: str) -> np.ndarray:
-        """Return a dump column (n,)."""
         return PointTable(self._simulation.hub, self._rows).particle(name)
 
     @property
@@ -405,9 +401,9 @@ class PointsView(View):
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
-        ``gradient(moves, step)`` returns the derivatives (n, d) of the velocity `component` in the
-        coordinates of the grid (reference positions if not `moves`); `step` is a length much
-        smaller than a cell. Called only if points store a gradient.
+        ``gradient(moves, step)``, called if there are any, returns derivatives (n, d) of a velocity
+        `component` in coordinates of the grid (reference positions if not `moves`); `step` is a
+        length much smaller than a cell.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension

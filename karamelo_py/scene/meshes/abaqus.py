@@ -1,8 +1,7 @@
-"""Read the mesh in an Abaqus or CalculiX deck.
+"""Read the mesh in an Abaqus or CalculiX deck: parts, instances, sets, surfaces, generated nodes.
 
-Supports parts, instances with translation and rotation, sets, surfaces, generated nodes and
-elements. Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX
-CrunchiX manual).
+Keywords that move or copy nodes otherwise are refused (Abaqus Keywords Reference; CalculiX CrunchiX
+manual).
 """
 
 import re
@@ -100,7 +99,7 @@ def _wrong(keyword: _Keyword, error: str, expected: str | None = None) -> Script
 
 
 def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
-    """Yield keywords with their data lines, also of included files."""
+    """Yield keywords with data lines, also of included files."""
     lines = path.read_text("utf-8", errors="replace").splitlines()
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
@@ -144,7 +143,6 @@ def _table(keyword: _Keyword, least: int, most: int) -> np.ndarray:
 
 
 def _flat(keyword: _Keyword) -> np.ndarray:
-    """Integers (n,) of all data lines."""
     try:
         words = ",".join(keyword.lines).replace(" ", "").split(",")
         return np.array([word for word in words if word], np.int64)
@@ -218,7 +216,6 @@ def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _kind(name: str) -> tuple[str, int] | None:
-    """Family and number of nodes of an Abaqus element type."""
     for kind, pattern in _TYPES:
         match = pattern.fullmatch(name)
         if match:
@@ -375,7 +372,7 @@ class _Deck:
     # ---- sets by numbers ----
 
     def _numbers(self, sets: dict, name: str) -> np.ndarray:
-        """Numbers (n,) in a set, or the number that `name` is."""
+        """(n,) in a set, or the number that `name` is."""
         if name.lstrip("-").isdigit():
             return np.array([int(name)])
         return np.unique(np.concatenate([np.empty(0, np.int64), *self._resolved(sets, name, ())]))
@@ -390,7 +387,6 @@ class _Deck:
     # ---- the mesh ----
 
     def mesh(self) -> Mesh:
-        """Merge all bodies, with consecutive node and element numbers."""
         bodies = self.instances or [
             _Instance(name, part, lambda x: x) for name, part in self.parts.items()
         ]

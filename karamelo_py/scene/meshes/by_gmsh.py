@@ -1,4 +1,4 @@
-"""Read or generate meshes with Gmsh: its own formats, MED, UNV, Nastran, geometries."""
+"""Read or generate meshes with Gmsh."""
 
 import contextlib
 import re
@@ -20,7 +20,7 @@ _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra",
 
 
 class NoGmsh(Exception):
-    """Gmsh, or a library that it needs, is missing."""
+    """Gmsh, or one of its libraries, is missing."""
 
 
 @contextlib.contextmanager
@@ -55,9 +55,8 @@ def begin(gmsh: Any) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[Path]:
-    """Yield a link to a file (or a copy) in an empty folder.
-
-    Gmsh reads an options file next to the file that it opens, and options may run programs.
+    """Yield a link to a file (or a copy) in an empty folder: Gmsh reads options next to a file,
+    which may run programs.
     """
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name

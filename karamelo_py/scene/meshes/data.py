@@ -39,9 +39,9 @@ class Mesh(NamedTuple):
     left_out: dict[str, int]  # counts of elements that are no solids, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of a named set, or all; a node set selects outer faces with all nodes in it.
+        """Cells of a named set (ScriptError if unknown or empty), or all.
 
-        Raises ScriptError for an unknown or empty set.
+        A node set selects outer faces with all nodes in it.
         """
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
@@ -57,7 +57,6 @@ class Mesh(NamedTuple):
         ]
 
     def _name_of(self, group: str) -> str:
-        """Ignores case if that is unambiguous."""
         names = [*self.sets, *(name for name in self.node_sets if name not in self.sets)]
         alike = [name for name in names if name.casefold() == group.casefold()]
         name = group if group in names else alike[0] if len(alike) == 1 else None

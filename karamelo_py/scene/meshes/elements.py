@@ -19,7 +19,7 @@ _CHUNK = 4096  # elements integrated at once
 
 
 class Shape(NamedTuple):
-    """A family of elements; nodes in meshio's order, which is VTK's."""
+    """A family of elements; nodes in VTK's order."""
 
     name: str
     words: str  # plural
@@ -69,8 +69,6 @@ _MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 
 class MeshElements(NamedTuple):
-    """Elements of one shape."""
-
     shape: Shape
     numbers: np.ndarray  # (n, c) of the corners
     corners: np.ndarray  # (n, c, d) positions
@@ -89,10 +87,10 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Elements of `dimension` in a mesh or its named `group`, one item per type.
+    """Elements of `dimension` in a mesh or its `group`, one item per type.
 
     `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError if there are
-    none, for other types, and for a mesh outside z = 0 in 2D or off the x axis in 1D.
+    none, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -221,8 +219,8 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
     """Elements with positive orientation, volumes (n,) and centroids (n, d).
 
-    Integrals of det J and x det J over the mapped element, with curved edges and warped faces, by a
-    Gauss rule of exact degree. Raises ScriptError for a flat or twisted element.
+    Exact integrals of det J and x det J, with curved edges and warped faces. Raises ScriptError for
+    a flat or twisted element.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes

@@ -63,9 +63,8 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Refuse a geometry that does more than describe a shape, or includes one.
-
-    Of a `trusted` geometry, only commands that would end this program are refused.
+    """Refuse a geometry that does more than describe a shape; if `trusted`, one that would end this
+    program.
     """
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
@@ -86,7 +85,7 @@ def _refuse(token: _Token, reason: str, *, trusted: bool = False) -> None:
 
 
 def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None:
-    """Read a file in Gmsh's language and those that it includes."""
+    """Read a file in Gmsh's language and its includes."""
     # Gmsh also reads the options next to a file.
     for file in (path, path.with_name(f"{path.name}.opt")):
         if file in files or not file.is_file():
@@ -139,7 +138,6 @@ def _tokens(path: Path, trusted: bool) -> Iterator[_Token]:
 
 
 def _after(tokens: list[_Token], k: int) -> int:
-    """Skip brackets that start at `k`."""
     while k < len(tokens) and tokens[k].text in ("~", *_PAIRS):
         opened, depth = tokens[k].text, 0
         closed = _PAIRS.get(opened)
@@ -157,7 +155,6 @@ def _texts(tokens: list[_Token], k: int, count: int) -> list[str]:
 
 
 def _given(tokens: list[_Token]) -> Iterator[str]:
-    """Yield names that a file defines for numbers, strings and macros."""
     constants = False
     for k, token in enumerate(tokens):
         before = tokens[k - 1].text if k else ""
@@ -174,7 +171,6 @@ def _given(tokens: list[_Token]) -> Iterator[str]:
 
 
 def _check(tokens: list[_Token], k: int, defined: set[str]) -> None:
-    """Refuse the token `k` if it does more than describe a shape."""
     token, word = tokens[k], tokens[k].text
     if not token.is_word:
         return

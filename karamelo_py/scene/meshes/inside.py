@@ -16,8 +16,7 @@ _SETS = 8  # at most, of shells that do not overlap
 class Skin:
     """Surface of a body: sets of `faces` (m, d, d), each closed.
 
-    A position is in the body if a set encloses it, or within `tolerance` of a face. An `open` skin
-    encloses nothing.
+    A position is inside if a set encloses it, or within `tolerance` of a face; never if `open`.
     """
 
     def __init__(
@@ -30,7 +29,6 @@ class Skin:
 
     @property
     def faces(self) -> np.ndarray:
-        """Corners (m, d, d)."""
         return np.concatenate([surface.faces for surface in self.surfaces])
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
@@ -57,10 +55,9 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Faces (m, d, d) of one element only, oriented outwards.
+    """Faces (m, d, d) of one element only, oriented outwards; in 1D in pairs, the lower one first.
 
-    Faces with four corners are split along the diagonal from the lowest node number: neighbours
-    agree and leave no gap. In 1D they come in pairs, the lower one first.
+    Quadrilaterals are split along the diagonal from the lowest node number, as in their neighbours.
     """
     triangles: list[np.ndarray] = []
     for elements in parts:
@@ -129,8 +126,8 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
     """Skin of closed shells of `points` (n, 3), `triangles` (m, 3).
 
-    A shell inside another is a cavity, whatever its orientation. Overlapping shells form one body.
-    An edge with an odd number of triangles is an error.
+    Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
+    Raises ScriptError for an edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
     for sided in (True, False):  # oriented as in the file; else reoriented
@@ -269,7 +266,7 @@ def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
 def _within(
     shells: list[np.ndarray], lo: np.ndarray, hi: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """Tell which shells lie completely inside which others: (n, n) bool."""
+    """(n, n) bool: shells completely inside others."""
     n = len(shells)
     within = np.zeros((n, n), bool)
     for k in range(n):

@@ -1,7 +1,6 @@
 """Entry point for mesh files: chooses the reader.
 
-Gmsh reads its own formats, MED, UNV and Nastran, and meshes geometries; Abaqus decks and OBJ have
-readers here; meshio reads the rest, and Gmsh's formats if Gmsh's library is missing.
+Gmsh reads its own formats, MED, UNV and Nastran, and meshes geometries; meshio reads the rest.
 """
 
 import contextlib
@@ -92,7 +91,7 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
 
 
 def _refuse_what_is_no_cad(path: Path) -> None:
-    """Compare first bytes with a CAD ending: on a mismatch, the library would print."""
+    """Check first bytes: on a mismatch with its ending, the library would print."""
     with path.open("rb") as file:
         begin = file.read(1024)
     right = {
@@ -105,7 +104,6 @@ def _refuse_what_is_no_cad(path: Path) -> None:
 
 
 def _by_content(path: Path) -> Mesh:
-    """Choose the reader by first bytes, else by ending."""
     with path.open("rb") as file:
         begin = file.read(4096)
     ending = path.suffix.lower()
@@ -132,7 +130,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _refuse_systems(path: Path) -> None:
-    """Refuse Nastran nodes in local coordinate systems, which no reader supports."""
+    """Refuse Nastran nodes in local coordinate systems: no reader supports them."""
     with path.open(errors="replace") as file:
         for number, line in enumerate(file, 1):
             if line[:4].upper() == "GRID":
