@@ -102,7 +102,7 @@ class FakeHub:
         )
         self.update = SimpleNamespace(step=0, time=0.0, dt=0.1, fixed_dt=0.1)
         self.values = FakeValues(Ek=1.0, Ek_s=1.0, Es_s=0.0)
-        self.interpreter = SimpleNamespace(variables={"E": 1000.0, "name": "text"})
+        self.interpreter = SimpleNamespace(files=[], variables={"E": 1000.0, "name": "text"})
         self.rehearsing = self.checking = False
         self.place = None
         self.console = Console(io.StringIO(), io.StringIO())

@@ -61,8 +61,8 @@ class Console:
     def terminal(self) -> bool:
         """Tell whether `out` is an interactive terminal."""
         if self._terminal is None:
-            isatty = getattr(self.out, "isatty", None)
-            self._terminal = bool(isatty and isatty()) and os.environ.get("TERM") != "dumb"
+            interactive = hasattr(self.out, "isatty") and self.out.isatty()
+            self._terminal = interactive and os.environ.get("TERM") != "dumb"
         return self._terminal
 
     # Lines

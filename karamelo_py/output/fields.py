@@ -126,12 +126,11 @@ class Fields(PointTable):
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(part.group):
-            terms_or_rows = getattr(part, name)(some, *arguments)
-            count, rows, terms = (
-                terms_or_rows
-                if isinstance(terms_or_rows, tuple)
-                else (len(terms_or_rows), None, terms_or_rows)
-            )
+            terms, rows = getattr(part, name)(some, *arguments), None
+            if isinstance(terms, tuple):
+                count, rows, terms = terms
+            else:
+                count = len(terms)
             if not len(limbs):
                 limbs = np.zeros((count, LIMBS), np.int64)
             if rows is not None:
@@ -140,10 +139,8 @@ class Fields(PointTable):
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        nonzero = totals.any(axis=1)  # few of the thousands for a quantile
-        return np.array(
-            [rounded(t) if one else 0.0 for t, one in zip(totals, nonzero, strict=True)]
-        )
+        # Few of the thousands for a quantile are not 0.
+        return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
         """Sum local terms (n,) or (n, k) over all processes, rounded once."""
@@ -183,15 +180,13 @@ class Fields(PointTable):
         """Yield all points in pieces; `to_first`: to rank 0 only."""
         s = self.setup
         orders = [np.argsort(block.points.id) for block in s.blocks]
-        ids_by_block = [
-            block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)
-        ]
+        ordered = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
         gather = self.comm.gather if to_first else self.comm.allgather
         present = self.simulation.present
         for first, end in ranges(len(present)):
             blocks = [
                 some_of(block, order[slice(*np.searchsorted(ids, (first, end)))])
-                for block, order, ids in zip(s.blocks, orders, ids_by_block, strict=True)
+                for block, order, ids in zip(s.blocks, orders, ordered, strict=True)
             ]
             if self.comm.size > 1:
                 local = [[array for _, array in arrays_of(block.points)] for block in blocks]
@@ -223,7 +218,7 @@ class Fields(PointTable):
     def rate_is_asked_for(self) -> bool:
         """A dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
-        return any("epdot" in getattr(asker, "columns", ()) for asker in askers)
+        return any("epdot" in asker.columns for asker in askers)
 
     def absent_at_points(self) -> list[str]:
         """Names for `particle` that are 0 in this scene."""
@@ -262,7 +257,7 @@ def ranges(count: int) -> Iterator[tuple[int, int]]:
 
 def _joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     """Concatenate points from the arrays of `arrays_of`."""
-    count = sum(arrays_of_rank[0].shape[-1] for arrays_of_rank in parts)
+    count = sum(arrays[0].shape[-1] for arrays in parts)
     made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):
         np.concatenate(same, axis=-1, out=array)
@@ -394,8 +389,8 @@ def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) 
     error.expected = one_of(name, known, page="docs/reference/columns.md")
     others = table()["columns"].items()
     quantity = next((columns for columns, words in others if name.lower() in words), "")
-    if columns_present := [column for column in quantity.split() if column in known]:
-        error.hint, error.alike = f"did you mean {', '.join(columns_present)}?", columns_present[0]
+    if meant := [column for column in quantity.split() if column in known]:
+        error.hint, error.alike = f"did you mean {', '.join(meant)}?", meant[0]
     component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())
     if component is not None:
         i, j = sorted("xyz".find(axis) + 1 or int(axis) for axis in component.groups()[1:])

@@ -35,7 +35,6 @@ class PlottedCurve(Rhythmic):
         self.points: list[tuple[float, float]] = []
         self.last_step: int | None = None
         self.id = y.name
-        self.place: Place | None = None
 
     def write(self) -> None:
         self.points.append((float(self.x.read()), float(self.y.read())))
@@ -51,6 +50,7 @@ class Plots(dict[str, PlottedCurve]):
         super().__init__()
         self.hub = hub
         self.file: Path | None = None
+        self.style = ""
         self.place: Place | None = None  # of save_plot
 
     def add(self, ID: str, curve: PlottedCurve) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError, meant, unknown
-from karamelo_py.script.expressions import POINT_SEEDS
+from karamelo_py.script.expressions import POINT_SEEDS, Expression
 from karamelo_py.script.syntax import Raw, Source
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
@@ -28,15 +28,14 @@ class Quantity:
         self.hub = hub
         self.name = name
         self.formula = formula
-        self._told = False  # a NaN has been reported
+        self._reported_nan = False  # a NaN has been reported
         self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return
         if formula is None and name not in self.names(hub):
             raise unknown(f"unknown quantity '{name}'", name, self.names(hub))
         source = self._source()
-        per_point = PER_POINT & getattr(source, "names", frozenset())
-        if per_point:
+        if isinstance(source, Expression) and (per_point := PER_POINT & source.names):
             raise ScriptError(
                 f"'{name}' depends on {min(per_point)}, which differs from point to point",
                 name=name,
@@ -79,10 +78,10 @@ class Quantity:
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()
-        formula = hasattr(source, "evaluate")
-        number = float(source.evaluate(self.hub.values)) if formula else source
-        if math.isnan(number) and not self._told:
-            self._told = True
+        is_formula = isinstance(source, Expression)
+        number = float(source.evaluate(self.hub.values)) if is_formula else source
+        if math.isnan(number) and not self._reported_nan:
+            self._reported_nan = True
             self.hub.warn(
                 f"{self.heading} is NaN, which is not a number, from step "
                 f"{self.hub.update.step} on",
@@ -130,14 +129,17 @@ class Caption:
     @property
     def names(self) -> set[str]:
         """Names that its numbers depend on."""
-        sources = ((one.name, one._source()) for one in self.quantities.values())
-        return {item for name, of in sources for item in getattr(of, "names", [name])}
+        names: set[str] = set()
+        for quantity in self.quantities.values():
+            source = quantity._source()
+            names |= source.names if isinstance(source, Expression) else {quantity.name}
+        return names
 
     def __str__(self) -> str:
-        def shown(found: re.Match) -> str:
-            if found[1]:
-                return f"{self.quantities[found[1]].read():.6g}"
-            return found[0][0] if found[0] in ("{{", "}}") else found[0]
+        def shown(piece: re.Match) -> str:
+            if piece[1]:
+                return f"{self.quantities[piece[1]].read():.6g}"
+            return piece[0][0] if piece[0] in ("{{", "}}") else piece[0]
 
         return self.PIECE.sub(shown, self.text)
 
@@ -149,4 +151,4 @@ class Logged(Quantity):
 
 
 def _variables(hub: Scene) -> dict[str, Any]:
-    return getattr(hub.interpreter, "variables", None) or {}
+    return hub.interpreter.variables if hub.interpreter else {}

@@ -7,6 +7,7 @@ from typing import Annotated
 from karamelo_py.language.kinds import Positive, Unfit, kind_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
+from karamelo_py.script.errors import Place
 
 _BY_TIME = re.compile(r"time\s*\((.*)\)")
 _STEPS = kind_of(Annotated[int, Positive])
@@ -33,10 +34,23 @@ class Rhythmic:
     remembers = ("last_step", "passed")
     every: int | ByTime
     last_step: int | None = None
+    style = ""  # of a dump
+    place: Place | None = None
+
+    def write(self) -> None:
+        """Write the present state."""
+        raise NotImplementedError
+
+    def take_part(self) -> None:
+        """Write as another process than the first."""
+        self.write()
+
+    def finish(self) -> None:
+        """Complete the files at the end of each run, also of a failed one."""
 
     @property
     def passed(self) -> int | None:
-        return getattr(self.every, "passed", None)
+        return self.every.passed if isinstance(self.every, ByTime) else None
 
     @passed.setter
     def passed(self, count: int | None) -> None:

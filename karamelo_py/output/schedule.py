@@ -2,9 +2,9 @@
 
 import os
 import re
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import Any
 
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
@@ -12,7 +12,7 @@ from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
 from karamelo_py.output.rhythm import ByTime, Rhythmic, is_due, next_step
 from karamelo_py.output.units import Units
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 RESTART = "restart"
 
@@ -47,7 +47,7 @@ class Output:
     def check_file(self, file: Path) -> None:
         """Refuse to write to the log, a script or an unwritable file."""
         path = self.hub.folder / file
-        scripts = getattr(self.hub.interpreter, "files", ())
+        scripts = self.hub.interpreter.files if self.hub.interpreter else ()
         if _may_be(path, self.log.path):
             error = f"{file} is the log"
         elif any(_may_be(path, script) for script in scripts):
@@ -107,7 +107,7 @@ class Output:
             # Computes and energy fixes work only when needed.
             self.hub.refresh_values()
         for item in due:
-            self._do(item, "write")
+            self._write(item)
             item.last_step = step
             if isinstance(item.every, ByTime):
                 item.every.passed = item.every.now(time)
@@ -115,7 +115,7 @@ class Output:
     def write_last(self) -> None:
         for item in self.last if self.takes_part else ():
             if item.last_step != self.hub.update.step:
-                self._do(item, "write")
+                self._write(item)
                 item.last_step = self.hub.update.step
 
     def end(self, last: bool = True) -> None:
@@ -125,7 +125,8 @@ class Output:
         if last:
             self.write(last=True)
         for item in self._to_finish():
-            self._do(item, "finish")
+            with _reported(item, "finish"):
+                item.finish()
 
     def abort(self) -> None:
         """Complete plots, dumps and log of an aborted run, without a further state.
@@ -137,30 +138,20 @@ class Output:
         try:
             for item in self._to_finish():
                 try:
-                    self._do(item, "finish")
+                    with _reported(item, "finish"):
+                        item.finish()
                 except ScriptError as error:
                     self.hub.console.warn(error.render())
         finally:
             self.log.close()
 
-    def _to_finish(self) -> list:
+    def _to_finish(self) -> list[Rhythmic | Plots]:
         return [self.plots, *self.hub.dumps.values()] if self.writes else []
 
-    def _do(self, item: Any, what: str) -> None:
-        """Write or finish an item; errors point to its command."""
-        style = getattr(item, "style", "")
-        if not self.hub.settings.comm.leads:
-            what = "take_part" if hasattr(item, "take_part") else what
-        place = getattr(item, "place", None)
-        naming = as_script_error(f"dump {style}", what, type(item), place)
-        try:
-            with naming if style else nullcontext():
-                getattr(item, what)()
-        except ScriptError as error:
-            raise _located(error, place) from error.__cause__
-        except OSError as error:
-            said = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
-            raise _located(ScriptError(said), place) from error
+    def _write(self, item: Rhythmic) -> None:
+        what = "write" if self.hub.settings.comm.leads else "take_part"
+        with _reported(item, what):
+            getattr(item, what)()
 
     def _items(self) -> list[Rhythmic]:
         if not self.takes_part:
@@ -168,7 +159,21 @@ class Output:
         return [self.log, *self.hub.dumps.values(), *self.plots.values(), *self.pages, *self.last]
 
 
-def _located(error: ScriptError, place: Any) -> ScriptError:
+@contextmanager
+def _reported(item: Rhythmic | Plots, what: str) -> Iterator[None]:
+    """Point errors to the command that defined an item."""
+    naming = as_script_error(f"dump {item.style}", what, type(item), item.place)
+    try:
+        with naming if item.style else nullcontext():
+            yield
+    except ScriptError as error:
+        raise _located(error, item.place) from error.__cause__
+    except OSError as error:
+        said = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
+        raise _located(ScriptError(said), item.place) from error
+
+
+def _located(error: ScriptError, place: Place | None) -> ScriptError:
     if error.place is None and place is not None:
         error.place = place
         error.complete = True

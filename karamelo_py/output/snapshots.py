@@ -33,7 +33,7 @@ def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
     try:
         yield from reader(path, first)
     except Exception as error:  # of many kinds, for damaged files
-        reason = getattr(error, "strerror", None)
+        reason = error.strerror if isinstance(error, OSError) else None
         raise ScriptError(
             f"{path} cannot be read: {reason}"
             if reason

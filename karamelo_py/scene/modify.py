@@ -5,7 +5,7 @@ with a view of the group at that stage of each step, or a compiled hook made by 
 :func:`point_hook` or :func:`vector_hook`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any
 
@@ -49,6 +49,7 @@ class Publisher:
     id: str = ""
     style: str = ""
     place: Place | None = None
+    columns: Sequence[str] = ()  # dump columns that it reads
     # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
@@ -148,11 +149,11 @@ class Fix(Publisher):
     def hooks(self) -> dict[str, Any]:
         hooks = {name: getattr(self, name) for name in STAGES if hasattr(self, name)}
         return {
-            name: hook if isinstance(hook, CompiledHook) else self._told(name, hook)
+            name: hook if isinstance(hook, CompiledHook) else self._attributed(name, hook)
             for name, hook in hooks.items()
         }
 
-    def _told(self, name: str, hook: Callable) -> Callable:
+    def _attributed(self, name: str, hook: Callable) -> Callable:
         @wraps(hook)
         def call(view: Any) -> None:
             with as_script_error(f"fix {self.style}", name, type(self), self.place):

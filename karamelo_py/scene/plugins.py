@@ -278,7 +278,7 @@ def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_field
 
 
 def _shown(kind: Any) -> str:
-    return getattr(kind, "__name__", repr(kind))
+    return kind.__name__ if isinstance(kind, type) else repr(kind)
 
 
 # ---- attribution ----
@@ -299,8 +299,13 @@ def is_foreign(kind: type) -> bool:
 def foreign_parts(hub: Scene) -> list[PartInUse]:
     update, method = hub.update, hub.update.method
     parts = [
-        PartInUse(f"{of.kind} {item.style}", type(getattr(item, "law", item)), item.place)
-        for of in (hub.fixes, hub.computes, hub.dumps, hub.materials, *hub.parts.values())
+        PartInUse(f"{of.kind} {item.style}", type(item), item.place)
+        for of in (hub.fixes, hub.computes, hub.dumps)
+        for item in of.values()
+    ]
+    parts += [
+        PartInUse(f"{of.kind} {item.style}", type(item.law), item.place)
+        for of in (hub.materials, *hub.parts.values())
         for item in of.values()
     ]
     tags = [("scheme", update.scheme, update.scheme_place)]

@@ -44,7 +44,7 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     try:
         lines = read_text(path).splitlines()
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
+        reason = error.strerror if isinstance(error, OSError) else error
         raise ScriptError(f"{path} cannot be read: {reason}", argument="file") from None
     for number, line in enumerate(lines, 1):
         if line.strip() and not line.lstrip().startswith("#"):

@@ -19,6 +19,7 @@ from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.kernels.export import export_velocity_moment, impose_stress, impose_temperature
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
+from karamelo_py.kernels.ranks import Linked
 from karamelo_py.output.point_table import (
     AXES,
     VECTORS,
@@ -74,6 +75,11 @@ class View:
 
     _fields: tuple[str, ...] = ()
     _read_only: tuple[str, ...] = ()
+    _shown: frozenset[str]
+
+    def __init_subclass__(cls) -> None:
+        attributes = (item for base in cls.__mro__ for item in vars(base).items())
+        cls._shown = frozenset(name for name, value in attributes if isinstance(value, Shown))
 
     def __init__(self) -> None:
         # By attribute or field class: array given to the hook, and a copy.
@@ -106,16 +112,12 @@ class View:
     _put: Callable[[type, np.ndarray], None]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in self._fields or name.startswith("_") or self._shows(name)):
+        if not (name in self._fields or name.startswith("_") or name in self._shown):
             raise self._unknown(name)
         object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
         raise self._unknown(name)
-
-    @classmethod
-    def _shows(cls, name: str) -> bool:
-        return isinstance(getattr(cls, name, None), Shown)
 
     def __getitem__(self, kind: type) -> np.ndarray:
         """Return a declared field, (n, components)."""
@@ -129,10 +131,10 @@ class View:
     def _no_column(self, name: Any) -> KeyError:
         kind = type(self).__name__
         attribute, *k = _VECTORS.get(str(name), (str(name),))
-        if self._shows(attribute):
+        if attribute in self._shown:
             column = f"[:, {k[0]}]" if k else ""
             return NoItem(f"{kind} has no ['{name}']: write .{attribute}{column}")
-        names = ", ".join(filter(self._shows, dir(type(self))))
+        names = ", ".join(sorted(self._shown))
         return NoItem(f"{kind} has no ['{name}']; its attributes are {names}")
 
     def _unknown(self, name: str) -> AttributeError:
@@ -169,7 +171,8 @@ class NodesView(View):
     def __init__(self, simulation: Any, s: Any, group: Any, stage: int, before_update: bool):
         super().__init__()
         self._simulation = simulation
-        self._foreign = getattr(s.control.ranks, "foreign", None)
+        ranks = s.control.ranks
+        self._foreign = ranks.foreign if isinstance(ranks, Linked) else None
         self._nodes = s.nodes
         self._grids = s.grids
         self._stage = stage

@@ -224,23 +224,23 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     order = np.argsort(edge, kind="stable")
     begin = np.flatnonzero(np.r_[True, np.diff(edge[order]) > 0])
     pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
-    ends = np.stack([order[pairs], order[pairs + 1]], axis=1)
-    turned = (way[ends[:, 0]] == way[ends[:, 1]]).tolist()
-    neighbours: list[list[tuple[int, bool]]] = [[] for _ in range(m)]
-    for (a, b), other in zip((ends % m).tolist(), turned, strict=True):
-        neighbours[a].append((b, other))
-        neighbours[b].append((a, other))
-    sides: list[bool | None] = [None] * m
-    for first in range(m):
-        stack = [first] if sides[first] is None else []
-        sides[first] = bool(sides[first])
-        while stack:
-            one = stack.pop()
-            for other, differs in neighbours[one]:
-                if sides[other] is None:
-                    sides[other] = sides[one] != differs
-                    stack.append(other)
-    return np.where(np.array(sides, bool)[:, None], triangles[:, ::-1], triangles)
+    one, other = order[pairs], order[pairs + 1]
+    flipped = m * (way[one] == way[other])
+    # Node k is triangle k as in the file, node m + k the same reversed: linked nodes fit together.
+    # In each component the triangle of the lowest number stays as it is.
+    one, other = one % m, other % m
+    label = _components(np.r_[one, one + m], np.r_[other + flipped, other + m - flipped], 2 * m)
+    return np.where((label[:m] > label[m:])[:, None], triangles[:, ::-1], triangles)
+
+
+def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
+    """Lowest node of the component of each node (count,), with links from a to b."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(a), bool), (a, b)), (count, count))
+    label = connected_components(graph, directed=False)[1]
+    return np.unique(label, return_index=True, return_inverse=True)[1][label]
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
@@ -248,19 +248,11 @@ def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
 
     Triangles without orientation are connected only by edges of two triangles.
     """
-    edges = np.ascontiguousarray(edge.reshape(3, -1).T)
-    if not sided:
-        several = np.bincount(edge)[edges] > 2
-        edges = np.where(several, edge.max() + 1 + np.arange(edge.size).reshape(-1, 3), edges)
-    label = np.arange(edges.max() + 1)
-    while True:
-        least = label[edges].min(axis=1)
-        new = label.copy()
-        np.minimum.at(new, edges.ravel(), np.repeat(least, 3))
-        new = new[new]
-        if (new == label).all():
-            return np.unique(least, return_inverse=True)[1].ravel()
-        label = new
+    m, edges = len(edge) // 3, edge.max() + 1
+    triangle = edges + np.tile(np.arange(m), 3)
+    linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2
+    label = _components(edge[linked], triangle[linked], edges + m)
+    return np.unique(label[edges:], return_inverse=True)[1].ravel()
 
 
 def _within(

@@ -203,7 +203,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
             yield f"{name}:{number}", masks
             if len(tags) == 1 or name == "gmsh:physical":
                 yield str(number), masks
-            for group in getattr(mesh, "cell_tags", {}).get(int(number), ()):  # MED
+            for group in vars(mesh).get("cell_tags", {}).get(int(number), ()):  # MED
                 yield group, masks
     for name, (number, dimension) in mesh.field_data.items():
         arrays = tags.get("gmsh:physical", [])

@@ -12,7 +12,7 @@ from karamelo_py.output.files import discarded, folder_of_discarded
 from karamelo_py.output.log import begins_anew
 from karamelo_py.output.rhythm import Every, Rhythmic
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import ScriptError
 
 
 class Dump(Rhythmic):
@@ -29,9 +29,6 @@ class Dump(Rhythmic):
     columns
         Content of the dump, interpreted by the style.
     """
-
-    style = ""
-    place: Place | None = None
 
     def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         self.hub = hub
@@ -50,16 +47,10 @@ class Dump(Rhythmic):
         folder, file = (self.hub.folder, file) if folder is None else (folder, file.name)
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
-    def write(self) -> None:
-        raise NotImplementedError
-
     def take_part(self) -> None:
         """Do what the first of several processes does, which alone writes."""
         with discarded():
             self.write()
-
-    def finish(self) -> None:
-        """Complete the files; called at the end of each run, also of a failed one."""
 
     def warn_of_absence(self) -> None:
         """Warn if the file to continue is not as the resumed run left it."""
