@@ -13,7 +13,16 @@ from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.kernels.views import state_at, volume_of
-from karamelo_py.points.bodies import NEW, MinimizePenetration, along, force_between, radius, rub
+from karamelo_py.points.bodies import (
+    NEW,
+    FrictionMemory,
+    MinimizePenetration,
+    TouchingPair,
+    along,
+    force_between,
+    radius,
+    rub,
+)
 from karamelo_py.points.kinematics import zero_vector
 
 
@@ -196,10 +205,8 @@ def _push_between(law, kin, bodies, reach, dt, kick, i, j):
     both = bodies.radius[i] + bodies.radius[j]
     if not (near and 0 < squared < both * both):
         return none
-    return force_between(
-        law, kin, dx, sqrt(squared), bodies.radius[i], bodies.radius[j],
-        bodies.mass[i], bodies.mass[j], dt, kick,
-    )  # fmt: skip
+    radii, masses = (bodies.radius[i], bodies.radius[j]), (bodies.mass[i], bodies.mass[j])
+    return force_between(law, kin, TouchingPair(dx, sqrt(squared), radii, masses, dt, kick))
 
 
 @noinline
@@ -243,9 +250,9 @@ def _rub(law, kin, bodies, step, dt, i, contact):
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
     slid = step if grip[i, d] > 0 else 0.0  # 0 if it did not touch before
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
-    force, hold, mean, unused = rub(
-        law.friction, hold, contact[0], grip[i, d], grip[i, d + 1], dt * slide
-    )
+    load = contact[0]
+    memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
+    force, (hold, mean, unused) = rub(law.friction, load, memory, dt * slide)
     for k in range(d):
         grip[i, k] = hold[k]
         contact[1 + d + k] = force[k]

@@ -2,7 +2,7 @@
 
 from karamelo_py.compiler import kernel
 from karamelo_py.kernels.arrays import vector_at
-from karamelo_py.points.bodies import along, rub
+from karamelo_py.points.bodies import FrictionMemory, along, rub
 from karamelo_py.points.kinematics import zero_vector
 
 
@@ -22,7 +22,8 @@ def rub_points(kin, mu, normal, load, pull, stop, grip, force):
         n = vector_at(kin, normal, i, 0, none)
         hold = along(vector_at(kin, grip, i, 0, none) + vector_at(kin, pull, i, 0, none), n)
         stopping = along(vector_at(kin, stop, i, 0, none), n)
-        found, hold, mean, unused = rub(mu, hold, load[i], grip[i, d], grip[i, d + 1], stopping)
+        memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
+        found, (hold, mean, unused) = rub(mu, load[i], memory, stopping)
         for k in range(d):
             force[i, k] += found[k]
             grip[i, k] = hold[k]

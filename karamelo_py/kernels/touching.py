@@ -15,7 +15,7 @@ from karamelo_py.kernels import hooks
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.surfaces import depth, slopes
 from karamelo_py.kernels.views import volume_of
-from karamelo_py.points.bodies import along, radius, rub
+from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
 SOFT = 0.1  # fraction of the penetration removed in a step
@@ -97,8 +97,8 @@ def force_of(tag, what, volume, p, values, dt):
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + SOFT * stiffness * slid, normal)
     stop = along(contact_dt * stiffness * slip, normal)
-    rubbed, hold, mean, unused = rub(tag.mu, hold, load, mean, unused, stop)
-    store(grip, p, (*hold, mean, unused, *x))
+    rubbed, memory = rub(tag.mu, load, FrictionMemory(hold, mean, unused), stop)
+    store(grip, p, (*memory.hold, memory.mean, memory.unused, *x))
     return load * normal + rubbed
 
 

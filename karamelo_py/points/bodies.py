@@ -1,7 +1,7 @@
 """Points as bodies: size, and forces between two points that touch as spheres."""
 
 from math import pi, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
@@ -17,7 +17,7 @@ class Hertz(NamedTuple):
 
 
 class MinimizePenetration(NamedTuple):
-    """The force that removes the overlap of two free points within a step, with friction."""
+    """Force that removes the overlap of two free points within a step, with friction."""
 
     friction: float  # coefficient of Coulomb friction
 
@@ -32,36 +32,51 @@ def face(kin, volume, x):
 
 
 def radius(kin, volume, x):
-    """Half the side of a cube of this volume."""
     if isinstance(kin, Axisymmetric):
-        # The volume is one radian of a ring.
         return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
     if kin.dimension == 2:
         return 0.5 * sqrt(volume)
     return 0.5 * volume ** (1.0 / 3.0) if kin.dimension == 3 else 0.5 * volume
 
 
+class TouchingPair(NamedTuple):
+    dx: Any  # x2 - x1
+    r: Any  # |dx|, less than the sum of the radii
+    radii: tuple
+    masses: tuple
+    dt: Any
+    kick: Any
+
+
 @point_function()
-def force_between(law, kin, dx, r, radius1, radius2, mass1, mass2, dt, kick):
-    """Contact force on point 1 from point 2, with dx = x2 - x1 and |dx| = r < radius1 + radius2."""
+def force_between(law, kin, pair):
+    """Contact force on point 1 of a `TouchingPair`."""
 
 
 @force_between.on(Hertz)
-def _force_between_hertz(law, kin, dx, r, radius1, radius2, mass1, mass2, dt, kick):
-    p = radius1 + radius2 - r
-    round_ = radius1 * radius2 / (radius1 + radius2)
+def _force_between_hertz(law, kin, pair):
+    radius1, radius2 = pair.radii
+    p = radius1 + radius2 - pair.r
+    reduced = radius1 * radius2 / (radius1 + radius2)
     stiffness = 4.0 / 3.0 if kin.dimension == 3 else pi / 4.0
-    return -stiffness * law.modulus * sqrt(round_ * p * p * p) / r * dx
+    return -stiffness * law.modulus * sqrt(reduced * p * p * p) / pair.r * pair.dx
 
 
 @force_between.on(MinimizePenetration)
-def _force_between_minimize_penetration(law, kin, dx, r, radius1, radius2, mass1, mass2, dt, kick):
+def _force_between_minimize_penetration(law, kin, pair):
+    (radius1, radius2), (mass1, mass2) = pair.radii, pair.masses
     reduced = mass1 * mass2 / (mass1 + mass2)
-    p = radius1 + radius2 - r
-    return -reduced * p / (dt * kick) / r * dx
+    p = radius1 + radius2 - pair.r
+    return -reduced * p / (pair.dt * pair.kick) / pair.r * pair.dx
 
 
-def rub(mu, hold, load, mean, unused, stop):
+class FrictionMemory(NamedTuple):
+    hold: Any  # force of the spring along the surface, a vector
+    mean: Any  # running mean of the load
+    unused: Any  # friction left from earlier steps
+
+
+def rub(mu, load, memory, stop):
     """Coulomb friction with memory: the force, and the memory after the step.
 
     A free point is stopped by `stop`, m v/dt. A point that carries others would creep, because it
@@ -73,12 +88,14 @@ def rub(mu, hold, load, mean, unused, stop):
     `unused` in earlier steps, up to mu times the `mean` load. A point that slides all the time has
     mu times the load of each step.
     """
+    hold, mean, unused = memory
     mean = mean + NEW * (load - mean)
     unused = (1 - NEW) * unused + mu * load
     bound = mu * max(mean, load)
     force = _shortened(hold + stop, min(bound, unused))
     # Clipped at 0: with round-off below it, friction would accelerate the slip.
-    return force, _shortened(hold, bound), mean, max(unused - sqrt(force.squared()), 0.0)
+    left = max(unused - sqrt(force.squared()), 0.0)
+    return force, FrictionMemory(_shortened(hold, bound), mean, left)
 
 
 def along(v, normal):

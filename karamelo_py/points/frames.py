@@ -13,14 +13,10 @@ from karamelo_py.points.laws import deformation
 
 
 class Updated(NamedTuple):
-    """Weights at present positions (updated Lagrangian)."""
-
     moves = True
 
 
 class DeformationGradient(Field):
-    """F, for laws whose state does not contain it."""
-
     shape = tensor
 
     @staticmethod
@@ -33,8 +29,6 @@ class DeformationGradient(Field):
 
 
 class Total(NamedTuple):
-    """Weights at reference positions, which never change (total Lagrangian)."""
-
     moves = False
     point_fields = (DeformationGradient,)
 
@@ -53,7 +47,6 @@ def of_places_before(frame, kin, dl):
 
 
 def strained(frame, kin, f, dl):
-    """New F, if the frame needs it, from the `dl` of the frame and the old F."""
     return f if frame.moves else f + dl
 
 
@@ -79,5 +72,4 @@ def scaled_increment(frame, kin, dl, f, ratio):
 
 def inverse_stretch_squared(frame, kin, f, like):
     """Bound of (h / size of a deformed cell)^2, the inverse smallest stretch squared."""
-    # Bound of the largest eigenvalue of F^-1 F^-T.
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

@@ -41,7 +41,6 @@ def pick(direction, a, b, c):
 
 
 def in_cells(grid, direction, x):
-    """Distance from the lower corner of the grid, in cells."""
     return (x - pick(direction, grid.x0, grid.y0, grid.z0)) * grid.inv_h
 
 
@@ -50,7 +49,6 @@ def cells_along(grid, direction):
 
 
 def inside(grid, kin, x):
-    """Check that the position `x` lies on the grid."""
     within = x[0] == x[0]
     for k in range(kin.dimension):
         a = in_cells(grid, k, x[k])
@@ -61,7 +59,6 @@ def inside(grid, kin, x):
 
 
 def node_position(grid, n):
-    """(x, y, z) of node `n`."""
     local = n - grid.first
     x = grid.x0 + (local // grid.step_x) * grid.spacing
     y = grid.y0 + (local % grid.step_x // grid.step_y) * grid.spacing
@@ -78,8 +75,6 @@ class Bounces(Field):
 
 
 class ReflectingGrid(Grid):
-    """A grid that reflects points at its edge."""
-
     __slots__ = ()
     point_fields = (Bounces,)
 
@@ -112,7 +107,6 @@ def turn(grid, direction, y, v):
 
 
 def mirror(grid, direction, y):
-    """`y` reflected at the edge of the grid."""
     side = beyond(grid, direction, y)
     lower = pick(direction, grid.x0, grid.y0, grid.z0)
     upper = lower + pick(direction, grid.lx, grid.ly, grid.lz) * grid.h

@@ -41,7 +41,6 @@ WITH = "with {scene.transfer_name} and the basis {scene.basis_name}"
 
 
 def drifts(transfer: type) -> None:
-    """Register the warning for drifting bodies."""
     known_failure(
         transfer,
         "noise of a drift",
@@ -55,7 +54,6 @@ def drifts(transfer: type) -> None:
 
 
 def turns(transfer: type) -> None:
-    """Register the warning for rotating bodies, for transfers or users of a field."""
     known_failure(
         transfer,
         "noise of a rotation",

@@ -18,8 +18,6 @@ from karamelo_py.points.noise import Borne
 
 
 class BasisTraits(NamedTuple):
-    """Traits of a basis; the first four have no default."""
-
     cells: int  # that the nodes of all points of a cell span; 1: the corners of the cell only
     least_nodes: int  # of the grid per direction
     steady_moment: bool  # D of the affine transfers stays away from zero everywhere
@@ -52,7 +50,7 @@ def locate(basis, kin, grid, place):
 
 @point_function()
 def support(basis, kin):
-    """Number of nodes of a stencil; a constant at compile time."""
+    """Number of nodes of a stencil; constant when compiled."""
 
 
 @point_function()
@@ -82,7 +80,7 @@ def walled(basis, faces):
 
 @point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
-    """Part of a point's affine moment that MUSL maps to the nodes the second time."""
+    """The part of the affine moment that MUSL maps to the nodes the second time."""
     return moment
 
 
@@ -112,7 +110,6 @@ def shape_size(basis: type, d: int) -> int:
 
 
 def blank(basis, kin, x):
-    """A place at position `x` with a shape of zeros."""
     return (*x, *((x[0] - x[0],) * shape_size(type(basis), len(x))))
 
 
@@ -130,7 +127,7 @@ def extent(basis, kin, grid, place):
 
 @point_function(otherwise=True)
 def carried(basis, kin):
-    """Count of domain corners that move with the grid; constant at compile time."""
+    """Count of domain corners that move with the grid; constant when compiled."""
     return 0
 
 

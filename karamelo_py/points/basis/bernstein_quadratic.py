@@ -21,7 +21,6 @@ class BernsteinQuadratic(NamedTuple):
     """
 
     in_lanes = True
-    # D of the affine transfers vanishes at the corners of cells.
     traits = BasisTraits(
         cells=1,
         least_nodes=3,
@@ -55,6 +54,10 @@ def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     return Along(i + i, s, weights, gradients, gradients)
 
 
-spacing.on(BernsteinQuadratic)(lambda basis: 0.5)
+@spacing.on(BernsteinQuadratic)
+def _spacing_bernstein_quadratic(basis):
+    return 0.5
+
+
 mapped_again.on(BernsteinQuadratic)(leave_moment_out)
 register(BernsteinQuadratic, 3)

@@ -146,11 +146,14 @@ class CPGIMP(_Box):
     default_variant = "stretch"
 
 
-def box(grid, kin, place, direction, least, most):
-    """Centre and ends of a domain along one direction, in cells, before cutting at walls."""
+def box(grid, kin, place, direction, halves):
+    """Centre and ends of a domain along one direction, in cells, before cuts at walls.
+
+    `halves` are bounds of its half size.
+    """
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
-    half = min(max(half, least), most)
+    half = min(max(half, halves[0]), halves[1])
     return a, a - half, a + half
 
 
@@ -184,7 +187,7 @@ def averaged_hats(cells, grid, first, lo, hi):
 
 @along.on(UGIMP)
 def _along_ugimp(basis, kin, grid, place, direction):
-    _, lo, hi = box(grid, kin, place, direction, 1e-3, 0.5)
+    _, lo, hi = box(grid, kin, place, direction, (LEAST, 0.5))
     last = cells_along(grid, direction)
     lo, hi = max(lo, 0), min(hi, last)
     first = max(min(int(lo), last - 2), 0)
@@ -193,7 +196,7 @@ def _along_ugimp(basis, kin, grid, place, direction):
 
 @along.on(_Following)
 def _along_box(basis, kin, grid, place, direction):
-    a, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
+    a, lo, hi = box(grid, kin, place, direction, (LEAST, MOST))
     last = cells_along(grid, direction)
     first = max(min(min(int(a), last - 1) - 1, last - 3), 0)
     return averaged_hats(3, grid, first, max(lo, 0) - first, min(hi, last) - first)
@@ -202,7 +205,7 @@ def _along_box(basis, kin, grid, place, direction):
 @along.on(CPGIMPCorners)
 def _along_cpgimp_corners(basis, kin, grid, place, direction):
     line = _along_box(basis, kin, grid, place, direction)
-    _, lo, hi = box(grid, kin, place, direction, LEAST, MOST)
+    _, lo, hi = box(grid, kin, place, direction, (LEAST, MOST))
     top = cells_along(grid, direction) - 1 - line.first
     return line._replace(ends=tuple([_end(at, line.first, top) for at in (lo, hi)]))
 
@@ -253,7 +256,6 @@ def _carried_cpgimp_corners(basis, kin):
 
 
 def _side(line, corner, j):
-    """Node along one direction, and weight, of bit `j` for the end given by bit `corner`."""
     i, b = line.ends[1] if corner else line.ends[0]
     return (i + 1, b) if j else (i, 1 - b)
 

@@ -26,7 +26,6 @@ class Linear(NamedTuple):
     """
 
     in_lanes = True
-    # D of the affine transfers vanishes at the nodes.
     traits = BasisTraits(
         cells=1, least_nodes=2, steady_moment=False, steep_edge=True, gradient_jumps=True
     )
@@ -43,7 +42,6 @@ known_failure(
 
 
 def _meet_again(basis, scene):
-    """Check whether bodies have time to fly through the domain, and collide or bounce again."""
     domain, share = scene.hub.domain, scene.hub.update.dt_factor
     far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
     small = share is not None and share <= SMALL_SHARE

@@ -11,8 +11,6 @@ from karamelo_py.points.kinematics import Axisymmetric, gradient, product, vecto
 
 
 class Along(NamedTuple):
-    """Nodes of a stencil in one direction."""
-
     first: int  # number of the first of them in this direction
     r: float  # distance of the point from it, in cells
     weights: tuple[float, ...]  # N of each
@@ -22,14 +20,11 @@ class Along(NamedTuple):
 
 
 class Stencil(NamedTuple):
-    """Nodes of a stencil, in any numbering."""
-
     lines: tuple[Along, ...]  # along each direction
     inv_r: float  # 1 / r of an axisymmetric point
 
 
 def sees_same_nodes(stencil):
-    """Check whether the points in all lanes have the same nodes."""
     first, *rest = (is_one(line.first) for line in stencil.lines)
     for same in rest:
         first = first & same
@@ -37,7 +32,6 @@ def sees_same_nodes(stencil):
 
 
 def with_one_node(stencil):
-    """The stencil of points with the same nodes: node numbers have no lanes."""
     lines = tuple(type(line)(first_lane(line.first), *line[1:]) for line in stencil.lines)
     return Stencil(lines, stencil.inv_r)
 
@@ -101,7 +95,6 @@ def node_number(grid, first, steps):
 
 
 def cell_number(kin, grid, place):
-    """Number of the cell of a point, over all grids."""
     number = 0
     for k in range(kin.dimension):
         count = cells_along(grid, k)
@@ -110,7 +103,6 @@ def cell_number(kin, grid, place):
 
 
 def digits(k, base, d):
-    """The `d` digits of a number in a base, the highest first."""
     found: list = []
     for _ in range(d - 1):
         found = [k % base, *found]
@@ -130,7 +122,6 @@ def each_for_its_own(weights, others):
 
 
 def places_of(stencil, k):
-    """Node indices on each line of the k-th node of a stencil."""
     return digits(k, len(stencil.lines[0].weights), len(stencil.lines))
 
 
@@ -183,7 +174,6 @@ def register(basis: type, width: int) -> None:
 
 
 def wide(basis: type) -> None:
-    """Register the warning for four-node bases when no point crosses cells."""
     suggestion(
         basis,
         when=_seen,

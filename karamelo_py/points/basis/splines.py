@@ -17,8 +17,6 @@ BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls of a cell in a direction
 
 
 class AtWalls(NamedTuple):
-    """Base of splines that are also modified at walls inside the grid."""
-
     faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN; 0 without a wall
 
     in_lanes = True
@@ -93,7 +91,6 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
 
 
 def in_bulk(basis, grid, line, direction):
-    """Check whether a line has the splines, not the functions at a wall."""
     if isinstance(basis, AtWalls):
         return line.weights[0] * line.weights[2] > 0
     return (cells_along(grid, direction) > 1) & (line.r >= 0.5) & (line.r < 1.5)
@@ -120,7 +117,11 @@ def _evenly_quadratic_spline(basis, grid, stencil):
     return first
 
 
-first_node.on(QuadraticSpline)(lambda basis, like: 0.5)
+@first_node.on(QuadraticSpline)
+def _first_node_quadratic_spline(basis, like):
+    return 0.5
+
+
 product.register(QuadraticSpline, 3)
 
 
@@ -131,7 +132,11 @@ class QuadraticSplineAtWalls(AtWalls):
 def of_splines(basis: type, of: type, functions: tuple) -> None:
     """Give `of`, a basis with walls inside the grid, the functions of the one without."""
     of.traits = basis.traits
-    walled.on(basis)(lambda basis, faces: of(faces))
+
+    @walled.on(basis)
+    def _walled_splines(basis, faces):
+        return of(faces)
+
     walls_beside.on(of)(_walls_beside_at_walls)
     for function in functions:
         function.on(of)(function.find((basis,)))
@@ -164,8 +169,7 @@ class CubicSpline(NamedTuple):
     # to 2.6 and 1.46 to 2.7, over positions, spacings, walls and ratios up to 0.49.
     # courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the longer
     # step, 1 % with 0.9 h/c. This is no instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at
-    # 0.03, none at 0.001): strains lacked (dt grad v)^2. They have it since; the bound was not
-    # measured again.
+    # 0.03, none at 0.001): strains lacked (dt grad v)^2 then. Not measured since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,
@@ -215,15 +219,16 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
         bulk = where(below | above, False, bulk)
     if all_lanes(bulk):
         return line
-    other = at_wall(grid, a, cell, last, below, above, inside=len(walls) > 0)
+    other = at_wall(grid, direction, a, cell, (below, above), inside=len(walls) > 0)
     return where(bulk, line, other)
 
 
-def at_wall(grid, a, cell, last, below, above, inside):
+def at_wall(grid, direction, a, cell, walls, *, inside):
     """Modified functions of a cell at a wall; unused nodes of the four have no weight.
 
     Without walls `inside` the grid, only a grid of one cell is between two.
     """
+    last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)
     between = hats(grid, a, cell, first, 4)  # the functions between two walls
     between = between._replace(affine=between.gradients)

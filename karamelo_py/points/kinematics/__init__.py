@@ -31,8 +31,6 @@ COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 
 
 class Line(NamedTuple):
-    """1D: uniaxial strain."""
-
     word = "1D"
     dimension = 1
     tensor_size = 1
@@ -65,8 +63,6 @@ class Axisymmetric(NamedTuple):
 
 
 class Space(NamedTuple):
-    """3D."""
-
     word = "3D"
     dimension = 3
     tensor_size = 9
@@ -159,7 +155,6 @@ class Elements(tuple):
         return self._make([a + p if i == j else a for a, (i, j) in pairs])
 
     def at(self):
-        """Components by row and column."""
         return dict(zip(self.places, self, strict=True))
 
 
@@ -185,8 +180,6 @@ def add_row(s, terms, gradient, a):
 
 
 class Isotropic(namedtuple("Isotropic", "p")):
-    """p I, in any number of dimensions."""
-
     __slots__ = ()
     __array_ufunc__ = None
 
@@ -224,7 +217,6 @@ class Vector(Elements):
         return total([a * a for a in self])
 
     def largest(self):
-        """max_i |a_i|."""
         return max(*map(abs, self)) if len(self) > 1 else abs(self[0])
 
 
@@ -244,19 +236,15 @@ class Matrix(Elements):
         return out
 
     def columns(self):
-        """Columns as vectors, without the hoop component."""
         a, d = self.at(), self.kin.dimension
         return tuple([self.vector._make([a[i, j] for i in range(d)]) for j in range(d)])
 
     def diagonal(self):
-        """(t_xx, t_yy, t_zz) in the directions of vectors."""
         a = self.at()
         return self.vector._make([a[i, i] for i in range(self.kin.dimension)])
 
 
 class Tensor(Matrix):
-    """A tensor such as F or grad v."""
-
     __slots__ = ()
 
     def __matmul__(self, other):
@@ -302,12 +290,10 @@ class Tensor(Matrix):
     # If a kinematics has no component F_ii, F_ii is 1.
 
     def left_cauchy_green(self):
-        """b = F F^T."""
         a = self.at()
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
     def right_cauchy_green(self):
-        """C = F^T F."""
         a = self.transposed().at()
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
@@ -342,7 +328,6 @@ class Tensor(Matrix):
         return self._make([(0.5 * g) * a + (0.5 / g) * b for a, b in pairs])
 
     def turned_back(self, f):
-        """Symmetric part of R^T F."""
         r, f = self.at(), f.at()
 
         def component(i, j):
@@ -365,7 +350,6 @@ POLAR_STEPS = 7
 
 
 def cofactor(a, d, i, j):
-    """Cofactor of a[i, j] in the d x d matrix of components `a`, by row and column."""
     if d == 1:
         return 1
     if d == 2:
@@ -423,12 +407,9 @@ def large(dl):
 
 
 class SymmetricTensor(Matrix):
-    """A tensor such as stress or strain."""
-
     __slots__ = ()
 
     def at(self):
-        """Components by row and column, on both sides of the diagonal."""
         a = dict(zip(self.places, self, strict=True))
         return a | {(j, i): value for (i, j), value in a.items()}
 
@@ -548,7 +529,6 @@ def _class(kind: type, tag: type, names: tuple) -> type:
 
 
 def _rows(one: type, whole: type) -> None:
-    """Set how components of tensors act on vectors; `whole` is the class of F."""
     d = one.kin.dimension
     one.acting = tuple((i if i < d else 0, j) for i, j in one.places)
     number = {(j, i): k for k, (i, j) in enumerate(one.places)}
@@ -563,7 +543,6 @@ for _tag in TAGS:
     _tag.Tensor = _class(Tensor, _tag, _tag.tensor_names)
     _tag.Tensor.symmetric = _tag.Symmetric
     if _tag is Axisymmetric:
-        # In 2D the vectors are the same.
         _tag.Vector = PlaneStrain.Vector
         _tag.Gradient = _class(Vector, _tag, ("1", "2", "around"))
         _tag.Gradient.tensor = _tag.Tensor
@@ -593,12 +572,10 @@ def symmetric_tensor(kin, numbers):
 
 
 def unit(kin):
-    """I as a tensor."""
     return kin.Tensor._make([1 if i == j else 0 for i, j in kin.Tensor.places])
 
 
 def nothing(kin):
-    """The symmetric tensor 0."""
     return kin.Symmetric._make([0 for _ in kin.Symmetric.places])
 
 

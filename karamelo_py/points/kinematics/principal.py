@@ -47,7 +47,6 @@ def principal_in_plane(s):
     radius = sqrt(apart * apart + s.xy * s.xy)
     turned = radius > 0
     over = where(turned, radius, 1)
-    # Cosine and sine of twice the angle to the first direction.
     angle = where(turned, apart / over, 1), s.xy / over
     return (mean + radius, mean - radius, s.zz), angle
 
@@ -90,7 +89,6 @@ def principal_in_space(s):
 
 
 def rotated(k, g, u, v):
-    """Rotate two directions in their plane by the angle with cosine k and sine g."""
     return k * u - g * v, k * v - (-g) * u  # differences, because a sum would be rounded once
 
 
@@ -101,7 +99,6 @@ def real_principal(s):
 
 
 def logarithm_of(s):
-    """ln of a symmetric tensor with positive principal values."""
     values, directions = real_principal(s)
     found = tuple([logarithm(x) for x in values])
     return from_principal(s, found, directions, tuple([1 / x for x in values]))
@@ -122,8 +119,6 @@ PAIRS = (0, 1), (0, 2), (1, 2)
 
 
 class TurningFrame(NamedTuple):
-    """Directions, and the derivatives that rotate them."""
-
     directions: Any
     shears: tuple  # n_a . S' n_b of the pairs of directions, for each slope
     apart: tuple  # s_a - s_b of the pairs
@@ -160,7 +155,6 @@ def out_of_frame(s, diagonal, shears, directions):
 
 
 def columns(numbers, n):
-    """The `n` slopes of numbers, each as a tuple."""
     return list(zip(*[slopes_of(x, n) for x in numbers], strict=True))
 
 

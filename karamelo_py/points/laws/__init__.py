@@ -27,8 +27,6 @@ from karamelo_py.compiler import point_function, real
 
 
 class LawTraits(NamedTuple):
-    """Traits of a law, or of a part."""
-
     rebounds: bool = False  # sustains tension and returns all the work done on it
     flows: bool = False  # holds no shape, as liquids and soils
     rings: bool = True  # vibrates, unless it has no shear modulus
@@ -38,18 +36,14 @@ class LawTraits(NamedTuple):
 
 
 def law_traits(part: Any) -> LawTraits:
-    """Traits of a law, of a part, or of its class."""
     return getattr(part, "traits", LawTraits())
 
 
 def parameter(part: Any, name: str, otherwise: Any = 0.0) -> Any:
-    """A parameter of a law or part, by its name."""
     return part._asdict().get(name, otherwise) if isinstance(part, tuple) else otherwise
 
 
 class Absent(NamedTuple):
-    """Tag of a missing part of a law."""
-
     in_lanes = True
 
 
@@ -60,7 +54,6 @@ def law_kind(law: NamedTuple) -> tuple[type, ...]:
 
 
 def law_parts(law: tuple) -> Iterator[tuple]:
-    """The law and all its parts."""
     yield law
     for part in law:
         if isinstance(part, tuple):
@@ -110,7 +103,11 @@ def number(function: Callable) -> Callable:
     """
     name = f"{function.__name__}_tag"
     made = namedtuple(name, (), module=function.__module__)
-    shown.on(made)(lambda what, law, kin, state: function(law, kin, state))
+
+    @shown.on(made)
+    def _shown_column(what, law, kin, state):
+        return function(law, kin, state)
+
     setattr(sys.modules[function.__module__], name, made)
     function.tag = made()
     return function
@@ -127,8 +124,6 @@ def advance(law, kin, state, dl, dt):
 
 
 class FbarStep(NamedTuple):
-    """An increment of a point with F-bar."""
-
     dl: Any
     dt: Any
     extra: Any  # pressure that forces have beyond the point's own
@@ -150,9 +145,10 @@ def cauchy_stress(law, kin, state):
     """Cauchy stress, for output."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def jacobian(law, kin, state):
-    """det F."""
+    """det F; by default `state.J`."""
+    return state.J
 
 
 @point_function()
@@ -208,7 +204,6 @@ def constrained_velocity(law, own, given):
 
 
 def moves_as_told(law: tuple) -> bool:
-    """Check whether a law is of rigid bodies."""
     return constrained_velocity.defined(type(law))
 
 

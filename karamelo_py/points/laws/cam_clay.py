@@ -1,13 +1,12 @@
 """material cam-clay: modified Cam-clay in logarithmic strains."""
 
 from math import sqrt
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import implements, real, shared, where
 from karamelo_py.compiler.powers import exponential as exp
 from karamelo_py.compiler.powers import logarithm as log
 from karamelo_py.compiler.slopes import Dual, value_of
-from karamelo_py.language.signature import Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import (
     I,
@@ -21,6 +20,7 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
+from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
 
@@ -75,7 +75,7 @@ class CamClay(NamedTuple):
     in_lanes = True
     traits = LawTraits(flows=True, rings=False)
 
-    specific_volume: float  # reference volume per mass
+    specific_volume: float
     G: float
     M: float
     lam: float
@@ -86,14 +86,14 @@ class CamClay(NamedTuple):
     @classmethod
     def given(
         cls,
-        rho: Annotated[float, Positive],
-        G: Annotated[float, Positive],
-        M: Annotated[float, Positive],
-        lam: Annotated[float, Positive],
-        kappa: Annotated[float, Positive],
-        p0: Annotated[float, Positive],
+        rho: AboveZero,
+        G: AboveZero,
+        M: AboveZero,
+        lam: AboveZero,
+        kappa: AboveZero,
+        p0: AboveZero,
         *,
-        pc: Annotated[float, Positive] | None = None,
+        pc: AboveZero | None = None,
     ):
         if kappa >= lam:
             raise ScriptError(
@@ -111,17 +111,14 @@ class CamClay(NamedTuple):
 
 
 class State(NamedTuple):
-    """State of a point."""
-
     J: Any  # det F
     e: Any  # logarithmic elastic strain
-    pc: Any  # preconsolidation pressure
+    pc: Any
     ep: Any  # equivalent plastic strain
     loss: Any  # dissipated energy per reference volume
 
 
 def pressure(law, e):
-    """Kirchhoff pressure of an elastic strain."""
     return law.p0 * exp(-tr(e) / law.kappa)
 
 
@@ -154,8 +151,6 @@ def _advance_cam_clay(law, kin, state, dl, dt):
 
 
 class ClayStress(NamedTuple):
-    """Stress of a point, and its preconsolidation pressure."""
-
     q: Any  # von Mises stress
     p: Any
     pc: Any
@@ -173,7 +168,6 @@ def residuals(law, trial, y, w):
 
 
 def newton_step(law, trial, y, w, errors):
-    """Newton corrections of y and w."""
     f, g = errors
     q, p, pc = after_flow(law, trial, y, w)
     c, slant = law.M**2 / (6 * law.G), 2 * p - pc
@@ -249,11 +243,6 @@ def _kirchhoff_stress_cam_clay(law, kin, state):
 @laws.cauchy_stress.on(CamClay)
 def _cauchy_stress_cam_clay(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / state.J
-
-
-@laws.jacobian.on(CamClay)
-def _jacobian_cam_clay(law, kin, state):
-    return state.J
 
 
 @laws.elastic_strain.on(CamClay)

@@ -5,13 +5,12 @@ A damage is a NamedTuple of parameters (its class is the tag) and a part of a co
 equation of state and strength do not depend on it. Its memory is a tuple.
 """
 
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import any_lane, point_function, where
 from karamelo_py.compiler.powers import exponential, logarithm
-from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.laws import column, damage, damage_initiation
-from karamelo_py.points.laws.parameters import check_temperatures, reference_rate
+from karamelo_py.points.laws.parameters import FromZero, check_temperatures, reference_rate
 from karamelo_py.points.laws.temperatures import homologous
 from karamelo_py.script.errors import ScriptError
 
@@ -23,8 +22,6 @@ def initial_damage(damage, like):
 
 
 class FlowStep(NamedTuple):
-    """Plastic flow of a point in a step."""
-
     strain: Any  # increment of the equivalent plastic strain
     triaxiality: Any  # mean stress over von Mises stress
     heat: Any  # `Warm` or ()
@@ -94,11 +91,11 @@ class JohnsonCookDamage(NamedTuple):
     in_lanes = True
 
     d1: float
-    d2: Annotated[float, NonNegative]
+    d2: FromZero
     d3: float
-    d4: Annotated[float, NonNegative]
-    d5: Annotated[float, NonNegative]
-    epsdot0: Annotated[float, NonNegative]
+    d4: FromZero
+    d5: FromZero
+    epsdot0: FromZero
     Tr: float
     Tm: float
 
@@ -118,8 +115,6 @@ column(JohnsonCookDamage, "damage_init", damage_initiation)
 
 
 class Accumulated(NamedTuple):
-    """State of a point."""
-
     w: Any  # sum of plastic strain over failure strain
 
 

@@ -123,7 +123,6 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
 
 
 def reference_temperatures(law: Any) -> dict[str, float]:
-    """Return the reference temperatures of the parts of a law, if it has a temperature."""
     heat, softening = parameter(law, "temperature"), parameter(law, "strength")
     if not hasattr(heat, "T0"):
         return {}
@@ -139,7 +138,6 @@ def reference_temperatures(law: Any) -> dict[str, float]:
 
 
 def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]]:
-    """Yield implausible temperatures of a law with flow stress `flow`."""
     heat, counted = law.temperature, reference_temperatures(law)
     if counted and max(counted.values()) - min(counted.values()) > APART:
         yield (

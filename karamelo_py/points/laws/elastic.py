@@ -1,12 +1,11 @@
 """Bases: isotropic elastic laws, and laws of the deformation gradient."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import det, unit
 from karamelo_py.points.laws import LawTraits
-from karamelo_py.points.laws.parameters import lame_parameters, tell_of_locking
+from karamelo_py.points.laws.parameters import AboveZero, FromZero, lame_parameters, tell_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -16,18 +15,18 @@ class ElasticLaw(NamedTuple):
     in_lanes = True
     traits = LawTraits(rebounds=True)
 
-    specific_volume: float  # reference volume per mass
+    specific_volume: float
     lam: float  # Lame's first parameter
-    G: float  # shear modulus
+    G: float
 
     @classmethod
     def given(
         cls,
-        rho: Annotated[float, Positive],
-        E: Annotated[float, Positive],
+        rho: AboveZero,
+        E: AboveZero,
         nu: float,
-        cp: Annotated[float, Positive] | None = None,
-        kappa: Annotated[float, NonNegative] | None = None,
+        cp: AboveZero | None = None,
+        kappa: FromZero | None = None,
         alpha: float = 0.0,
     ):
         return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
@@ -37,30 +36,40 @@ tell_of_locking(ElasticLaw)
 
 
 class OfDeformation:
-    """Base of laws whose stress is a function of the deformation gradient."""
-
     __slots__ = ()
 
 
 class Hyperelastic(OfDeformation, ElasticLaw):
-    """Base of laws of the deformation gradient with Young's modulus and Poisson's ratio."""
-
     __slots__ = ()
 
 
 class State(NamedTuple):
-    """State of a point."""
-
-    F: Any  # deformation gradient
+    F: Any
 
 
-laws.initial_state.on(OfDeformation)(lambda law, kin, like: State(unit(kin)))
-laws.by_rates.on(OfDeformation)(lambda law: False)
-laws.deformation.on(OfDeformation)(lambda law, kin, state: state.F)
-laws.jacobian.on(OfDeformation)(lambda law, kin, state: det(state.F))
+@laws.initial_state.on(OfDeformation)
+def _initial_state_of_deformation(law, kin, like):
+    return State(unit(kin))
 
 
-laws.advance.on(OfDeformation)(lambda law, kin, state, dl, dt: State(state.F.after(dl)))
+@laws.by_rates.on(OfDeformation)
+def _by_rates_of_deformation(law):
+    return False
+
+
+@laws.deformation.on(OfDeformation)
+def _deformation_of_deformation(law, kin, state):
+    return state.F
+
+
+@laws.jacobian.on(OfDeformation)
+def _jacobian_of_deformation(law, kin, state):
+    return det(state.F)
+
+
+@laws.advance.on(OfDeformation)
+def _advance_of_deformation(law, kin, state, dl, dt):
+    return State(state.F.after(dl))
 
 
 @laws.cauchy_stress.on(OfDeformation)

@@ -47,8 +47,6 @@ WARMER = 1.0, 100.0, 1000.0  # than a test point
 
 
 class Eos:
-    """For signatures: an equation of state named in the script."""
-
     script_kind: ClassVar[str] = "the ID of an equation of state"
     kind: ClassVar[str] = "eos"
 
@@ -58,15 +56,11 @@ class Eos:
 
 
 class Strength(Eos):
-    """For signatures: a strength."""
-
     script_kind = "the ID of a strength"
     kind = "strength"
 
 
 class Option:
-    """For signatures: an optional part."""
-
     script_kind: ClassVar[str] = "the ID of a damage or of a temperature"
 
     @classmethod
@@ -173,9 +167,7 @@ column(EosStrength, "dissipated", laws.dissipated_energy)
 
 
 def _idle_damage(law, scene):
-    yields = can(law.strength, laws.plastic_strain) or any(
-        name in law.strength._fields for name in ("yield_stress", "A", "cohesion", "phi")
-    )
+    yields = strengths.equivalent_plastic_strain.defined(type(law.strength))
     return not isinstance(law.damage, Absent) and not yields
 
 
@@ -191,7 +183,6 @@ def _idle_heat(law, scene):
 
 
 def _strained(law, heat):
-    """Flow stress and damage of a point after a plastic strain of 0.1."""
     strength, damage, results = law.strength, law.damage, []
     if damage_after.defined(type(damage)):
         step = FlowStep(0.1, 1.0, heat, 1.0)
@@ -274,17 +265,15 @@ class Memory(NamedTuple):
     """States of the parts of a law; () for parts without a state."""
 
     energy: Any  # of the equation of state
-    viscous: Any  # viscous pressure
+    viscous: Any  # pressure
     damage: Any
-    heat: Any  # temperature
+    heat: Any
     loss: Any  # dissipated energy per reference volume
     strength: Any
     further: Any
 
 
 class State(NamedTuple):
-    """State of a point."""
-
     J: Any  # det F
     s: Any  # deviatoric stress of the intact material
     m: Memory
@@ -349,7 +338,6 @@ def carried_along(law, kin, s, dl):
 
 
 def intact_pressure(law, j, m):
-    """Pressure of the intact material, without viscous pressure."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     p = eos.pressure(law.eos, elastic, m.energy, m.heat)
     p += sum(thermal_pressure(law.temperature, m.heat))
@@ -375,7 +363,6 @@ def full_pressure(law, j, m):
 
 
 def sound(law, j, m):
-    """Speed of sound without shear."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
     return sqrt(K * laws.specific_volume(law.eos) * j - unborne(law, j, m))
@@ -399,7 +386,6 @@ def unborne(law, j, m):
 
 
 def viscous_after(law, j, m, rate):
-    """Viscous pressure (q,) for a rate of volume change, or ()."""
     if isinstance(law.viscosity, Absent):
         return ()
     density = 1 / (laws.specific_volume(law.eos) * j)
@@ -415,7 +401,6 @@ def integrity_of(law, memory):
 
 
 def damage_after_flow(law, state, strain, dt):
-    """Memory of the damage after an increment of plastic strain; () without damage."""
     if isinstance(law.damage, Absent):
         return ()
     J, s, m = state
@@ -455,13 +440,34 @@ def _kirchhoff_stress_eos_strength(law, kin, state):
     return J * stress_left(law, state) - J * full_pressure(law, J, state.m) * I
 
 
-laws.by_rates.on(EosStrength)(lambda law: isinstance(law.strain, Absent))
-laws.jacobian.on(EosStrength)(lambda law, kin, state: state.J)
-laws.dissipated_energy.on(EosStrength)(lambda law, kin, state: sum(state.m.loss))
-laws.specific_volume.on(EosStrength)(lambda law: laws.specific_volume(law.eos))
-laws.temperature.on(EosStrength)(lambda law, kin, state: sum(state.m.heat))
-laws.heat_capacity.on(EosStrength)(lambda law, like: laws.heat_capacity(law.temperature, like))
-laws.conductivity.on(EosStrength)(lambda law, like: laws.conductivity(law.temperature, like))
+@laws.by_rates.on(EosStrength)
+def _by_rates_eos_strength(law):
+    return isinstance(law.strain, Absent)
+
+
+@laws.dissipated_energy.on(EosStrength)
+def _dissipated_energy_eos_strength(law, kin, state):
+    return sum(state.m.loss)
+
+
+@laws.specific_volume.on(EosStrength)
+def _specific_volume_eos_strength(law):
+    return laws.specific_volume(law.eos)
+
+
+@laws.temperature.on(EosStrength)
+def _temperature_eos_strength(law, kin, state):
+    return sum(state.m.heat)
+
+
+@laws.heat_capacity.on(EosStrength)
+def _heat_capacity_eos_strength(law, like):
+    return laws.heat_capacity(law.temperature, like)
+
+
+@laws.conductivity.on(EosStrength)
+def _conductivity_eos_strength(law, like):
+    return laws.conductivity(law.temperature, like)
 
 
 @laws.wave_speed_squared.on(EosStrength)
@@ -499,7 +505,6 @@ def _energy_density_eos_strength(law, kin, state):
 
 @laws.elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
-    """ln J / 3, the mean of the elastic strain increments, and the elastic shear."""
     strain = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
     elastic = strengths.elastic_ratio(law.strength, state.m.strength, state.J)
     return strain + 1 / 3 * log(elastic) * I

@@ -15,8 +15,6 @@ from karamelo_py.points.laws.strengths import equivalent_plastic_strain
 
 
 class Further(NamedTuple):
-    """A part, and further ones (`Absent` at the end)."""
-
     in_lanes = True
 
     part: Any
@@ -49,7 +47,6 @@ def part_pressure(part, memory):
 
 
 def initial_further(parts, like):
-    """Memory of the first part, and of the rest; () without parts."""
     if isinstance(parts, Absent):
         return ()
     return initial_part(parts.part, like), initial_further(parts.rest, like)
@@ -76,8 +73,6 @@ CELLS = 1000
 
 
 class PlasticRate(NamedTuple):
-    """Rate of the equivalent plastic strain, smoothed over time."""
-
     in_lanes = True
 
     time: float
@@ -91,8 +86,6 @@ laws.column(PlasticRate, "epdot", Smoothed())
 
 
 class RateMemory(NamedTuple):
-    """State of a point."""
-
     rate: Any
     ep: Any  # plastic strain, -1 if not known yet
 
@@ -121,7 +114,6 @@ def last_memory(memories):
 
 
 def has_rate(law: NamedTuple) -> bool:
-    """Check whether a law has plastic strain, and thus a rate."""
     return hasattr(law, "further") and "ep" in laws.columns_of(law)
 
 

@@ -50,7 +50,6 @@ class Hencky(Hyperelastic):
 
 @laws.elastic_strain.on(Hencky)
 def _elastic_strain_hencky(law, kin, state):
-    """ln V."""
     return 0.5 * logarithm_of(state.F.left_cauchy_green())
 
 

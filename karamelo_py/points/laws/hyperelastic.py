@@ -1,12 +1,12 @@
 """Materials by their stored energy: hyperelastic, and ready formulas for rubber and tissue."""
 
 from collections import namedtuple
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws.by_energy import FIELDS, INVARIANTS, STRETCHES, OfInvariants, law_of
+from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
@@ -82,7 +82,7 @@ class HyperelasticFormula(OfInvariants, _Fields):
     syntax = "rho, energy"
 
     @classmethod
-    def given(cls, rho: Annotated[float, Positive], energy: EnergyFormula) -> Any:
+    def given(cls, rho: AboveZero, energy: EnergyFormula) -> Any:
         return law_of(rho, energy)
 
 
@@ -96,7 +96,6 @@ class _Numbers:
         return self.numbers[name] if name in self.numbers else Expression.seed(name)
 
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Any:
-        """Refuse commands: ready formulas have none."""
         raise NotImplementedError(node.name)
 
     def hides(self, name: str) -> bool:
@@ -104,7 +103,6 @@ class _Numbers:
 
 
 def ready(rho: float, formula: str, **numbers: float) -> Any:
-    """Make the law of a formula with named constants."""
     raw, node = parse_text(formula)
     value = evaluation.evaluate(node, raw, _Numbers(numbers))
     return law_of(rho, Expression(value))
@@ -142,9 +140,7 @@ class MooneyRivlin(OfInvariants, _Fields):
     syntax = "rho, C10, C01, K"
 
     @classmethod
-    def given(
-        cls, rho: Annotated[float, Positive], C10: float, C01: float, K: Annotated[float, Positive]
-    ) -> Any:
+    def given(cls, rho: AboveZero, C10: float, C01: float, K: AboveZero) -> Any:
         formula = f"C10*(I1*J^(-2/3) - 3) + C01*(I2*J^(-4/3) - 3) + {VOLUME}"
         return ready(rho, formula, C10=C10, C01=C01, K=K)
 
@@ -178,9 +174,7 @@ class Yeoh(OfInvariants, _Fields):
     syntax = "rho, K, C10[, C20[, C30]]"
 
     @classmethod
-    def given(
-        cls, rho: Annotated[float, Positive], K: Annotated[float, Positive], *constants: float
-    ) -> Any:
+    def given(cls, rho: AboveZero, K: AboveZero, *constants: float) -> Any:
         if not 1 <= len(constants) <= 3:
             raise ScriptError(
                 "the energy has one to three terms", argument="constants", expected=cls.syntax
@@ -221,13 +215,7 @@ class Gent(OfInvariants, _Fields):
     syntax = "rho, G, Jm, K"
 
     @classmethod
-    def given(
-        cls,
-        rho: Annotated[float, Positive],
-        G: Annotated[float, Positive],
-        Jm: Annotated[float, Positive],
-        K: Annotated[float, Positive],
-    ) -> Any:
+    def given(cls, rho: AboveZero, G: AboveZero, Jm: AboveZero, K: AboveZero) -> Any:
         formula = f"-G*Jm/2*log(1 - (I1*J^(-2/3) - 3)/Jm) + {VOLUME}"
         return ready(rho, formula, G=G, Jm=Jm, K=K)
 
@@ -260,9 +248,7 @@ class SaintVenantKirchhoff(OfInvariants, _Fields):
     syntax = "rho, lam, G"
 
     @classmethod
-    def given(
-        cls, rho: Annotated[float, Positive], lam: float, G: Annotated[float, Positive]
-    ) -> Any:
+    def given(cls, rho: AboveZero, lam: float, G: AboveZero) -> Any:
         formula = "lam/8*(I1 - 3)^2 + G/4*(I1^2 - 2*I2 - 2*I1 + 3)"
         return ready(rho, formula, lam=lam, G=G)
 
@@ -296,9 +282,7 @@ class Ogden(OfInvariants, _Fields):
     syntax = "rho, K, mu1, alpha1[, mu2, alpha2, ...]"
 
     @classmethod
-    def given(
-        cls, rho: Annotated[float, Positive], K: Annotated[float, Positive], *pairs: float
-    ) -> Any:
+    def given(cls, rho: AboveZero, K: AboveZero, *pairs: float) -> Any:
         if len(pairs) % 2 or not 2 <= len(pairs) <= 8 or 0 in pairs[1::2]:
             raise ScriptError(
                 "the terms are pairs of mu and alpha, where no alpha is 0",

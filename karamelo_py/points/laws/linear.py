@@ -1,13 +1,13 @@
 """material linear: isotropic linear elasticity for large rotations."""
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from karamelo_py.language.rules import gain
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import ElasticLaw
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 
 
 class LinearElastic(ElasticLaw):
@@ -55,11 +55,11 @@ class LinearElastic(ElasticLaw):
     @classmethod
     def given(
         cls,
-        rho: Annotated[float, Positive],
-        E: Annotated[float, Positive],
+        rho: AboveZero,
+        E: AboveZero,
         nu: float,
-        cp: Annotated[float, Positive] | None = None,
-        kappa: Annotated[float, NonNegative] | None = None,
+        cp: AboveZero | None = None,
+        kappa: FromZero | None = None,
         alpha: float = 0.0,
         *,
         rate: Literal["jaumann", "none"] = "jaumann",
@@ -69,7 +69,7 @@ class LinearElastic(ElasticLaw):
 
 
 class FixedFrame(LinearElastic):
-    """Linear elasticity whose stress does not rotate with the point (Karamelo's)."""
+    """The stress does not rotate with the point (Karamelo's)."""
 
     __slots__ = ()
     traits = LawTraits()
@@ -77,8 +77,6 @@ class FixedFrame(LinearElastic):
 
 
 class State(NamedTuple):
-    """State of a point."""
-
     J: Any  # det F
     sigma: Any  # Cauchy stress
 
@@ -91,9 +89,15 @@ gain(
     cure="material neo-hookean, which stores what it is given",
 )
 
-laws.initial_state.on(LinearElastic)(lambda law, kin, like: State(1, nothing(kin)))
-laws.cauchy_stress.on(LinearElastic)(lambda law, kin, state: state.sigma)
-laws.jacobian.on(LinearElastic)(lambda law, kin, state: state.J)
+
+@laws.initial_state.on(LinearElastic)
+def _initial_state_linear_elastic(law, kin, like):
+    return State(1, nothing(kin))
+
+
+@laws.cauchy_stress.on(LinearElastic)
+def _cauchy_stress_linear_elastic(law, kin, state):
+    return state.sigma
 
 
 @laws.advance.on(LinearElastic)

@@ -86,5 +86,4 @@ def _energy_density_neo_hookean(law, kin, state):
 
 @laws.elastic_strain.on(NeoHookean)
 def _elastic_strain_neo_hookean(law, kin, state):
-    """Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I

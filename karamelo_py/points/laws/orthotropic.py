@@ -3,23 +3,22 @@
 from collections import namedtuple
 from itertools import combinations_with_replacement
 from math import cos, radians, sin
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.language.signature import Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, inner, total
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
+from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
-# Components of symmetric tensors in the order of Voigt's notation.
+# Voigt's order.
 VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
 INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of a component in it
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
-# Where the law stores the stiffness of two components.
 STIFFNESS = tuple(
     tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)
 )
@@ -31,8 +30,6 @@ _Fields = namedtuple(
 
 
 class Directional(OfDeformation, _Fields):
-    """Law with a linear stiffness in the reference frame."""
-
     __slots__ = ()
     in_lanes = True
     traits = LawTraits(rebounds=True)
@@ -73,16 +70,16 @@ class Orthotropic(NamedTuple):
     transverse, saint-venant-kirchhoff, plane_stress
     """
 
-    rho: Annotated[float, Positive]
-    E1: Annotated[float, Positive]
-    E2: Annotated[float, Positive]
-    E3: Annotated[float, Positive]
+    rho: AboveZero
+    E1: AboveZero
+    E2: AboveZero
+    E3: AboveZero
     nu12: float
     nu13: float
     nu23: float
-    G12: Annotated[float, Positive]
-    G13: Annotated[float, Positive]
-    G23: Annotated[float, Positive]
+    G12: AboveZero
+    G13: AboveZero
+    G23: AboveZero
     angle: float = 0.0
     tilt: float = 0.0
     spin: float = 0.0
@@ -138,12 +135,12 @@ class Transverse(NamedTuple):
     orthotropic, linear
     """
 
-    rho: Annotated[float, Positive]
-    E: Annotated[float, Positive]
+    rho: AboveZero
+    E: AboveZero
     nu: float
-    E3: Annotated[float, Positive]
+    E3: AboveZero
     nu3: float
-    G3: Annotated[float, Positive]
+    G3: AboveZero
     angle: float = 0.0
     tilt: float = 0.0
 

@@ -1,9 +1,14 @@
 """Checks and conversions of parameters, and sequences of numbers."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from karamelo_py.language.rules import known_failure
+from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.script.errors import ScriptError
+
+AboveZero = Annotated[float, Positive]
+FromZero = Annotated[float, NonNegative]
 
 LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 
@@ -38,7 +43,6 @@ def tell_of_locking(law: type) -> None:
 
 
 def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
-    """Refuse a melting temperature that is not above the reference temperature."""
     if not Tm > Tr:
         raise ScriptError(
             f"the melting temperature Tm = {Tm:g} is not above {name} = {Tr:g}",
@@ -77,5 +81,4 @@ class Numbers:
         return self.values[k]
 
     def filled(self, length: int) -> list[float]:
-        """The numbers, the last one repeated up to `length`."""
         return [*self.values, *self.values[-1:] * (length - len(self.values))]

@@ -1,10 +1,10 @@
 """Material rigid: prescribed velocity, empty state."""
 
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from karamelo_py.language.signature import Positive
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import nothing
+from karamelo_py.points.laws.parameters import AboveZero
 
 
 class Rigid(NamedTuple):
@@ -39,18 +39,41 @@ class Rigid(NamedTuple):
 
     in_lanes = True
 
-    specific_volume: float  # volume per mass
+    specific_volume: float
 
     @classmethod
-    def given(cls, rho: Annotated[float, Positive]):
+    def given(cls, rho: AboveZero):
         return cls(1 / rho)
 
 
-laws.initial_state.on(Rigid)(lambda law, kin, like: ())
-laws.advance.on(Rigid)(lambda law, kin, state, dl, dt: ())
-laws.constrained_velocity.on(Rigid)(lambda law, own, given: own)
-laws.jacobian.on(Rigid)(lambda law, kin, state: 1)
-for _stress in (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain):
-    _stress.on(Rigid)(lambda law, kin, state: nothing(kin))
-for _number in (laws.wave_speed_squared, laws.energy_density):
-    _number.on(Rigid)(lambda law, kin, state: 0)
+@laws.initial_state.on(Rigid)
+def _initial_state_rigid(law, kin, like):
+    return ()
+
+
+@laws.advance.on(Rigid)
+def _advance_rigid(law, kin, state, dl, dt):
+    return ()
+
+
+@laws.constrained_velocity.on(Rigid)
+def _constrained_velocity_rigid(law, own, given):
+    return own
+
+
+@laws.jacobian.on(Rigid)
+def _jacobian_rigid(law, kin, state):
+    return 1
+
+
+@laws.cauchy_stress.on(Rigid)
+@laws.kirchhoff_stress.on(Rigid)
+@laws.elastic_strain.on(Rigid)
+def _no_stress(law, kin, state):
+    return nothing(kin)
+
+
+@laws.wave_speed_squared.on(Rigid)
+@laws.energy_density.on(Rigid)
+def _zero(law, kin, state):
+    return 0

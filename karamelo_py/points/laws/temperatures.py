@@ -8,14 +8,12 @@ parts get as `heat`: () if the law has none.
 from typing import Annotated, NamedTuple
 
 from karamelo_py.compiler import point_function, where
-from karamelo_py.language.signature import In, NonNegative, Positive
+from karamelo_py.language.signature import In
 from karamelo_py.points.laws import column, conductivity, heat_capacity, temperature
-from karamelo_py.points.laws.parameters import check_temperatures
+from karamelo_py.points.laws.parameters import AboveZero, FromZero, check_temperatures
 
 
 class Warm(NamedTuple):
-    """Temperature of a point."""
-
     T: float
 
 
@@ -42,7 +40,6 @@ def temperature_or(heat, otherwise):
 
 
 def at_temperature(heat, T):
-    """Warm(T), or () if the law has no temperature."""
     return Warm(T) if len(heat) else ()
 
 
@@ -88,8 +85,8 @@ class PlasticWork(NamedTuple):
     in_lanes = True
 
     chi: Annotated[float, In(0, 1)]
-    cp: Annotated[float, Positive]
-    kappa: Annotated[float, NonNegative]
+    cp: AboveZero
+    kappa: FromZero
     alpha: float
     T0: float
     Tm: float
@@ -100,9 +97,21 @@ class PlasticWork(NamedTuple):
 
 
 column(PlasticWork, "T", temperature)
-initial_heat.on(PlasticWork)(lambda temperature, like: Warm(temperature.T0))
-heat_capacity.on(PlasticWork)(lambda law, like: law.cp)
-conductivity.on(PlasticWork)(lambda law, like: law.kappa)
+
+
+@initial_heat.on(PlasticWork)
+def _initial_heat_plastic_work(temperature, like):
+    return Warm(temperature.T0)
+
+
+@heat_capacity.on(PlasticWork)
+def _heat_capacity_plastic_work(law, like):
+    return law.cp
+
+
+@conductivity.on(PlasticWork)
+def _conductivity_plastic_work(law, like):
+    return law.kappa
 
 
 @heated.on(PlasticWork)

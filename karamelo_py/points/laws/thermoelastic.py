@@ -15,8 +15,8 @@ class Expansion(NamedTuple):
 
     in_lanes = True
 
-    cp: float  # heat capacity per mass
-    kappa: float  # conductivity
+    cp: float
+    kappa: float
     alpha: float  # coefficient of linear expansion
     pressure: float  # 3 K alpha, pressure per kelvin
     initial_temperature: float  # T0 of the solid, known when the scene is lowered
@@ -43,7 +43,6 @@ suggestion(
 
 
 def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> NamedTuple:
-    """An elastic law, with a temperature if heat capacity and conductivity are given."""
     if cp is None or kappa is None:
         if cp is not None:
             raise ScriptError(
@@ -57,7 +56,11 @@ def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> 
 
 
 laws.column(Expansion, "T", laws.temperature)
-initial_heat.on(Expansion)(lambda heat, like: Warm(heat.initial_temperature))
+
+
+@initial_heat.on(Expansion)
+def _initial_heat_expansion(heat, like):
+    return Warm(heat.initial_temperature)
 
 
 @thermal_pressure.on(Expansion)
@@ -66,14 +69,11 @@ def _thermal_pressure_expansion(heat, T):
 
 
 class State(NamedTuple):
-    """State of a point."""
-
-    elastic: Any  # state of the elastic law
-    T: Any  # temperature
+    elastic: Any
+    T: Any
 
 
 def expansion_pressure(law, state):
-    """3 K alpha (T - T0)."""
     return thermal_pressure(law.heat, (state.T,))[0]
 
 
@@ -98,23 +98,20 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
     return laws.kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
-def of_elastic_law(function) -> None:
-    """Apply a function of laws to the elastic law within."""
-
+def _of_elastic_law(function) -> None:
     @function.on(Thermoelastic)
-    def _of_elastic_law(law, kin, state):
+    def _of_law_within(law, kin, state):
         return function(law.elastic, kin, state.elastic)
 
 
-of_elastic_law(laws.jacobian)
-of_elastic_law(laws.deformation)
-of_elastic_law(laws.wave_speed_squared)
-of_elastic_law(laws.wave_speed_bound)
+for _function in (
+    laws.jacobian, laws.deformation, laws.wave_speed_squared, laws.wave_speed_bound,
+):  # fmt: skip
+    _of_elastic_law(_function)
 
 
 @laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
-    """Energy released by unloading at this temperature."""
     j = laws.jacobian(law, kin, state)
     elastic = laws.energy_density(law.elastic, kin, state.elastic)
     return elastic + expansion_pressure(law, state) * (1 - j)
@@ -132,11 +129,31 @@ def _with_stress_thermoelastic(law, kin, state, stress):
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
 
 
-laws.by_rates.on(Thermoelastic)(lambda law: laws.by_rates(law.elastic))
-laws.specific_volume.on(Thermoelastic)(lambda law: laws.specific_volume(law.elastic))
-laws.temperature.on(Thermoelastic)(lambda law, kin, state: state.T)
-laws.heat_capacity.on(Thermoelastic)(lambda law, like: law.heat.cp)
-laws.conductivity.on(Thermoelastic)(lambda law, like: law.heat.kappa)
+@laws.by_rates.on(Thermoelastic)
+def _by_rates_thermoelastic(law):
+    return laws.by_rates(law.elastic)
 
 
-laws.with_temperature.on(Thermoelastic)(lambda law, kin, state, T: State(state.elastic, T))
+@laws.specific_volume.on(Thermoelastic)
+def _specific_volume_thermoelastic(law):
+    return laws.specific_volume(law.elastic)
+
+
+@laws.temperature.on(Thermoelastic)
+def _temperature_thermoelastic(law, kin, state):
+    return state.T
+
+
+@laws.heat_capacity.on(Thermoelastic)
+def _heat_capacity_thermoelastic(law, like):
+    return law.heat.cp
+
+
+@laws.conductivity.on(Thermoelastic)
+def _conductivity_thermoelastic(law, like):
+    return law.heat.kappa
+
+
+@laws.with_temperature.on(Thermoelastic)
+def _with_temperature_thermoelastic(law, kin, state, T):
+    return State(state.elastic, T)

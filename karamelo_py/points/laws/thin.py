@@ -30,32 +30,26 @@ class Thin(NamedTuple):
 
 
 class ThinInLargeIncrements(Thin):
-    """Thin body under increments of any size."""
-
     __slots__ = ()
     trials = ENOUGH
 
 
 class State(NamedTuple):
-    """State of a point."""
-
     whole: Any  # of the wrapped law
     across: Any  # stretch across the body: thickness over initial thickness
 
 
 class Within(NamedTuple):
-    """Tag of an output column of the wrapped law."""
-
     column: Any
 
 
-def across(law, kin, dl, q):
+def with_strain_across(law, kin, dl, q):
     """The increment `dl` in the body, with q across it, for the wrapped law."""
     if isinstance(dl, LargeIncrement):
-        step = across(law, kin, dl.dl, q)
+        step = with_strain_across(law, kin, dl.dl, q)
         return large(step) if laws.by_rates(law) else step
-    none = real(0, q)
-    numbers = (*dl, q) if kin.dimension == 2 else (dl[0], none, none, q, q)
+    zero = real(0, q)
+    numbers = (*dl, q) if kin.dimension == 2 else (dl[0], zero, zero, q, q)
     return WHOLE.Tensor._make(numbers)
 
 
@@ -75,7 +69,7 @@ def _advance_thin(law, kin, state, dl, dt):
     first = modulus + (2 - kin.dimension) * rest / volume
 
     def tried(q):
-        new = laws.advance(inner, WHOLE, old, across(inner, kin, dl, q), dt)
+        new = laws.advance(inner, WHOLE, old, with_strain_across(inner, kin, dl, q), dt)
         return new, laws.cauchy_stress(inner, WHOLE, new)[2]
 
     q, slope = modulus - modulus, first
@@ -91,37 +85,27 @@ def _advance_thin(law, kin, state, dl, dt):
     return State(new, state.across * (1 + q))
 
 
-def _by_state(function):
-    def of_whole(law, kin, state):
-        return function(law.law, WHOLE, state.whole)
+def _of_law_within(function):
+    """Apply a function of law and state, or of the law alone, to the wrapped law."""
 
-    function.on(Thin)(of_whole)
-
-
-def _by_law(function):
-    def of_whole(law, *like):
-        return function(law.law, *like)
-
-    function.on(Thin)(of_whole)
+    @function.on(Thin)
+    def _within(law, *arguments):
+        if len(arguments) < 2:
+            return function(law.law, *arguments)
+        return function(law.law, WHOLE, arguments[1].whole)
 
 
 for _function in (
-    laws.jacobian,
-    laws.energy_density,
-    laws.dissipated_energy,
-    laws.damage,
-    laws.damage_initiation,
-    laws.temperature,
-    laws.plastic_strain,
-):
-    _by_state(_function)
-for _function in (laws.specific_volume, laws.heat_capacity, laws.conductivity):
-    _by_law(_function)
+    laws.jacobian, laws.energy_density, laws.dissipated_energy, laws.damage,
+    laws.damage_initiation, laws.temperature, laws.plastic_strain,
+    laws.specific_volume, laws.heat_capacity, laws.conductivity,
+):  # fmt: skip
+    _of_law_within(_function)
 
 
 @laws.by_rates.on(Thin)
 def _by_rates_thin(law):
-    return True
+    return True  # the logarithm in load steps, which need more trials anyway
 
 
 @laws.wave_speed_squared.on(Thin)
@@ -142,27 +126,19 @@ def _slower(law, kin, state, squared):
     """
     shear = min(laws.shear_part(law.law, WHOLE, state.whole), squared)
     rest = squared - shear
-    across = shear + (3 - kin.dimension) * rest
-    return shear + rest * shear / where(across > 0, across, 1)
+    stiffness = shear + (3 - kin.dimension) * rest
+    return shear + rest * shear / where(stiffness > 0, stiffness, 1)
 
 
-def _in_body(kin, s):
-    return kin.Symmetric._make(s[: len(kin.symmetric_names)])
+def _in_body(function):
+    @function.on(Thin)
+    def _tensor_in_body(law, kin, state):
+        s = function(law.law, WHOLE, state.whole)
+        return kin.Symmetric._make(s[: len(kin.symmetric_names)])
 
 
-@laws.kirchhoff_stress.on(Thin)
-def _kirchhoff_stress_thin(law, kin, state):
-    return _in_body(kin, laws.kirchhoff_stress(law.law, WHOLE, state.whole))
-
-
-@laws.cauchy_stress.on(Thin)
-def _cauchy_stress_thin(law, kin, state):
-    return _in_body(kin, laws.cauchy_stress(law.law, WHOLE, state.whole))
-
-
-@laws.elastic_strain.on(Thin)
-def _elastic_strain_thin(law, kin, state):
-    return _in_body(kin, laws.elastic_strain(law.law, WHOLE, state.whole))
+for _function in (laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain):
+    _in_body(_function)
 
 
 @laws.with_temperature.on(Thin)

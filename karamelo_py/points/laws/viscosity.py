@@ -13,8 +13,8 @@ class ArtificialViscosity(NamedTuple):
 
     in_lanes = True
 
-    Q1: float  # quadratic coefficient
-    Q2: float  # linear coefficient
+    Q1: float
+    Q2: float
     cell_size: float  # h, known when the scene is lowered
 
 

@@ -19,8 +19,6 @@ from karamelo_py.points import noise
 
 
 class TransferTraits(NamedTuple):
-    """Traits of a transfer."""
-
     inverts_spread: bool = False  # divides by D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
     retains: bool = False  # points retain a fraction of their velocity: `alpha`, a parameter
     per_time: bool = False  # alpha holds for a stable step, not for each

@@ -109,7 +109,9 @@ known_failure(
 )
 
 
-transfers.known_volume.on(ASFLIP)(lambda transfer, law, kin, state: jacobian(law, kin, state))
+@transfers.known_volume.on(ASFLIP)
+def _known_volume_asflip(transfer, law, kin, state):
+    return jacobian(law, kin, state)
 
 
 @transfers.displacing_velocity.on(ASFLIP)

@@ -90,27 +90,36 @@ def _in_step_flip_per_time(transfer, kept):
 
 def take_nodal_velocity(transfer: type) -> None:
     """Let points take the nodal velocity after the step, as in PIC."""
-    lost_shares.on(transfer)(lambda transfer, like: (1.0, 1.0))
-    updated_velocity.on(transfer)(lambda transfer, v, v_pic, dv: v_pic)
+    lost_shares.on(transfer)(_lost_shares_pic)
+    updated_velocity.on(transfer)(_updated_velocity_pic)
+
+
+def _lost_shares_pic(transfer, like):
+    return 1.0, 1.0
+
+
+def _updated_velocity_pic(transfer, v, v_pic, dv):
+    return v_pic
 
 
 def blend(transfer: type) -> None:
-    """Update the velocity of points as in FLIP, by `alpha` of the transfer."""
+    updated_velocity.on(transfer)(_updated_velocity_flip)
+    lost_shares.on(transfer)(_lost_shares_flip)
 
-    @updated_velocity.on(transfer)
-    def _updated_velocity_transfer(transfer, v, v_pic, dv):
-        alpha = transfer.alpha
-        return (1 - alpha) * v_pic + alpha * (v + dv)
 
+def _updated_velocity_flip(transfer, v, v_pic, dv):
+    alpha = transfer.alpha
+    return (1 - alpha) * v_pic + alpha * (v + dv)
+
+
+def _lost_shares_flip(transfer, like):
     # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
-    @lost_shares.on(transfer)
-    def _lost_shares_transfer(transfer, like):
-        alpha = transfer.alpha
-        return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)
+    alpha = transfer.alpha
+    return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)
 
 
 def swings(transfer: type) -> None:
-    """Register the warning for large vibrations: only usl, which damps, is safe."""
+    """Warn of large vibrations: only usl, which damps, is safe."""
     known_failure(
         transfer,
         "large vibrations",

@@ -104,7 +104,9 @@ def _gradient_weight_mls(transfer, node):
     return as_gradient(node.kin, [*moved, *node.grad_N[len(moved) :]])
 
 
-transfers.by_arms.on(MLS)(lambda transfer, inverse_d: inverse_d)
+@transfers.by_arms.on(MLS)
+def _by_arms_mls(transfer, inverse_d):
+    return inverse_d
 
 
 # The point stores the velocity gradient: gathered once if both come from v*.

@@ -10,8 +10,6 @@ from karamelo_py.points.transfers import TransferTraits, terms, updated_velocity
 
 
 class TermOfSeries(StepField):
-    """Term of the series at a point."""
-
     shape = vector
 
 
@@ -24,7 +22,6 @@ class Reflected(StepField):
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        """True if points of a law take the transfer's energy loss as heat."""
         return can(law, taken_heat)
 
 
@@ -64,5 +61,13 @@ class XPIC(NamedTuple):
 
 
 # kernels.table.sum_series has replaced dv by the sum of the series, with the change.
-updated_velocity.on(XPIC)(lambda transfer, v, v_pic, dv: dv)
-terms.on(XPIC)(lambda transfer: transfer.order)
+
+
+@updated_velocity.on(XPIC)
+def _updated_velocity_xpic(transfer, v, v_pic, dv):
+    return dv
+
+
+@terms.on(XPIC)
+def _terms_xpic(transfer):
+    return transfer.order

@@ -27,8 +27,6 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 
 
 class Element(NamedTuple):
-    """Kind of element whose corners a family of domains stores."""
-
     kind: str  # its name in meshes
     corners: int
     edges: tuple[tuple[int, int], ...]  # between corners; their determinant must be positive
@@ -52,7 +50,7 @@ class ConvectedDomain(NamedTuple):
 
 
 class CarriedDomain(ConvectedDomain):
-    """Base of domains with stored corners that the grid moves; they add `element`."""
+    """Domains with stored corners that the grid moves; they add `element`."""
 
     __slots__ = ()
     traits = ConvectedDomain.traits._replace(shape=("corners",))
@@ -98,11 +96,9 @@ def upright(basis, kin, place):
 
 
 class Corner(NamedTuple):
-    """Position of a corner on the grid."""
-
-    cell: tuple[int, ...]  # its cell, along each direction
-    fractions: tuple[float, ...]  # how far into the cell, along each direction
-    at: Any  # both together, in cells from the corner of the grid, a vector
+    cell: tuple[int, ...]  # along each direction
+    fractions: tuple[float, ...]  # of the cell, along each direction
+    at: Any  # their sum, in cells from the corner of the grid, a vector
 
 
 class CornerStencil(NamedTuple):
@@ -147,19 +143,16 @@ def corner_at(kin, grid, x):
 
 
 def hat(corner, j):
-    """Linear basis function of the j-th node of a corner's cell."""
     sides = zip(digits(j, 2, len(corner.cell)), corner.fractions, strict=True)
     return product([where(far > 0, r, 1 - r) for far, r in sides])
 
 
 def node_around(grid, corner, j):
-    """Number of the first node of a corner's cell, and offset of the j-th."""
     first = node_number(grid, grid.first, corner.cell)
     return first, node_number(grid, 0, digits(j, 2, len(corner.cell)))
 
 
 def around(grid, corner):
-    """Nodes around a corner, and their weights."""
     nodes = range(2 ** len(corner.cell))
     rows = tuple([beside(*node_around(grid, corner, j)) for j in nodes])
     return Weighted(rows, tuple([hat(corner, j) for j in nodes]))
@@ -174,7 +167,6 @@ def arm(grid, first, far, centre):
 
 
 def pairs_of_spread(kin):
-    """Rows and columns of D in the layout of :class:`CornerStencil`."""
     return [pair for pair in kin.Symmetric.places if max(*pair) < kin.dimension]
 
 
@@ -191,7 +183,6 @@ def spread_of(kin, grid, weight, corner, centre):
 
 
 def solve(kin, spread, a):
-    """D^-1 a."""
     d = kin.dimension
     m = dict(zip(pairs_of_spread(kin), spread, strict=True))
     m = m | {(j, i): value for (i, j), value in m.items()}
@@ -221,7 +212,6 @@ def seen_at_corner(kin, stencil, c):
 
 
 def of_corner(stencil, c):
-    """The stencil with only its c-th corner, chosen at run time."""
     parts = list(zip(stencil.corners, stencil.weights, stencil.gradients, strict=True))
     numbers = flat(parts[0])
     for k, part in enumerate(parts):
@@ -260,7 +250,9 @@ def _support_corners(basis, kin):
     return 2**kin.dimension * 2**kin.dimension
 
 
-bases.first_node.on(ConvectedDomain)(lambda basis, like: 0.5)
+@bases.first_node.on(ConvectedDomain)
+def _first_node_convected_domain(basis, like):
+    return 0.5
 
 
 # --- corners that move with the grid ----------------------------------------------------------

@@ -29,18 +29,14 @@ class NodeBlock(NamedTuple):
 
 
 class InBlock(NamedTuple):
-    """Tag instead of a basis: the point has a :class:`NodeBlock`."""
-
     basis: NamedTuple
 
 
 def _hats(a):
-    """Linear basis functions of three nodes, `a` cells from the first."""
     return max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)
 
 
 def block_of(kin, grid, stencil):
-    """Block of a point; () in 3D."""
     if kin.dimension > 2:
         return ()
     first, ahead, holds = [], [], True
@@ -60,12 +56,10 @@ def block_of(kin, grid, stencil):
 
 
 def is_whole(block):
-    """Check whether the points in all lanes see only nodes of their blocks."""
     return len(block) > 0 and all_lanes(block.holds)
 
 
 def is_one_block(block):
-    """Check whether the points in all lanes see only nodes of one block."""
     if len(block) == 0:
         return False
     row, line = block.first
@@ -74,7 +68,6 @@ def is_one_block(block):
 
 @shared
 def of_one(block):
-    """Block of points with the same nodes: node numbers have no lanes."""
     return NodeBlock(tuple([first_lane(number) for number in block.first]), *block[1:])
 
 

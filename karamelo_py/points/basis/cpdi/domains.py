@@ -126,7 +126,6 @@ class Tet4(_Simplex):
 
 
 def corners_and_edges(kin, place):
-    """Corners, and components of the edges from the first corner."""
     d = kin.dimension
     corners = [vector(kin, place[d * c : d * c + d]) for c in range(1, d + 2)]
     edges = [corner - corners[0] for corner in corners[1:]]
@@ -194,7 +193,6 @@ def _upright_q4(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
     ax, ay, bx, by = x2 - x1, y2 - y1, x3 - x2, y3 - y2
     cx, cy, dx, dy = x4 - x3, y4 - y3, x1 - x4, y1 - y4
-    # Jacobians at the corners, from the two edges at each.
     least = min(
         min(ax * by - bx * ay, bx * cy - cx * by), min(cx * dy - dx * cy, dx * ay - ax * dy)
     )
@@ -203,7 +201,6 @@ def _upright_q4(basis, kin, place):
 
 # Weights of the ends of an edge at its nearer and farther Gauss point.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
-# Of two directions, in the order of `_at_gauss`.
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
@@ -285,12 +282,10 @@ def _domain_h8(basis, kin, place):
 
 
 def _at(a: int, b: int) -> int:
-    """Index of one of the four in the order of `_at_gauss`."""
     return (a > 0) + 2 * (b > 0)
 
 
 def _means(place, d, p, q, r):
-    """Corners, weights and gradients, from the contributions of det J and its cofactors."""
     sums = [(d[0][n] + d[1][n]) + (d[2][n] + d[3][n]) for n in range(2)]
     k = 1 / (sums[0] + sums[1])
     near, far, half = k * NEAR, k * FAR, k * 0.5
@@ -309,7 +304,6 @@ def _means(place, d, p, q, r):
 
 @cpdi.upright.on(H8)
 def _upright_h8(basis, kin, place):
-    # The smallest Jacobian of the corners, from the half edges at each.
     u, v, w = _edges(place)
     met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in cpdi.CUBE]
     return min(*[dot(a, _cross(b, c)) for a, b, c in met]) > 0

@@ -6,10 +6,10 @@ the volume over the reference volume, `heat` the temperature (`Warm`), or () if 
 The memory is a tuple, empty for most. It has a `specific_volume`, like a law.
 """
 
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.compiler import point_function
-from karamelo_py.language.signature import Positive
+from karamelo_py.points.laws.parameters import AboveZero
 
 
 @point_function(otherwise=True)
@@ -90,11 +90,11 @@ class LinearPressure(NamedTuple):
 
     in_lanes = True
 
-    specific_volume: float  # reference volume per mass
+    specific_volume: float
     K: float
 
     @classmethod
-    def given(cls, rho0: Annotated[float, Positive], K: Annotated[float, Positive]):
+    def given(cls, rho0: AboveZero, K: AboveZero):
         return cls(1 / rho0, K)
 
 

@@ -1,12 +1,11 @@
 """Eos fluid and ideal-gas: liquids by Tait's equation, gases with internal energy."""
 
 from math import inf, sqrt
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import round_off
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.language.rules import known_failure
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.eos import (
     at_pressure,
@@ -19,6 +18,7 @@ from karamelo_py.points.laws.eos import (
     stored_heat,
     taken_heat,
 )
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
@@ -61,20 +61,13 @@ class Tait(NamedTuple):
     traits = LawTraits(any_speed=True)
     scalarised = ("compression_energy",)
 
-    specific_volume: float  # reference volume per mass
+    specific_volume: float
     K: float  # reference pressure; K gamma is the bulk modulus
     gamma: float
     tension: float = inf  # sustainable; from K on the formula limits it
 
     @classmethod
-    def given(
-        cls,
-        rho0: Annotated[float, Positive],
-        K: Annotated[float, Positive],
-        gamma: Annotated[float, Positive],
-        *,
-        tension: Annotated[float, NonNegative] = inf,
-    ):
+    def given(cls, rho0: AboveZero, K: AboveZero, gamma: AboveZero, *, tension: FromZero = inf):
         if gamma > 100 > K:  # exponents of liquids are below 15
             raise ScriptError(
                 f"K = {K:g} and gamma = {gamma:g} are swapped: gamma is an exponent",
@@ -132,7 +125,6 @@ def _compression_energy_tait(eos, j, memory):
     whole = j if eos.tension >= eos.K else min(j, ratio_at_pressure(eos, -eos.tension, ()))
     grown = -logarithm(whole) if exponent == 0 else (1 - power(whole, exponent)) / exponent
     energy = eos.K * (grown - (1 - whole))
-    # From there, constant tension.
     return energy + eos.tension * (j - whole) if j > whole else energy
 
 
@@ -181,20 +173,20 @@ class IdealGas(NamedTuple):
     in_lanes = True
     traits = LawTraits(any_speed=True, least_density=1e-3)
 
-    specific_volume: float  # reference volume per mass
-    gamma: float  # ratio of specific heats
+    specific_volume: float
+    gamma: float
     energy: float  # initial E, per reference volume
 
     @classmethod
     def given(
         cls,
-        rho0: Annotated[float, Positive],
+        rho0: AboveZero,
         gamma: float,
         *,
-        p: Annotated[float, Positive] | None = None,
-        e: Annotated[float, Positive] | None = None,
-        Q1: Annotated[float, NonNegative] = 0.0,
-        Q2: Annotated[float, NonNegative] = 0.0,
+        p: AboveZero | None = None,
+        e: AboveZero | None = None,
+        Q1: FromZero = 0.0,
+        Q2: FromZero = 0.0,
     ):
         if not gamma > 1:
             raise ScriptError(
@@ -254,13 +246,17 @@ known_failure(
 
 
 class InternalEnergy(NamedTuple):
-    """State of a point."""
-
     E: Any  # per reference volume
 
 
-initial_energy.on(IdealGas)(lambda eos, like: InternalEnergy(eos.energy))
-stored_heat.on(IdealGas)(lambda eos, loss: loss)
+@initial_energy.on(IdealGas)
+def _initial_energy_ideal_gas(eos, like):
+    return InternalEnergy(eos.energy)
+
+
+@stored_heat.on(IdealGas)
+def _stored_heat_ideal_gas(eos, loss):
+    return loss
 
 
 @compressed.on(IdealGas)

@@ -1,18 +1,18 @@
 """Eos shock: Mie-Grueneisen equation of state."""
 
 from math import inf, sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.rules import known_failure
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
     compression_energy,
     pressure,
     ratio_at_pressure,
 )
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
@@ -75,7 +75,7 @@ class Shock(NamedTuple):
     in_lanes = True
     scalarised = ("ratio_at_pressure",)
 
-    specific_volume: float  # reference volume per mass
+    specific_volume: float
     modulus: float  # rho0 c0^2
     S: float
     thermal: float  # Gamma rho0 cv, pressure per kelvin above Tr
@@ -85,17 +85,17 @@ class Shock(NamedTuple):
     @classmethod
     def given(
         cls,
-        rho0: Annotated[float, Positive],
-        K: Annotated[float, Positive],
-        c0: Annotated[float, Positive],
-        S: Annotated[float, NonNegative],
-        Gamma: Annotated[float, NonNegative],
-        cv: Annotated[float, NonNegative],
+        rho0: AboveZero,
+        K: AboveZero,
+        c0: AboveZero,
+        S: FromZero,
+        Gamma: FromZero,
+        cv: FromZero,
         Tr: float,
-        Q1: Annotated[float, NonNegative],
-        Q2: Annotated[float, NonNegative],
+        Q1: FromZero,
+        Q2: FromZero,
         *,
-        tension: Annotated[float, NonNegative] = inf,
+        tension: FromZero = inf,
     ):
         # K is unused because rho0 c0^2 replaces it; it could only replace c0.
         if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:

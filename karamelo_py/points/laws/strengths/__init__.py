@@ -17,8 +17,6 @@ from karamelo_py.points.laws import column
 
 
 class StrainStep(NamedTuple):
-    """A strain increment of a point."""
-
     s: Any  # deviatoric stress before the step, rotated with the point
     strain: Any  # increment, not deviatoric
     j: Any  # volume ratio after the step
@@ -29,13 +27,13 @@ class StrainStep(NamedTuple):
 class FrictionTrial(NamedTuple):
     """Stress after a step that is assumed to be elastic."""
 
-    s: Any  # deviatoric stress
-    p: Any  # pressure
-    K: Any  # bulk modulus
+    s: Any  # deviatoric
+    p: Any
+    K: Any
 
 
 class Remembered(NamedTuple):
-    """Tag of a number in the memory of a strength."""
+    """Tag of a number in the memory."""
 
     index: int
 

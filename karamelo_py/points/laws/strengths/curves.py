@@ -1,7 +1,7 @@
 """Strengths tabulated and formula: a flow stress given in the script."""
 
 from pathlib import Path
-from typing import Annotated, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from karamelo_py.compiler.formula import CONSTANT, POINT, SPREAD, UNIFORM
 from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.signature import NonNegative, Positive, TableFile
-from karamelo_py.points.laws.parameters import Numbers
+from karamelo_py.language.signature import TableFile
+from karamelo_py.points.laws.parameters import AboveZero, FromZero, Numbers
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return
 from karamelo_py.points.laws.temperatures import temperature_or
@@ -55,7 +55,7 @@ class Tabulated(NamedTuple):
     syntax = "G, ep1, Y1[, ep2, Y2, ...] | file"
 
     @classmethod
-    def given(cls, G: Annotated[float, Positive], *curve: float | TableFile):
+    def given(cls, G: AboveZero, *curve: float | TableFile):
         points = _points(curve)
         _check_curve(points, G)
         strain, stress = map(tuple, points.T.tolist())
@@ -191,20 +191,13 @@ class FlowStress(NamedTuple):
     initial_temperature: float
 
     @classmethod
-    def given(
-        cls,
-        G: Annotated[float, Positive],
-        Y: FlowFormula,
-        *,
-        T: Annotated[float, NonNegative] = 293.0,
-    ):
+    def given(cls, G: AboveZero, Y: FlowFormula, *, T: FromZero = 293.0):
         law = cls(G, Y, len(Y) // 2, T)
         _check_formula(law)
         return law
 
 
 def _check_formula(law: FlowStress) -> None:
-    """Refuse a formula without a value at the onset of plastic flow or later."""
     for ep in (0.0, 1e-3, 0.1, 1.0):
         for epdot in (0.0, 1.0, 1e4):
             Y = value(law, ep, epdot, law.initial_temperature)

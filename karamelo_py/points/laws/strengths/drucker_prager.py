@@ -1,11 +1,11 @@
 """strength drucker-prager: cohesion and friction as a cone."""
 
 from math import cos, inf, radians, sin, sqrt, tan
-from typing import Annotated, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import LawTraits
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
     Soil,
@@ -80,28 +80,28 @@ class DruckerPrager(NamedTuple):
     traits = LawTraits(flows=True)
     scalarised = ("respond",)
 
-    G: float  # shear modulus
+    G: float
     cohesion: float
     friction: float
     dilation: float
     tension: float
     residual_cohesion: float  # at the end of softening
     residual_friction: float
-    softening: float  # fraction of the way to the residual per unit of plastic strain, or 0
+    softening: float  # per unit of plastic strain; or 0
 
     @classmethod
     def given(
         cls,
-        G: Annotated[float, Positive],
-        cohesion: Annotated[float, NonNegative],
+        G: AboveZero,
+        cohesion: FromZero,
         phi: float,
         psi: float = 0.0,
         *,
         fit: Literal["compression", "extension", "plane-strain"] = "compression",
-        tension: Annotated[float, NonNegative] | None = None,
-        residual_cohesion: Annotated[float, NonNegative] | None = None,
-        residual_phi: Annotated[float, NonNegative] | None = None,
-        softening: Annotated[float, Positive] | None = None,
+        tension: FromZero | None = None,
+        residual_cohesion: FromZero | None = None,
+        residual_phi: FromZero | None = None,
+        softening: AboveZero | None = None,
     ):
         """The cone sqrt(s:s / 2) <= cohesion + friction p."""
         soil = Soil(cohesion, phi, psi, residual_cohesion, residual_phi, softening)

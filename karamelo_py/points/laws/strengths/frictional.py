@@ -70,7 +70,6 @@ def fraction_by_dilatancy(strength, memory):
 
 
 def sines_after(strength, strain):
-    """`sines` after a plastic strain."""
     _, friction, dilation = surface(strength, strain)
     return sines(strength, friction, dilation)
 
@@ -212,7 +211,6 @@ def _averages_splines(strength, scene):
 
 
 def _angle(f):
-    """A sufficient angle of dilatancy, in degrees, rounded up."""
     return ceil(degrees(asin(min(ENOUGH * f, 1))))
 
 

@@ -1,7 +1,7 @@
 """strength plastic, and the base of von Mises strengths with any hardening."""
 
 from math import sqrt
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import (
     any_lane,
@@ -13,8 +13,8 @@ from karamelo_py.compiler import (
     where,
 )
 from karamelo_py.compiler.slopes import Dual, value_of
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import dev, von_mises
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths import remembers, shear_response
 
 
@@ -55,17 +55,15 @@ class LinearHardening(NamedTuple):
 
     in_lanes = True
 
-    G: Annotated[float, Positive]
-    yield_stress: Annotated[float, Positive]
-    H: Annotated[float, NonNegative] = 0.0
+    G: AboveZero
+    yield_stress: AboveZero
+    H: FromZero = 0.0
 
     def checked(self):
         return self if self.H > 0 else Plastic(self.G, self.yield_stress)
 
 
 class Plastic(NamedTuple):
-    """Von Mises strength with a constant yield stress."""
-
     style = "plastic"
     in_lanes = True
     H = 0.0
@@ -90,8 +88,6 @@ def _shear_response_linear_hardening(strength, kin, step, memory, heat):
 
 
 class FlowState(NamedTuple):
-    """State of a point before plastic flow."""
-
     memory: Any  # of the strength
     heat: Any  # `Warm` or ()
     known: Any  # result of `precompute`

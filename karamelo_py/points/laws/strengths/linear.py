@@ -1,12 +1,12 @@
 """Strengths linear and fluid: unlimited elastic shear, and viscous shear."""
 
 from math import sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import dev, inner, nothing
 from karamelo_py.points.laws import LawTraits, parameter, specific_volume, strengths
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.viscosity import damped
 
@@ -36,7 +36,7 @@ class Elastic(NamedTuple):
     in_lanes = True
     traits = LawTraits(rebounds=True)
 
-    G: Annotated[float, Positive]
+    G: AboveZero
 
 
 @strengths.shear_response.on(Elastic)
@@ -74,7 +74,7 @@ class Viscous(NamedTuple):
     cell_size: float  # h, known when the scene is lowered
 
     @classmethod
-    def given(cls, mu: Annotated[float, NonNegative]):
+    def given(cls, mu: FromZero):
         return cls(mu, 0.0)
 
 

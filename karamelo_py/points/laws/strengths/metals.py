@@ -1,13 +1,17 @@
 """Strengths johnson_cook, swift and zerilli-armstrong: power-law hardening of metals."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import all_lanes, fma, real, round_off, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.language.rules import suggestion
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.laws import Absent
-from karamelo_py.points.laws.parameters import check_temperatures, reference_rate
+from karamelo_py.points.laws.parameters import (
+    AboveZero,
+    FromZero,
+    check_temperatures,
+    reference_rate,
+)
 from karamelo_py.points.laws.strengths import remembers, shear_response
 from karamelo_py.points.laws.strengths.hardening import (
     first_guess,
@@ -69,13 +73,13 @@ class JohnsonCook(NamedTuple):
     @classmethod
     def given(
         cls,
-        G: Annotated[float, Positive],
-        A: Annotated[float, Positive],
-        B: Annotated[float, NonNegative],
-        n: Annotated[float, NonNegative],
-        epsdot0: Annotated[float, NonNegative],
-        C: Annotated[float, NonNegative],
-        m: Annotated[float, NonNegative],
+        G: AboveZero,
+        A: AboveZero,
+        B: FromZero,
+        n: FromZero,
+        epsdot0: FromZero,
+        C: FromZero,
+        m: FromZero,
         Tr: float,
         Tm: float,
     ):
@@ -95,8 +99,6 @@ suggestion(
 
 
 class RateFactor(NamedTuple):
-    """1 + C ln(rate/epsdot0) above the reference rate."""
-
     in_lanes = True
 
     epsdot0: float
@@ -104,8 +106,6 @@ class RateFactor(NamedTuple):
 
 
 class Softening(NamedTuple):
-    """1 - T*^m."""
-
     in_lanes = True
 
     m: float
@@ -220,11 +220,11 @@ class Swift(NamedTuple):
 
     in_lanes = True
 
-    G: Annotated[float, Positive]
-    A: Annotated[float, Positive]
-    B: Annotated[float, NonNegative]
+    G: AboveZero
+    A: AboveZero
+    B: FromZero
     C: float
-    n: Annotated[float, NonNegative]
+    n: FromZero
 
 
 remembers(Swift, ep=0.0)
@@ -307,17 +307,17 @@ class ZerilliArmstrong(NamedTuple):
     @classmethod
     def given(
         cls,
-        G: Annotated[float, Positive],
-        C0: Annotated[float, NonNegative],
-        C1: Annotated[float, NonNegative],
-        C2: Annotated[float, NonNegative],
-        C3: Annotated[float, NonNegative],
-        C4: Annotated[float, NonNegative],
-        C5: Annotated[float, NonNegative],
-        n: Annotated[float, NonNegative],
+        G: AboveZero,
+        C0: FromZero,
+        C1: FromZero,
+        C2: FromZero,
+        C3: FromZero,
+        C4: FromZero,
+        C5: FromZero,
+        n: FromZero,
         *,
-        epsdot0: Annotated[float, Positive] = 1.0,
-        T: Annotated[float, NonNegative] = 293.0,
+        epsdot0: AboveZero = 1.0,
+        T: FromZero = 293.0,
     ):
         return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
 

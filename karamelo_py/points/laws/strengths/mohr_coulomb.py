@@ -1,12 +1,12 @@
 """strength mohr-coulomb: cohesion and friction."""
 
 from math import cos, sin, sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from karamelo_py.language.signature import NonNegative, Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.kinematics.principal import from_principal, principal
 from karamelo_py.points.laws import LawTraits
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths import pressure_response
 from karamelo_py.points.laws.strengths.frictional import (
     Soil,
@@ -58,25 +58,25 @@ class MohrCoulomb(NamedTuple):
     traits = LawTraits(flows=True)
     scalarised = ("respond",)
 
-    G: float  # shear modulus
+    G: float
     cohesion: float  # c cos(phi)
     friction: float  # sin(phi)
     dilation: float  # sin(psi)
     residual_cohesion: float  # at the end of softening
     residual_friction: float
-    softening: float  # fraction of the way to the residual per unit of plastic strain, or 0
+    softening: float  # per unit of plastic strain; or 0
 
     @classmethod
     def given(
         cls,
-        G: Annotated[float, Positive],
-        cohesion: Annotated[float, NonNegative],
+        G: AboveZero,
+        cohesion: FromZero,
         phi: float,
         psi: float = 0.0,
         *,
-        residual_cohesion: Annotated[float, NonNegative] | None = None,
-        residual_phi: Annotated[float, NonNegative] | None = None,
-        softening: Annotated[float, Positive] | None = None,
+        residual_cohesion: FromZero | None = None,
+        residual_phi: FromZero | None = None,
+        softening: AboveZero | None = None,
     ):
         soil = Soil(cohesion, phi, psi, residual_cohesion, residual_phi, softening)
         return cls(G, *peak_and_residual(soil, lambda c, angle: (c * cos(angle), sin(angle))))

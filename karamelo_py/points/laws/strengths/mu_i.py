@@ -1,14 +1,14 @@
 """strength mu-i: dense granular flow, with rate-dependent friction."""
 
 from math import sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from karamelo_py.compiler import where
 from karamelo_py.language.rules import known_failure
-from karamelo_py.language.signature import Positive
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import LawTraits, parameter, specific_volume
 from karamelo_py.points.laws.eos import pressure
+from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.points.laws.strengths import elastic_ratio, fbar_fraction, remembers, respond
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
@@ -56,12 +56,12 @@ class MuI(NamedTuple):
     in_lanes = True
     traits = LawTraits(flows=True, rings=False)
 
-    G: Annotated[float, Positive]
-    mu_s: Annotated[float, Positive]
-    mu_2: Annotated[float, Positive]
-    I0: Annotated[float, Positive]
-    d: Annotated[float, Positive]
-    rho_s: Annotated[float, Positive]
+    G: AboveZero
+    mu_s: AboveZero
+    mu_2: AboveZero
+    I0: AboveZero
+    d: AboveZero
+    rho_s: AboveZero
 
     def checked(self):
         """Refuse friction that decreases with the rate: such flow is unstable."""
