@@ -8,7 +8,7 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS, check_ID
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
-from karamelo_py.scene.hub import Catalogue, Hub
+from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError, instead
 from karamelo_py.script.expressions import SEEDS, Expression
@@ -36,7 +36,7 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     --------
     delete_fix, group, compute
     """
-    new = _define(hub, hub.fixes, hub.computes, ID, style, arguments)
+    new = _define(hub, "fix", ID, style, arguments)
     check_fix(hub, new)
     new.defined()
 
@@ -73,7 +73,7 @@ def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) 
     --------
     delete_compute, log_modify, fix
     """
-    _define(hub, hub.computes, hub.fixes, ID, style, arguments)
+    _define(hub, "compute", ID, style, arguments)
 
 
 def delete_compute(hub: Hub, ID: str) -> None:
@@ -90,11 +90,9 @@ def delete_compute(hub: Hub, ID: str) -> None:
     hub.computes.remove(ID)
 
 
-def _define(
-    hub: Hub, own: Catalogue, others: Catalogue, ID: str, style: str, arguments: tuple
-) -> Any:
+def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     """Make a fix or a compute and publish its values."""
-    kind = own.kind
+    own, others = (hub.fixes, hub.computes) if kind == "fix" else (hub.computes, hub.fixes)
     _refuse_wrong_order(kind, ID, style, arguments)
     with signature.in_new_words(kind, ID, style, arguments):
         target = registry.called(kind, ID, style)

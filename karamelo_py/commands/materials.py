@@ -114,7 +114,7 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     kind = catalogue.kind
     catalogue.refuse(ID)
     given: dict = {}
-    made = style_of(hub, kind, ID, style, arguments, given)
+    made = style_of(hub, kind, ID, style, arguments, values=given)
     entry = (Material if kind == "material" else MaterialPart)(kind, style, made, given)
     if isinstance(entry, Material):
         fit_to_domain(hub, entry)

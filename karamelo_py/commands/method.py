@@ -63,7 +63,7 @@ def method(
     scheme, solid, temperature, fix temperature_nodes, fix temperature_particles,
     fix heat_flux_particles, fix convection_particles
     """
-    call = _Call(hub, kind, transfer, basis, options)
+    call = _Call(hub, {"method": kind, "transfer": transfer, "basis": basis}, options)
     parts = call.parts()
     if hub.solids:
         raise ScriptError(
@@ -218,9 +218,10 @@ FAMILIES = ("transfer", "basis", "method")
 class _Call:
     """The three styles of a call, and the parameter of each option."""
 
-    def __init__(self, hub: Hub, kind: str, transfer: str, basis: str, options: Sequence[Argument]):
+    def __init__(self, hub: Hub, names: dict[str, str], options: Sequence[Argument]):
         self.hub = hub
-        self.names = {"method": kind, "transfer": transfer, "basis": basis}
+        self.names = names
+        basis = names["basis"]
         self.options = list(options)
         self.variant = ""
         domain = hub.domain

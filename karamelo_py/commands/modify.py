@@ -101,11 +101,11 @@ def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
 
 
 def _names(part: MaterialPart) -> set[str]:
-    return {p.name for p in parameters(registry.called(part.kind, part.id, part.style))}
+    return {p.name for p in parameters(registry.find(part.kind, part.style))}
 
 
 def _changed(hub: Hub, entry: MaterialPart, given: dict, numbers: tuple) -> MaterialPart:
-    made, given = remade(hub, entry.kind, entry.id, entry.style, given, numbers)
+    made, given = remade(hub, entry.kind, entry.style, given, numbers)
     after = type(entry)(entry.kind, entry.style, made, given)
     if isinstance(after, Material):
         fit_to_domain(hub, after)

@@ -1,7 +1,7 @@
 """Variables from the command line, which override assignments of a script."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -95,33 +95,32 @@ class Presets(dict[str, str]):
 
     def refuse_unused(self, statements: list[Statement]) -> None:
         """Refuse a variable of the command line that nothing reads or assigns."""
+        scripts = list(self._scripts(statements, self._script.folder)) if self else [None]
+        if None in scripts:
+            return
         words = set(re.findall(_WORD, " ".join(self.values())))
         assigned: dict[str, None] = {}
-        told = self and self._collect(statements, self._script.folder, words, assigned, [])
-        for name in self if told else ():
+        for script in filter(None, scripts):
+            code = script[0].raw.source.text
+            words.update(re.findall(_WORD, re.sub(r'"[^"\n]*"|#[^\n]*', " ", code)))
+            assigned |= {s.name: None for s in script if isinstance(s, Assignment)}
+        for name in self:
             if name not in words:
-                said = f"-var {name}: the script has no variable '{name}'"
-                raise unknown(said, name, assigned)
+                message = f"-var {name}: the script has no variable '{name}'"
+                raise unknown(message, name, assigned)
 
-    def _collect(
-        self, statements: list[Statement], folder: Path, words: set, assigned: dict, seen: list
-    ) -> bool:
-        """Collect words and assigned names of statements and of all included scripts.
-
-        Returns False if an included script is not known in advance.
-        """
-        code = statements[0].raw.source.text if statements else ""
-        words.update(re.findall(_WORD, re.sub(r'"[^"\n]*"|#[^\n]*', " ", code)))
+    def _scripts(
+        self, statements: list[Statement], folder: Path, outer: tuple[Path, ...] = ()
+    ) -> Iterator[list[Statement] | None]:
+        """Yield the statements of a script and of all included ones; None for an unknown one."""
+        yield statements
         for statement in statements:
-            if isinstance(statement, Assignment):
-                assigned[statement.name] = None
-            elif isinstance(statement, CommandCall) and statement.name == "include":
-                if not statement.arguments:
-                    return False
-                path = self._script.included(statement.arguments[0].code.strip(' "'), folder)
-                if path in seen or not path.is_file():
-                    return False
+            if not (isinstance(statement, CommandCall) and statement.name == "include"):
+                continue
+            name = statement.arguments[0].code.strip(' "') if statement.arguments else ""
+            path = self._script.included(name, folder)
+            if path in outer or not path.is_file():
+                yield None
+            else:
                 inner = parse(read_script(path), str(path))
-                if not self._collect(inner, path.parent, words, assigned, [*seen, path]):
-                    return False
-        return True
+                yield from self._scripts(inner, path.parent, (*outer, path))

@@ -137,25 +137,28 @@ def call(
 
 
 def style_of(
-    hub: Any, family: str, ID: str, style: str, arguments: Sequence[Argument], given: Any = None
+    hub: Any,
+    family: str,
+    ID: str,
+    style: str,
+    arguments: Sequence[Argument],
+    *,
+    values: dict | None = None,
 ) -> Any:
-    """Make a style of a family, with the `ID` in the script.
-
-    Argument values are stored in `given`, a dict, by name.
-    """
+    """Make a style of a family, with the `ID` in the script; store arguments in `values`."""
     with in_new_words(family, ID, style, arguments):
         target = registry.called(family, ID, style)
-        return call(target, hub, arguments, f"{family} {style}", given)
+        return call(target, hub, arguments, f"{family} {style}", values)
 
 
 def remade(
-    hub: Any, family: str, ID: str, style: str, given: dict, arguments: Sequence[Argument]
+    hub: Any, family: str, style: str, given: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
     """Make a law again from its values `given`, changed by ``name=value`` arguments.
 
     Returns the law and its values.
     """
-    target, name = registry.called(family, ID, style), f"{family} {style}"
+    target, name = registry.find(family, style), f"{family} {style}"
     expected = {p.name: p for p in parameters(target)}
     bound: dict[str, list[Argument]] = {}
     try:

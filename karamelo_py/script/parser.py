@@ -66,7 +66,7 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
     errors: list[ScriptError] = []
     for span in spans:
         try:
-            statements.append(_statement(source, *span))
+            statements.append(_statement(source, span))
         except ScriptError as error:
             errors.append(error)
     if errors:
@@ -108,10 +108,9 @@ def _tree(code: str) -> syntax.Node:
         raise mistakes.in_expression(grammar.parser_of("expression"), code) from None
 
 
-def _statement(
-    source: syntax.Source, kind: str, name: str, start: int, end: int, parts: Any
-) -> syntax.Statement:
-    """Build the statement between `start` and `end`."""
+def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> syntax.Statement:
+    """Build a statement from its kind, name, start, end and parts."""
+    kind, name, start, end, parts = span
     place = source.place(start, start + max(len(name), 1))
     whole = syntax.Raw(source, start, end)
     if kind == "call":

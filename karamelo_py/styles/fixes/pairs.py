@@ -85,7 +85,7 @@ class PairContact(Gripping):
         if rows is not None:
             own = [self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)]
             last = float(simulation.control.clock[0].last_dt)
-            push = partial(self._push, kin, last, points.contact_dt, points.contact_kick)
+            push = partial(self._push, kin, (last, points.contact_dt, points.contact_kick))
             found, total = simulation.comm.at_first(push, np.concatenate(own))
         for block, grip, k in zip(blocks, grips, range(len(blocks)), strict=True):
             if grip is not None:
@@ -133,7 +133,7 @@ class PairContact(Gripping):
         return found if grip is None else np.concatenate([found, grip[:, rows].T], axis=1)
 
     def _push(
-        self, kin: Any, step: float, dt: float, kick: float, found: list[np.ndarray]
+        self, kin: Any, times: tuple[float, float, float], found: list[np.ndarray]
     ) -> list[tuple]:
         """Forces and grips of the points of each process, and the sum of forces on the first."""
         of_all, d = np.concatenate(found), kin.dimension
@@ -145,8 +145,7 @@ class PairContact(Gripping):
         _, mass, radius = np.ascontiguousarray(of_all[:, :3].T)
         x, v, grip = map(np.ascontiguousarray, np.split(of_all[:, 3:], [d, 2 * d], axis=1))
         bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), grip, n - int(second.sum()))
-        times, cells = (step, dt, kick), pairs.cells_for(n)
-        pairs.push_apart(self.law(), kin, bodies, cells, self._reach, *times, total)
+        pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, *times, total)
         force = np.empty((n, d + grip.shape[1]))
         force[order] = np.concatenate([bodies.force, bodies.grip], axis=1)
         ends = np.cumsum([len(one) for one in found])[:-1]

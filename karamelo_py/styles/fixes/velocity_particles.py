@@ -1,6 +1,6 @@
 """Fixes that set point velocities, with a warning before the run if several conflict."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -107,21 +107,20 @@ class InitialVelocityParticles(VelocityOfPoints):
             x0 = points.reference_position
         for k, formula in enumerate(self.formulas):
             if formula is not None:
-                v[:, k] = formula.evaluate_points(self.hub.values, x, x0)
-                points.set_velocity_gradient(k, partial(gradient, formula, self.hub, x, x0))
+                evaluate = partial(formula.evaluate_points, self.hub.values)
+                v[:, k] = evaluate(x, x0)
+                points.set_velocity_gradient(k, partial(gradient, evaluate, x, x0))
         points.velocity = v
 
 
 def gradient(
-    formula: Any, hub: Hub, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
+    evaluate: Callable, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
 ) -> np.ndarray:
-    """Derivatives (n, d) of a formula by x (`moves`) or x0, by central differences over `step`.
+    """Return derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
 
     If a point is still at its reference position, x and x0 are the same coordinate.
     """
     out = np.zeros_like(x, float)
-    if formula.is_constant:
-        return out
     # Positions in single precision are rounded.
     unmoved = (np.abs(x - x0) <= 0.01 * step).all(axis=1)
     for k in range(x.shape[1]):
@@ -129,8 +128,8 @@ def gradient(
         shift[:, k] = step
         here = shift if moves else shift * unmoved[:, None]
         there = shift * unmoved[:, None] if moves else shift
-        ahead = formula.evaluate_points(hub.values, x + here, x0 + there)
-        behind = formula.evaluate_points(hub.values, x - here, x0 - there)
+        ahead = evaluate(x + here, x0 + there)
+        behind = evaluate(x - here, x0 - there)
         out[:, k] = (ahead - behind) / (2 * step)
     return out
 

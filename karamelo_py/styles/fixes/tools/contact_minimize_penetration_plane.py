@@ -60,4 +60,5 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
         depth = depth + radius
         normals = np.broadcast_to(normal, (len(depth), len(normal)))
         x = points.position.astype(float)
-        return self.press(points, depth, depth > -CLOSE * radius, normals, 0.0, x)
+        touching = depth > -CLOSE * radius
+        return self.press(points, depth, touching, normals, velocity=0.0, seen=x)

@@ -161,7 +161,8 @@ class ContactSurface(StiffTool):
             self._refuse(int(points.ids[lost[0]]) - 1)
         closing = ((velocity - points.velocity.astype(float)) * normal).sum(axis=1)
         push = np.where(depth > 0, SOFT * depth + points.contact_dt * closing, 0.0)
-        return self.press(points, push, depth > 0, normal, velocity, x, share=SOFT)
+        touching = depth > 0
+        return self.press(points, push, touching, normal, velocity=velocity, seen=x, share=SOFT)
 
 
 known_failure(

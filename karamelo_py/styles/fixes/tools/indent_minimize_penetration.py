@@ -61,5 +61,5 @@ class IndentMinimizePenetration(StiffTool, BallTool):
         depth = self.now(self.R) + radius - r[:, 0]
         self.publish("s", points.total(self.face(points) * (depth > 0)))
         velocity, x = self.now(*self.velocity), points.position.astype(float)
-        led = velocity * points.dt
-        return self.press(points, depth, depth > -CLOSE * radius, normal, velocity, x, led)
+        led, touching = velocity * points.dt, depth > -CLOSE * radius
+        return self.press(points, depth, touching, normal, velocity=velocity, seen=x, led=led)

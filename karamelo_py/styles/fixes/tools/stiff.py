@@ -27,6 +27,7 @@ class StiffTool(Gripping, ToolFix):
         push: np.ndarray,
         touching: np.ndarray,
         normal: np.ndarray,
+        *,
         velocity: Any,
         seen: np.ndarray,
         led: Any = 0.0,
