@@ -409,8 +409,8 @@ def group(
             )
     else:
         members = hub.groups.add(ID, KINDS[kind](hub))
-    found = members.add(region, solids or None)
-    if found or region.unknown:
+    count = members.add(region, solids or None)
+    if count or region.unknown:
         return
     if kind == "nodes" and not solids and own_grids(hub):
         members.awaits_solids = True  # the run warns if none came

@@ -92,7 +92,7 @@ def delete_compute(hub: Hub, ID: str) -> None:
 
 def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     """Make a fix or a compute and publish its values."""
-    own, others = (hub.fixes, hub.computes) if kind == "fix" else (hub.computes, hub.fixes)
+    catalogue, others = (hub.fixes, hub.computes) if kind == "fix" else (hub.computes, hub.fixes)
     _refuse_wrong_order(kind, ID, style, arguments)
     with signature.in_new_words(kind, ID, style, arguments):
         target = registry.called(kind, ID, style)
@@ -111,13 +111,13 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
             "it takes the sizes of points from their volumes, which contain the thickness",
             expected="plane_stress(true) with the thickness 1, and loads per thickness",
         )
-    replaces = own is hub.fixes
-    if replaces and ID in own:
+    replaces = catalogue is hub.fixes
+    if replaces and ID in catalogue:
         hub.warn(
-            f"fix '{ID}' replaces the one of line {own[ID].place.line}",
+            f"fix '{ID}' replaces the one of line {catalogue[ID].place.line}",
             hint="fixes that act at the same time need different IDs",
         )
-    own.add(ID, new, replace=replaces)
+    catalogue.add(ID, new, replace=replaces)
     hub.values.publish_vector(ID, new.published)
     group = new.group
     if group is not None and not group.all and len(group) == 0:

@@ -69,12 +69,12 @@ def value(hub: Hub, expression: Expression) -> float:
         if hub.rehearsing:
             return math.nan  # known only after the runs before it
         if hub.interpreter.replay is not None:
-            found = hub.interpreter.replay.value()
+            number = hub.interpreter.replay.value()
         else:
             _refresh(hub, expression)
-            found = expression.evaluate(hub.values)
-        hub.interpreter.record.note(found)
-        return found
+            number = expression.evaluate(hub.values)
+        hub.interpreter.record.note(number)
+        return number
     return expression.evaluate(hub.values)
 
 

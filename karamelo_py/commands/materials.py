@@ -50,8 +50,8 @@ def judge(hub: Hub, made: Material) -> None:
     """Test the law of a plug-in, and warn of values that hardly any material has."""
     try_law(hub, made)
     with attributed(hub):
-        for what, hint in doubts(made.whole):
-            hub.warn(f"material '{made.id}': {what}", hint=hint)
+        for doubt, hint in doubts(made.whole):
+            hub.warn(f"material '{made.id}': {doubt}", hint=hint)
 
 
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:
@@ -113,9 +113,9 @@ def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Seque
     """Store under `ID` the object that the style makes; refuse an ID in use first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
-    given: dict = {}
-    made = style_of(hub, kind, ID, style, arguments, values=given)
-    entry = (Material if kind == "material" else MaterialPart)(kind, style, made, given)
+    values: dict = {}
+    made = style_of(hub, kind, ID, style, arguments, values=values)
+    entry = (Material if kind == "material" else MaterialPart)(kind, style, made, values)
     if isinstance(entry, Material):
         fit_to_domain(hub, entry)
     check_law(hub, f"{kind} {style}", entry.law)
@@ -187,8 +187,8 @@ def load_path(
                 expected="one of them",
             )
         strains[name] = angles[name] / 2
-    given = *strains.values(), *stresses.values(), volumetric, duration
-    if not turn and all(value is None for value in given):
+    prescribed = *strains.values(), *stresses.values(), volumetric, duration
+    if not turn and all(value is None for value in prescribed):
         raise ScriptError(
             "no strain and no stress is prescribed: nothing would change",
             expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... holds it",
@@ -291,7 +291,7 @@ def element(
     if hub.rehearsing:
         return
     hub.rehearse()
-    what = f"element {ID}: {material.words}, {kinematics}"
+    title = f"element {ID}: {material.words}, {kinematics}"
     try:
         with attributed(hub):
             _follow(point, paths, response)
@@ -301,9 +301,9 @@ def element(
         # The increments before an error show where the law fails.
         if not hub.checking:
             response.write(hub.folder / table)
-            response.draw(hub.folder / picture, what)
+            response.draw(hub.folder / picture, title)
     files = "" if hub.checking else f": {table}, {picture}"
-    hub.console.say(f"{what}, {len(response.rows) - 1} increments{files}")
+    hub.console.say(f"{title}, {len(response.rows) - 1} increments{files}")
     if tangent:
         names = [f"e{name}" if name in NORMAL else f"g{name}" for name in point.free]
         lines = [" " * 4 + "".join(f"{name:>14}" for name in names)]

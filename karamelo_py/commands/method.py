@@ -150,7 +150,7 @@ def scheme(
     update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
     for name in PUBLISHED:
         # Values of earlier steps do not apply to an explicit scheme.
-        if name in hub.values or name in chosen.traits.published:
+        if name in hub.values or chosen.traits.implicit:
             hub.values.publish(name)
 
 
@@ -265,19 +265,19 @@ class _Call:
         rest = self._choose("basis", self._choose("transfer", self.options))
         slots = [(f, p) for f in FAMILIES for p in signature.parameters(self.styles[f])]
         numbers = [slot for slot in slots if not slot[1].kind.words]
-        given: dict[tuple[str, str], Argument] = {}
+        chosen: dict[tuple[str, str], Argument] = {}
         for argument in rest:
             slot = next((s for s in slots if _word(argument, s[1].kind.words)), None)
             if slot is None and not numbers:
                 raise self._unknown(argument, slots)
             family, parameter = slot or numbers.pop(0)
-            before, words = given.get((family, parameter.name)), parameter.kind.words
+            before, words = chosen.get((family, parameter.name)), parameter.kind.words
             # Scripts with variables as options may repeat a word.
             if before and not (words and _word(before, words) == _word(argument, words)):
                 raise _chosen_twice(before, argument)
-            given[family, parameter.name] = argument
+            chosen[family, parameter.name] = argument
         for family, parameter in slots:
-            if not parameter.optional and (family, parameter.name) not in given:
+            if not parameter.optional and (family, parameter.name) not in chosen:
                 word = next((a.text for a in self.options if a not in rest), None)
                 raise ScriptError(
                     f"{self.names[family]} needs {parameter.name} after the basis",
@@ -286,7 +286,7 @@ class _Call:
                 )
         values: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
         for family, p in slots:
-            if argument := given.get((family, p.name)):
+            if argument := chosen.get((family, p.name)):
                 values[family][p.name] = signature.convert(self.hub, p, argument)
         return {
             family: signature.make(
@@ -353,11 +353,11 @@ class _Call:
         asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
         lacking = [p for p in asked[len(typed) :] if not p.optional]
-        known = self._words("method", "transfer")
+        kept = self._words("method", "transfer")
         words = [
             kind or self.names["method"], self.names["transfer"], basis or self.names["basis"],
             *typed[: len(asked)], *(p.name if by_name else "1" for p in lacking),
-            *(argument.text for argument in self.options if _word(argument, known)),
+            *(argument.text for argument in self.options if _word(argument, kept)),
         ]  # fmt: skip
         return f"method({', '.join(words if option in (None, *words) else [*words, option])})"
 
@@ -395,19 +395,19 @@ class _Call:
                             place=argument.place,
                             expected=f"karamelo-py help {family} {name} explains it",
                         )
-        known = self._words("method", "transfer", "basis")
+        options = self._words("method", "transfer", "basis")
         return ScriptError(
             f"'{argument.text}' is not an option of method({', '.join(self.names.values())})",
             place=argument.place,
-            expected="nothing more, or one of " + ", ".join(known),
-            hint=meant(word, known),
+            expected="nothing more, or one of " + ", ".join(options),
+            hint=meant(word, options),
         )
 
 
-def _word(argument: Argument, known: Container[str]) -> str | None:
+def _word(argument: Argument, words: Container[str]) -> str | None:
     """The word of `known` that an argument names; a variable of that name is ignored."""
-    word = argument.text if argument.text in known else argument.word()
-    return word if word in known else None
+    word = argument.text if argument.text in words else argument.word()
+    return word if word in words else None
 
 
 def _chosen_twice(first: Argument, second: Argument) -> ScriptError:

@@ -63,8 +63,8 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     changed = {entry: _changed(hub, entry, entry.given, numbers)}
     for material in hub.materials.values():
         if entry in _parts(material):
-            given = {name: _now(value, changed) for name, value in material.given.items()}
-            changed[material] = _changed(hub, material, given, ())
+            values = {name: _now(value, changed) for name, value in material.given.items()}
+            changed[material] = _changed(hub, material, values, ())
     for before, after in changed.items():
         if isinstance(after, Material):
             _check(hub, before, after, numbers)
@@ -77,10 +77,10 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
 
 def _parts(material: Material) -> list[MaterialPart]:
-    found: list[Any] = []
+    values: list[Any] = []
     for value in material.given.values():
-        found += value if isinstance(value, tuple) else [value]
-    return [part for part in found if isinstance(part, MaterialPart)]
+        values += value if isinstance(value, tuple) else [value]
+    return [part for part in values if isinstance(part, MaterialPart)]
 
 
 def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
@@ -104,9 +104,9 @@ def _names(part: MaterialPart) -> set[str]:
     return {p.name for p in parameters(registry.find(part.kind, part.style))}
 
 
-def _changed(hub: Hub, entry: MaterialPart, given: dict, numbers: tuple) -> MaterialPart:
-    made, given = remade(hub, entry.kind, entry.style, given, numbers)
-    after = type(entry)(entry.kind, entry.style, made, given)
+def _changed(hub: Hub, entry: MaterialPart, values: dict, numbers: tuple) -> MaterialPart:
+    made, values = remade(hub, entry.kind, entry.style, values, numbers)
+    after = type(entry)(entry.kind, entry.style, made, values)
     if isinstance(after, Material):
         fit_to_domain(hub, after)
     after.id, after.place = entry.id, entry.place

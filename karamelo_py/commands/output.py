@@ -64,8 +64,8 @@ def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
     if len(arguments) < 2:
         return
     first, second = arguments[:2]
-    known = hub.interpreter.variables.get(first.text, "")
-    word = first.word() if isinstance(known, str) else None
+    variable = hub.interpreter.variables.get(first.text, "")
+    word = first.word() if isinstance(variable, str) else None
     if word and (re.search(r"[.*/]", word) or NUMBER.fullmatch(second.text)):
         raise ScriptError(
             "argument 1 'every' must be a whole number; the file comes second",

@@ -68,18 +68,18 @@ def delete_particles(
         _delete_where(hub, solids, ColumnFormula.from_script(hub, chosen))
         return
     region = Region.from_script(hub, chosen)
-    found = {solid: region.inside(solid.x0) for solid in solids}
-    found = {solid: inside for solid, inside in found.items() if inside.any()}
-    if not found and not region.unknown:
+    members = {solid: region.inside(solid.x0) for solid in solids}
+    members = {solid: inside for solid, inside in members.items() if inside.any()}
+    if not members and not region.unknown:
         hub.warn(f"region '{region.id}' holds no points: nothing is deleted")
         return
     if hub.has_run:
         if not hub.rehearsing and hub.interpreter.replay is None:
-            ids = [np.flatnonzero(inside) + solid.first_id for solid, inside in found.items()]
+            ids = [np.flatnonzero(inside) + solid.first_id for solid, inside in members.items()]
             present = hub.simulation.present
             _take_away(hub, np.concatenate([some[present[some]] for some in ids]))
         return
-    for solid, inside in found.items():
+    for solid, inside in members.items():
         refuse_chosen(hub, solid, "delete_particles")
         if inside.all():
             raise ScriptError(
@@ -87,7 +87,7 @@ def delete_particles(
                 argument="chosen",
                 hint="leave out the solid, and delete_particles",
             )
-    for solid, inside in found.items():
+    for solid, inside in members.items():
         replace_points(hub, solid, _chosen(solid, ~inside))
 
 
@@ -100,11 +100,11 @@ def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
         )
     if hub.rehearsing or hub.interpreter.replay is not None:
         return
-    own, fields = {solid.index for solid in solids}, hub.fields
+    numbers, fields = {solid.index for solid in solids}, hub.fields
     # Zero for deleted points: the condition does not apply to them.
     meet = np.zeros(fields.count, np.bool_)
     meet[fields.present] = condition.holds(fields)
-    _take_away(hub, np.flatnonzero(meet & np.isin(fields.solid, list(own))))
+    _take_away(hub, np.flatnonzero(meet & np.isin(fields.solid, list(numbers))))
 
 
 def _take_away(hub: Hub, ids: np.ndarray) -> None:

@@ -379,8 +379,8 @@ def read_restart(hub: Hub, file: str) -> None:
         )
     path = Path(file).expanduser()
     ways = [folder / path for folder in hub.interpreter.folders]
-    found = next((way for way in ways if any(way.parent.glob(way.name))), path)
-    restart_file.Restart(found).take(hub, outputs=False)
+    chosen = next((way for way in ways if any(way.parent.glob(way.name))), path)
+    restart_file.Restart(chosen).take(hub, outputs=False)
 
 
 for _command in (set_dt, dt_factor, restart):

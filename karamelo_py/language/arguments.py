@@ -68,12 +68,12 @@ class Argument:
         if not self.text or re.search(r'[\s()",=<>]', self.text) or NUMBER.fullmatch(self.text):
             return None
         names = _NAME.findall(self.text)
-        known = not names or any(self._interpreter.knows(name) for name in names)
-        return None if known else self.text
+        meaningful = not names or any(self._interpreter.knows(name) for name in names)
+        return None if meaningful else self.text
 
-    def words(self, known: Sequence[str] = ()) -> str:
+    def words(self, literals: Sequence[str] = ()) -> str:
         """Return its text where only a word fits, even if it looks like arithmetic."""
-        if self.text in known:
+        if self.text in literals:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
         if quoted:
@@ -103,9 +103,9 @@ class Argument:
 
     def value_with(self, seeds: Sequence[str]) -> Value:
         """Evaluate with `seeds` as the variables of a formula."""
-        own = self._interpreter
-        script = copy(own)
-        script.variables = own.variables | {name: Expression.seed(name) for name in seeds}
+        interpreter = self._interpreter
+        script = copy(interpreter)
+        script.variables = interpreter.variables | {name: Expression.seed(name) for name in seeds}
         try:
             return script.evaluate(parse_expression(self._raw), self._raw)
         except ScriptError as error:
@@ -113,9 +113,9 @@ class Argument:
                 name, numbers = error.name or "", self.numbers()
                 others = ", ".join(numbers) or "none so far"
                 few = one_of(name, seeds)
-                known = f"{few}, or a number that the script has set ({others})"
+                choices = f"{few}, or a number that the script has set ({others})"
                 hint = meant(name, [*seeds, *numbers]) or f"set it first: {name} = ..."
-                error.expected, error.hint = known, hint
+                error.expected, error.hint = choices, hint
             raise
 
     def behind(self, count: int) -> Argument:

@@ -48,8 +48,8 @@ class Forms:
     def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
         """Read the values of `arguments` by name, for `dimension`."""
         if dimension not in self.names:
-            known = " or ".join(map(str, sorted(self.names)))
-            expected = f"a domain with {known} dimensions"
+            dimensions = " or ".join(map(str, sorted(self.names)))
+            expected = f"a domain with {dimensions} dimensions"
             raise ScriptError(f"there is no form for {dimension}D", expected=expected)
         names = self.names[dimension]
         if len(arguments) != len(names):
@@ -113,14 +113,14 @@ class Forms:
         return value
 
     def _word(self, argument: Any, name: str, dimension: int) -> str:
-        word, known = argument.word(), self.words[name]
-        if word in known:
+        word, choices = argument.word(), self.words[name]
+        if word in choices:
             return word
         raise ScriptError(
-            f"{name} must be one of {', '.join(known)}",
+            f"{name} must be one of {', '.join(choices)}",
             place=argument.place,
             expected=self.line(dimension),
-            hint=meant(word, known) if word else None,
+            hint=meant(word, choices) if word else None,
             code="argument",
         )
 
@@ -133,17 +133,17 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
     value = argument.value(hub)
     kind, hint = "number", None
     if isinstance(value, Expression):
-        kind, what, hint = (
+        kind, got, hint = (
             "constant number",
             "a formula",
             f"value({argument.text}) is its present value",
         )
     elif isinstance(value, str):
-        what = f"the text '{value}'"
+        got = f"the text '{value}'"
     else:
         return finite(hub, float(value), name, argument)
     raise ScriptError(
-        f"{name} must be a {kind}, not {what}", place=argument.place, expected=expected, hint=hint
+        f"{name} must be a {kind}, not {got}", place=argument.place, expected=expected, hint=hint
     )
 
 

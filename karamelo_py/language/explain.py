@@ -15,7 +15,7 @@ def wrong_count(
     form: str,
     name: str,
     expected: Sequence[Parameter],
-    given: Sequence[Argument],
+    arguments: Sequence[Argument],
     keywords: Sequence[str],
 ) -> ScriptError:
     """Make the error for too few or too many arguments of `name`, written in the `form` shown.
@@ -24,17 +24,17 @@ def wrong_count(
     """
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
-    surplus = given[len(slots) :] if not any(p.variadic for p in slots) else ()
+    surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()
     place, hint, missing = None, None, [f"{word}=..." for word in keywords]
     if surplus:
         place, hint = surplus[0].place, _of_surplus(surplus[0].text, expected, name)
-    elif len(given) < len(needed):
-        hint = longer(name, given) or table()["otherwise"].get(name)
-        missing = _named(needed[len(given) :], slots)
-    if gap := with_gap(given):
+    elif len(arguments) < len(needed):
+        hint = longer(name, arguments) or table()["otherwise"].get(name)
+        missing = _named(needed[len(arguments) :], slots)
+    if gap := with_gap(arguments):
         place, hint = gap.place, f"is a comma missing in '{gap.text}'?"
-    elif left_out := _left_out(needed, given) if len(given) < len(needed) else []:
-        before, filled = _filled(needed, given, left_out)
+    elif left_out := _left_out(needed, arguments) if len(arguments) < len(needed) else []:
+        before, filled = _filled(needed, arguments, left_out)
         place, missing = before.place, _named(left_out, slots)
         hint = hint or (f"{name}({filled})" if filled else None)
     message = f"{'one argument' if len(surplus) == 1 else f'{len(surplus)} arguments'} too many"
@@ -50,16 +50,16 @@ def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | No
     return words.get(word or "") or table()["surplus"].get(name)
 
 
-def _left_out(slots: Sequence[Parameter], given: Sequence[Argument]) -> list[Parameter]:
+def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list[Parameter]:
     """List the parameters that were left out, by words that fit only further back."""
-    missing, rest = [], list(given)
+    missing, rest = [], list(arguments)
     for slot in slots:
         words = () if slot.shown == slot.name else slot.kind.words
         if rest and (not words or rest[0].text in words):
             del rest[0]
         else:
             missing.append(slot)
-    return [] if rest or missing == slots[len(given) :] else missing
+    return [] if rest or missing == slots[len(arguments) :] else missing
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
@@ -69,14 +69,14 @@ def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str
 
 
 def _filled(
-    slots: Sequence[Parameter], given: Sequence[Argument], missing: Sequence[Parameter]
+    slots: Sequence[Parameter], arguments: Sequence[Argument], missing: Sequence[Parameter]
 ) -> tuple[Argument, str | None]:
     """Find the argument given instead of the first missing one; fill words into all arguments."""
-    rest, before = iter(given), next(k for k, slot in enumerate(slots) if slot in missing)
+    rest, before = iter(arguments), next(k for k, slot in enumerate(slots) if slot in missing)
     words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
     if True in words:
-        return given[before], None
-    return given[before], ", ".join(word or next(rest).text for word in words)
+        return arguments[before], None
+    return arguments[before], ", ".join(word or next(rest).text for word in words)
 
 
 def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]) -> ScriptError:
@@ -89,10 +89,11 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
         hint = f"leave out '{word} ='; == compares"
     if any(p.name == word for p in expected):
         hint = f"arguments are given by position: leave out '{word} ='"
-    known = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
+    choices = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
     message = f"there is no argument to be given as '{word} = ...'"
     place = argument.place
-    return ScriptError(message, place=place, expected=known, hint=hint, code="arguments", name=word)
+    code = "arguments"
+    return ScriptError(message, place=place, expected=choices, hint=hint, code=code, name=word)
 
 
 def swapped(
@@ -113,12 +114,17 @@ def swapped(
     single = [p for p in expected if len(bound.get(p.name, ())) == 1 and not p.variadic]
     if wrong not in single:
         return None
-    (given,) = bound[wrong.name]
+    (first,) = bound[wrong.name]
     for other in single:
-        (there,) = bound[other.name]
-        if other != wrong and not fits(other, there) and fits(wrong, there) and fits(other, given):
-            right = f"{wrong.name} {there.text}, {other.name} {given.text}"
-            return f"swap {given.text} and {there.text}: {right}"
+        (second,) = bound[other.name]
+        if (
+            other != wrong
+            and not fits(other, second)
+            and fits(wrong, second)
+            and fits(other, first)
+        ):
+            right = f"{wrong.name} {second.text}, {other.name} {first.text}"
+            return f"swap {first.text} and {second.text}: {right}"
     family, after = [p.kind.family for p in (*single, *single)][:2]
     word = bound[single[0].name][0].text
     if family and registry.knows(after or "", word):

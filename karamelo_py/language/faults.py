@@ -31,11 +31,11 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
     except KNOWN:
         raise
     except FAILURES as error:
-        what = f"{cause_of(error)}{place_in(code, error)}"
-        raise fault(name, f"{where}: {what}", place, TRACEBACK) from error
+        message = f"{cause_of(error)}{place_in(code, error)}"
+        raise fault(name, f"{where}: {message}", place, TRACEBACK) from error
 
 
-def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptError:
+def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:
     """Make the error of a script that uses a faulty style (``fix drag``).
 
     Names the package; `more` is appended to the hint.
@@ -44,7 +44,7 @@ def fault(name: str, what: str, place: Place | None, more: str = "") -> ScriptEr
     family = family or "command"
     package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
     hint = f"tell the author of {style}{more}"
-    error = ScriptError(f"{name}{package}: {what}", place=place, hint=hint, code="plug-in")
+    error = ScriptError(f"{name}{package}: {message}", place=place, hint=hint, code="plug-in")
     error.complete = True
     return error
 
@@ -55,8 +55,8 @@ def cause_of(error: BaseException) -> str:
         return str(error)
     if not isinstance(error, CannotCompile):
         return ": ".join(filter(None, (type(error).__name__, str(error))))
-    own = (place for place in places_of(error) if not place[0].startswith(_others()))
-    line = next(filter(None, (linecache.getline(*place).strip() for place in own)), None)
+    user_places = (place for place in places_of(error) if not place[0].startswith(_others()))
+    line = next(filter(None, (linecache.getline(*place).strip() for place in user_places)), None)
     return f"it cannot be compiled: {error}" + (f", in '{line}'" if line else "")
 
 
@@ -85,9 +85,11 @@ def place_of(function: Callable) -> str:
 def place_in(code: Any, error: BaseException) -> str:
     """Format the last line in the file of `code` in the traceback: `` (spring.py:28)``."""
     try:
-        own = inspect.getsourcefile(code)
+        source = inspect.getsourcefile(code)
     except TypeError:
-        own = None
+        source = None
     places = [*places_of(error)]
-    same = [place for place in places if own and Path(place[0]).resolve() == Path(own).resolve()]
+    same = [
+        place for place in places if source and Path(place[0]).resolve() == Path(source).resolve()
+    ]
     return next((f" ({Path(file).name}:{line})" for file, line in [*same, *places]), "")

@@ -12,7 +12,7 @@ from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.unknown import SHAPES, renamed, unknown_call, words_of
-from karamelo_py.script.errors import Quit, ScriptError, instead, nearest, plural
+from karamelo_py.script.errors import Quit, ScriptError, instead, nearest, plural, table
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
@@ -60,8 +60,7 @@ class Dependents:
         if name in _SCENE or name == "scheme":
             self.names |= _RUNS
         if name == "scheme":
-            for style in registry.names("scheme"):
-                self.names.update(registry.find("scheme", style).traits.published)
+            self.names.update(table()["implicit"].split())
         if name in _SCENE | _NAMED and statement.arguments:
             self.names.update(re.findall(r"\w+", statement.arguments[0].code))
         return True
@@ -91,8 +90,8 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     The interpreter is past that statement, whose error is `first`. Its hub is used for trials and
     must not be used afterwards.
     """
-    found = first.others
-    seen = {error.message: error for error in (first, *found)}
+    errors = first.others
+    seen = {error.message: error for error in (first, *errors)}
     passed_over: list[Statement] = []
     dependents = Dependents()
 
@@ -111,12 +110,12 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         # An unknown name may appear in many lines.
         for one in (error, *error.others):
             if one.message not in seen and not follows(one):
-                found.append(one)
+                errors.append(one)
             seen[one.message] = one
         error.others = []
 
     wrong = interpreter.statement
-    while wrong is not None and len(found) < MOST:
+    while wrong is not None and len(errors) < MOST:
         if not dependents.note(wrong):
             passed_over += _rest_of(interpreter)
             break
@@ -140,7 +139,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         dependents.note(statement)
     for error in misnamed(interpreter, passed_over, dependents.names):
         tell(error)
-    return sorted(found, key=_order)[:MOST]
+    return sorted(errors, key=_order)[:MOST]
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
@@ -148,10 +147,10 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
     If there are too many, the last one gives the number of the rest.
     """
-    found = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
-    more = len(found) - MOST_OF_TEXT
+    errors = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
+    more = len(errors) - MOST_OF_TEXT
     besides = [ScriptError(f"and {plural(more, 'more mistake')} after these")] if more > 0 else []
-    return [*found[:MOST_OF_TEXT], *besides]
+    return [*errors[:MOST_OF_TEXT], *besides]
 
 
 def misnamed(
@@ -164,7 +163,7 @@ def misnamed(
     """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}
-    found = []
+    errors = []
     for statement in statements:
         if not isinstance(statement, CommandCall) or statement.name in variables:
             continue
@@ -172,8 +171,8 @@ def misnamed(
             _look_up(interpreter, statement, variables, set(wanting))
         except ScriptError as error:
             error.place = error.place or statement.place
-            found.append(error)
-    return found
+            errors.append(error)
+    return errors
 
 
 def _look_up(

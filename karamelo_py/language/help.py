@@ -60,9 +60,9 @@ def sections_of(doc: str) -> tuple[str, dict[str, str]]:
 
 def _descriptions(section: str) -> dict[str, str]:
     """Read descriptions by name, from a section in NumPy's form."""
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for block in re.split(r"\n(?=\S)", section):
         head, _, text = block.partition("\n")
         for name in filter(str.strip, head.partition(":")[0].split(",")):
-            found[name.strip().lstrip("*")] = inspect.cleandoc(text)
-    return found
+            descriptions[name.strip().lstrip("*")] = inspect.cleandoc(text)
+    return descriptions

@@ -77,8 +77,8 @@ class Interpreter:
     def include(self, name: str) -> None:
         """Execute another script here; `name` is relative to the present script."""
         path = self.included(name, self.folder)
-        there = path.exists()
-        if any(there and frame.path and frame.path.samefile(path) for frame in self.frames):
+        exists = path.exists()
+        if any(exists and frame.path and frame.path.samefile(path) for frame in self.frames):
             raise ScriptError(
                 f"{name} includes itself",
                 expected="a script that is not in progress already",
@@ -230,8 +230,8 @@ class Interpreter:
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
-        known = registry.knows("command", name)
-        command = registry.find("command", name) if known else None
+        is_command = registry.knows("command", name)
+        command = registry.find("command", name) if is_command else None
         # True, or the keywords that may differ when a run resumes.
         differs = getattr(command, "may_differ", ())
         if differs is True:
@@ -345,9 +345,9 @@ class Interpreter:
 
     def means_something(self, name: str) -> bool:
         """Tell if a name has any meaning here, as a call or in later lines."""
-        known = self.knows(name) or name in WORDS or name in FUNCTIONS
+        meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
-            known
+            meaningful
             or registry.knows("command", name)
             or bool(unknown.defined_later(self, name, None))
         )

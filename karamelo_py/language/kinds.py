@@ -76,18 +76,18 @@ class InputFile:
         """Read the path of the file."""
         name = _file_name(argument)
         folders = argument._interpreter.folders
-        if found := next((f / name for f in folders if (f / name).is_file()), None):
-            return found
+        if path := next((f / name for f in folders if (f / name).is_file()), None):
+            return path
         here = folders[-1] / name
         files = [p for p in here.parent.glob("*") if p.is_file()]
         if cls.endings is not None:
             files = [p for p in files if p.suffix.lower() in cls.endings]
-        what = "is a folder, not a file" if here.is_dir() else "does not exist"
+        problem = "is a folder, not a file" if here.is_dir() else "does not exist"
         if here.exists() and not here.is_dir():
-            what = "is a pipe or a device, not a file"
+            problem = "is a pipe or a device, not a file"
         expected = "a file in the current folder or the folder of the script"
         hint = meant(here.name, [p.name for p in files])
-        message = f"the file {name} {what}"
+        message = f"the file {name} {problem}"
         place, code = argument.place, "no-file"
         raise ScriptError(message, place=place, expected=expected, hint=hint, code=code)
 
@@ -199,8 +199,8 @@ def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
     if error.code != "unknown-name" or alike is None or "value" in argument.text:
         return
     if alike not in (*CONSTANTS, *numbers):
-        known = ", ".join(numbers) or "none so far"
-        error.expected = f"a number, or a variable that is one ({known})"
+        choices = ", ".join(numbers) or "none so far"
+        error.expected = f"a number, or a variable that is one ({choices})"
         error.hint = meant(name, numbers) or f"set it first: {name} = ..."
 
 

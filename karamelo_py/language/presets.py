@@ -19,19 +19,19 @@ _WORD = r"[^\W\d]\w*"
 class Presets(dict[str, str]):
     """Text by name, as given; assignments of these names in the script are skipped."""
 
-    def __init__(self, script: Any, given: Mapping[str, str]):
-        super().__init__(given)
+    def __init__(self, script: Any, texts: Mapping[str, str]):
+        super().__init__(texts)
         self._script = script
         # Those that may have to be numbers, and mistakes attributed to them.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
         # Presets that each variable depends on, by its name.
-        self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in given}
-        if isinstance(given, Presets):  # of a script that this one copies
-            vars(self).update(vars(given), _script=script, _made_of=dict(given._made_of))
+        self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in texts}
+        if isinstance(texts, Presets):  # of a script that this one copies
+            vars(self).update(vars(texts), _script=script, _made_of=dict(texts._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
-        for name in given:
+        for name in texts:
             if not name.isidentifier():
                 message = f"-var: '{name}' is not the name of a variable"
                 raise ScriptError(message, expected=expected)
@@ -63,10 +63,10 @@ class Presets(dict[str, str]):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
             # A method may take a text for a number; the mistake is reported where it is used.
-            own = None
+            in_script = None
             with suppress(ScriptError):
-                own = self._script.evaluate(statement.node, statement.right)
-            if isinstance(own, float):
+                in_script = self._script.evaluate(statement.node, statement.right)
+            if isinstance(in_script, float):
                 parse_text(self[name], "-var " + name)
                 self._texts[name] = statement.right.code.strip()
 
@@ -85,13 +85,13 @@ class Presets(dict[str, str]):
         place = error.place
         if place not in (None, statement.place) and not error.hint:
             marked = place.text[place.column - 1 : place.column - 1 + place.length]
-            if given := ", ".join(f"-var {name} {self[name]}" for name in self._in(marked)):
-                error.hint = f"{marked} comes from {given}"
-        for name, own in self._texts.items():
+            if options := ", ".join(f"-var {name} {self[name]}" for name in self._in(marked)):
+                error.hint = f"{marked} comes from {options}"
+        for name, number in self._texts.items():
             if re.search(rf"\b{name}\b", spelled(statement)):
                 self.blamed.add(name)
                 text = f"-var {name} {self[name]} is a text"
-                error.hint = f"{text}, and the script has a number there, as in -var {name} {own}"
+                error.hint = f"{text}, and the script has a number, as in -var {name} {number}"
 
     def refuse_unused(self, statements: list[Statement]) -> None:
         """Refuse a variable of the command line that nothing reads or assigns."""

@@ -45,9 +45,9 @@ def _families() -> dict[str, dict[str, list[EntryPoint]]]:
             continue
         styles = table.setdefault(group.removeprefix(PREFIX), {})
         for entry in everything.select(group=group):
-            known = styles.setdefault(entry.name, [])
-            if (entry.value, _origin(entry)) not in [(e.value, _origin(e)) for e in known]:
-                known.append(entry)
+            entries = styles.setdefault(entry.name, [])
+            if (entry.value, _origin(entry)) not in [(e.value, _origin(e)) for e in entries]:
+                entries.append(entry)
     return table
 
 
@@ -105,9 +105,9 @@ def forget_other(module: str) -> bool:
 
 def name_of(family: str, style: type) -> str:
     """Return the style name of a class; for classes with several, its attribute ``style``."""
-    own = f"{style.__module__}:{style.__qualname__}"
+    target = f"{style.__module__}:{style.__qualname__}"
     for name, entries in _families().get(family, {}).items():
-        if any(entry.value == own for entry in entries):
+        if any(entry.value == target for entry in entries):
             return name
     return getattr(style, "style", style.__name__)
 
@@ -142,9 +142,9 @@ def find(family: str, name: str) -> Any:
         except ScriptError:
             raise
         except FAILURES as error:
-            package, what = _origin(entry), f"{type(error).__name__}: {error}"
+            package, reason = _origin(entry), f"{type(error).__name__}: {error}"
             raise ScriptError(
-                f"{family} '{name}' of {package} cannot be loaded: {what}",
+                f"{family} '{name}' of {package} cannot be loaded: {reason}",
                 name=name,
                 hint=None
                 if of_module

@@ -41,7 +41,7 @@ class Record:
     def forget_from(self, number: int) -> None:
         """Remove the statements from `number` on, which were not executed, and their values."""
         del self.statements[number:]
-        self.values = {k: given for k, given in self.values.items() if k < number}
+        self.values = {k: numbers for k, numbers in self.values.items() if k < number}
 
 
 class Replay:

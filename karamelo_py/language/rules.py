@@ -86,8 +86,8 @@ def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
     """Tell what the rules of one kind say of a part (or of a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
-            found = when(part, scene)
-            for case in found if isinstance(found, list) else [found] if found else []:
+            result = when(part, scene)
+            for case in result if isinstance(result, list) else [result] if result else []:
                 numbers = case if isinstance(case, dict) else {}
                 share = numbers.get("share", inf)
                 if kind != "failure" or share > 1:

@@ -58,12 +58,12 @@ def parameters(target: Callable) -> list[Parameter]:
             empty, defaults = inspect.Parameter.empty, target._field_defaults
             return [_parameter(n, hints[n], defaults.get(n, empty)) for n in target._fields]
         function = target.given if record else target
-        found = [*inspect.signature(function, eval_str=True).parameters.values()]
+        listed = [*inspect.signature(function, eval_str=True).parameters.values()]
     except TypeError:
         raise
     except Exception as error:
         raise TypeError(f"an annotation cannot be evaluated ({error})") from error
-    return [_parameter(p.name, p.annotation, p.default, p.kind) for p in found[not record :]]
+    return [_parameter(p.name, p.annotation, p.default, p.kind) for p in listed[not record :]]
 
 
 def is_record(target: Any) -> bool:
@@ -88,7 +88,7 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 
 
 def call(
-    target: Callable, hub: Any, arguments: Sequence[Argument], name: str, given: Any = None
+    target: Callable, hub: Any, arguments: Sequence[Argument], name: str, converted: Any = None
 ) -> Any:
     """Call a command or make a style with the hub and script arguments; store values in `given`.
 
@@ -115,14 +115,14 @@ def call(
                     named[parameter.name] = value
                 else:
                     values.append(value)
-                if given is not None:
-                    before = given.get(parameter.name, ())
-                    given[parameter.name] = (*before, value) if parameter.variadic else value
+                if converted is not None:
+                    before = converted.get(parameter.name, ())
+                    converted[parameter.name] = (*before, value) if parameter.variadic else value
         try:
             return make(target, hub, name, *values, **named)
         except OSError as error:
-            what = f"{error.filename}: " if error.filename else ""
-            raise ScriptError(f"{what}{error.strerror or error}", code="file") from error
+            file = f"{error.filename}: " if error.filename else ""
+            raise ScriptError(f"{file}{error.strerror or error}", code="file") from error
         except OverflowError as error:
             message = "a number is too large for what is done with it"
             raise ScriptError(message, expected="numbers in proportion to each other") from error
@@ -152,7 +152,7 @@ def style_of(
 
 
 def remade(
-    hub: Any, family: str, style: str, given: dict, arguments: Sequence[Argument]
+    hub: Any, family: str, style: str, values: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
     """Make a law again from its values `given`, changed by ``name=value`` arguments.
 
@@ -172,14 +172,14 @@ def remade(
                     hint=meant(word, expected),
                 )
             bound[word] = [value]
-            given = given | {word: convert(hub, expected[word], value)}
+            values = values | {word: convert(hub, expected[word], value)}
         several = next((p.name for p in expected.values() if p.variadic), None)
         if several is None:
-            return make(target, hub, name, **given), given
+            return make(target, hub, name, **values), values
         names = [*expected]
-        first = [given[n] for n in names[: names.index(several)]]
-        last = {n: given[n] for n in names[names.index(several) + 1 :] if n in given}
-        return make(target, hub, name, *first, *given.get(several, ()), **last), given
+        first = [values[n] for n in names[: names.index(several)]]
+        last = {n: values[n] for n in names[names.index(several) + 1 :] if n in values}
+        return make(target, hub, name, *first, *values.get(several, ()), **last), values
     except ScriptError as error:
         error.place = error.place or explain.guilty(error, arguments, bound)
         error.command = error.command or name
@@ -223,13 +223,13 @@ def _bind(
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
-    given: list[Argument] = []
+    positional: list[Argument] = []
     # Raw arguments are passed to a style, which knows the names.
     passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
         word, value = argument.keyword() or ("", argument)
         if not word or (passed_on and word not in by_name):
-            given.append(argument)
+            positional.append(argument)
         elif word not in by_name:
             raise explain.unknown_keyword(word, argument, expected)
         elif word in bound:
@@ -238,9 +238,9 @@ def _bind(
             bound[word] = [value]
     needed = sum(not (p.optional or p.variadic) for p in slots)
     missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
-    if len(given) < needed or missing or (variadic is None and len(given) > len(slots)):
-        raise explain.wrong_count(syntax(target, name), name, expected, given, missing)
-    for argument, parameter in zip(given, chain(slots, repeat(variadic)), strict=False):
+    if len(positional) < needed or missing or (variadic is None and len(positional) > len(slots)):
+        raise explain.wrong_count(syntax(target, name), name, expected, positional, missing)
+    for argument, parameter in zip(positional, chain(slots, repeat(variadic)), strict=False):
         if parameter is not None:
             bound.setdefault(parameter.name, []).append(argument)
 
@@ -282,23 +282,23 @@ _HOMES = {"transfer": "method", "basis": "method"}
 
 def syntax(target: Callable, name: str) -> str:
     """Format the line that shows how a command or style is called."""
-    own = getattr(target, "syntax", None)
-    if not isinstance(own, str):
-        own = _joined(documented(target))
+    form = getattr(target, "syntax", None)
+    if not isinstance(form, str):
+        form = _joined(documented(target))
     family, _, style = name.partition(" ")
     if not style:
-        return f"{name}({own})"
+        return f"{name}({form})"
     command = _HOMES.get(family, family)
     before = [style]
     if registry.knows("command", command):
         outer = parameters(registry.find("command", command))
         outer = [p for p in outer if not p.variadic and not p.keyword]
         before = [style if p.kind.family == family else p.shown for p in outer]
-    if own.startswith("["):
-        own = own.replace("[", "[, ", 1)
-    elif own:
-        own = ", " + own
-    return f"{command}({', '.join(before)}{own})"
+    if form.startswith("["):
+        form = form.replace("[", "[, ", 1)
+    elif form:
+        form = ", " + form
+    return f"{command}({', '.join(before)}{form})"
 
 
 def variants_of(style: Any) -> Mapping[str, Any]:

@@ -31,9 +31,9 @@ MEANINGS = {
 def unknown_statement(script: Any, name: str) -> ScriptError:
     """Make the error for a statement that is just an unknown name."""
     meaning = "quit" if name.lower() in ("exit", "stop", "end") else name
-    known = ["quit", *registry.names("command"), *script.variables]
+    words = ["quit", *registry.names("command"), *script.variables]
     message = f"'{name}' is neither a command nor a variable"
-    hint = instead("command", name) or meant(meaning, known)
+    hint = instead("command", name) or meant(meaning, words)
     expected, code = "name = expression, or command(arguments)", "unknown-command"
     return ScriptError(message, expected=expected, hint=hint, code=code)
 
@@ -41,23 +41,23 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
 def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
     """Make the error for a call of an unknown command or function."""
     commands = registry.names("command")
-    what = "command" if statement else "function"
+    kind = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
     if script.knows(name) and not other:
-        message = f"'{name}' is not a {what} but a variable"
+        message = f"'{name}' is not a {kind} but a variable"
         expected = "an operator between the name and the parenthesis"
         hint, code = f"{name}*(...)", "unknown-command"
         return ScriptError(message, place=place, expected=expected, hint=hint, code=code)
     shown = commands if statement else sorted(FUNCTIONS)
-    known = commands if statement else [*FUNCTIONS, *commands]
+    callables = commands if statement else [*FUNCTIONS, *commands]
     return ScriptError(
-        f"unknown {what} '{name}'",
+        f"unknown {kind} '{name}'",
         code="unknown-command",
         name=name,
-        kind=what,
+        kind=kind,
         place=place,
         expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
-        hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, known),
+        hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, callables),
     )
 
 
@@ -76,8 +76,8 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
         return ScriptError(f"{name} is not a number", place=place, expected=expected)
     if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
-        what = f"'{name}' is a {kind} and needs parentheses"
-        return ScriptError(what, place=place, expected=expected)
+        message = f"'{name}' is a {kind} and needs parentheses"
+        return ScriptError(message, place=place, expected=expected)
     if other := _not_published(script, name, place) or defined_later(script, name, place):
         return other
     if name == "i":
@@ -101,16 +101,16 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     )
 
 
-def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None]:
+def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None]:
     """Guess the meaning of a name in an expression: a hint, and the known name if there is one."""
-    own, energies = script.statement, table()["energies"]
+    statement, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
-        alone = isinstance(own, Assignment) and own.right.code.strip() == name
+        alone = isinstance(statement, Assignment) and statement.right.code.strip() == name
         said = f'"{name.lower()}", in quotes' if alone else str(int(name[0] in "tT"))
         return f"write {said}", None
     if re.match("[vcf]_", name):  # as in LAMMPS
-        same = [n for n in known if n == name[2:]]
-        same = same or [n for n in known if re.fullmatch(f"{re.escape(name[2:])}_[^_]+", n)]
+        same = [n for n in names if n == name[2:]]
+        same = same or [n for n in names if re.fullmatch(f"{re.escape(name[2:])}_[^_]+", n)]
         if same or name[2:] in energies:
             return f"write {' or '.join(same)}" if same else energies[name[2:]], None
     if name.upper() in WORDS:
@@ -120,7 +120,7 @@ def _meant_by(script: Any, name: str, known: list[str]) -> tuple[str, str | None
         for _, ID, item in _publishing(script)
         if item.published
     }
-    close = "time" if name == "t" else nearest(name, known)
+    close = "time" if name == "t" else nearest(name, names)
     close = close or by_style.get(nearest(name, by_style) or "")
     if close and not (name in energies and close in script.variables):  # Ek is not a modulus E
         return f"did you mean '{close}'?", close
@@ -169,8 +169,8 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
 
 def line_below(script: Any, kind: str, ID: str) -> int | None:
     """Find the later line that defines a part of this kind and ID."""
-    found = (line for _, made, name, line in _ahead(script) if (made, name) == (kind, ID))
-    return next(found, None)
+    lines = (line for _, made, name, line in _ahead(script) if (made, name) == (kind, ID))
+    return next(lines, None)
 
 
 def _needs(script: Any, name: str, other: str) -> bool:
@@ -188,23 +188,23 @@ def _needs(script: Any, name: str, other: str) -> bool:
 def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
     """Make the error for a `name` that is defined later."""
     ID = re.sub(r"_[^_]+$", "", name)
-    own = script.statement.name if isinstance(script.statement, Assignment) else ""
+    assigned = script.statement.name if isinstance(script.statement, Assignment) else ""
     for statement, kind, made, line in _ahead(script, back=1):
         if kind in ("fix", "compute") and made in (name, ID):
-            what = f"'{name}' is used before its {kind} is defined"
+            message = f"'{name}' is used before its {kind} is defined"
             where = f"the {kind} is in line {line}"
         elif not kind and made == name:
-            what, where = f"'{name}' is used before it is set", f"it is set in line {line}"
+            message, where = f"'{name}' is used before it is set", f"it is set in line {line}"
         else:
             continue
         hint = f"move line {line} up"
         if statement.place == script.hub.place:
             where, hint = f"it is set in this very line {line}", "give it a value first"
-        elif own and _needs(script, name, own):
-            hint = f"'{own}' and '{name}' need each other: set one of them without the other"
+        elif assigned and _needs(script, name, assigned):
+            hint = f"'{assigned}' and '{name}' need each other: set one of them without the other"
         expected = f"a name that is known here; {where}"
         code = "used-before-defined"
-        return ScriptError(what, place=place, expected=expected, hint=hint, code=code)
+        return ScriptError(message, place=place, expected=expected, hint=hint, code=code)
     return None
 
 
@@ -218,13 +218,13 @@ def check_name(name: str) -> None:
         "a command": registry.knows("command", name) and of_karamelo(name),
         "a function": name in RESERVED,
     }
-    what = next((kind for kind, applies in kinds.items() if applies), "")
-    if not what:
+    meaning = next((kind for kind, applies in kinds.items() if applies), "")
+    if not meaning:
         return
     free = f"another name, such as {name}_1 or my_{name}"
-    other = f"{name}(...) calls it" if what == "a command" else instead("command", name)
+    other = f"{name}(...) calls it" if meaning == "a command" else instead("command", name)
     raise ScriptError(
-        f"'{name}' is {what} and cannot be assigned",
+        f"'{name}' is {meaning} and cannot be assigned",
         code="taken-name",
         name=name,
         expected="a name that is free",
@@ -272,10 +272,10 @@ def words_of(statement: Any) -> list[str]:
 def in_own_words(script: Any, name: str) -> str | None:
     """Translate the call of a Karamelo command that does not exist here."""
     calls = [s for frame in script.frames for s in frame.statements if isinstance(s, CommandCall)]
-    own = next((call for call in calls if call.name == "method"), None)
+    method = next((call for call in calls if call.name == "method"), None)
     asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
-    before, rest = words_of(own), words_of(asked[0] if asked else None)
-    where = f"instead of line {own.place.line}" if own else "before the first solid"
+    before, rest = words_of(method), words_of(asked[0] if asked else None)
+    where = f"instead of line {method.place.line}" if method else "before the first solid"
     if name == "method_modify" and rest:
         if registry.knows("method", rest[0]):
             before, rest = [rest[0], *before[1:]], rest[1:] or before[1:] or ["FLIP"]
@@ -301,20 +301,22 @@ def filled(statement: Any) -> str | None:
     return f"region(box, {SHAPES[shape]}, {inside}), and solid({ID}, region, box, {points})"
 
 
-def longer(name: str, given: Sequence[Any]) -> str | None:
+def longer(name: str, arguments: Sequence[Any]) -> str | None:
     """Complete the line of a style (`name`: ``eos shock``) that was `given` fewer arguments."""
     forms = table()["shorter"].get(name)
-    if forms is None or not given:
+    if forms is None or not arguments:
         return None
     family, style = name.split()
-    count = str(len(given))
+    count = str(len(arguments))
     if count not in forms and "else" not in forms:
         return None
     says, line = forms.get(count) or forms["else"]
-    ID = words_of(given[0].statement)[:1] or ["ID"]
-    script = given[0]._interpreter
-    known = {name: next(filter(script.knows, own), name) for name, own in OWN_NAMES.items()}
-    words = line.format(*(argument.text for argument in given), **known)
+    ID = words_of(arguments[0].statement)[:1] or ["ID"]
+    script = arguments[0]._interpreter
+    temperatures = {
+        name: next(filter(script.knows, candidates), name) for name, candidates in OWN_NAMES.items()
+    }
+    words = line.format(*(argument.text for argument in arguments), **temperatures)
     return f"{says}{family}({ID[0]}, {style}, {words})"
 
 

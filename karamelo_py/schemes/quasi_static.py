@@ -73,7 +73,7 @@ class QuasiStatic(NamedTuple):
     differently, or towards held nodes without points.
     """
 
-    traits = SchemeTraits(implicit=True, inertia=False, published=PUBLISHED)
+    traits = SchemeTraits(implicit=True, inertia=False)
     begin = BEGIN
     hold = HOLD
     close = CLOSE

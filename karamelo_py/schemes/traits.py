@@ -28,5 +28,3 @@ class SchemeTraits(NamedTuple):
     damps: bool = False
     # What damps vibrations through the parameters of the scheme; empty if nothing does.
     damping: Callable[[Any], str] = lambda scheme: ""
-    # Names of published values of the last step.
-    published: tuple[str, ...] = ()

@@ -48,10 +48,10 @@ OF_ONE = {
 
 def derivative(root: Term, name: str) -> Term:
     """Differentiate a formula with respect to a name."""
-    found: dict[int, Term] = {}
+    slopes: dict[int, Term] = {}
     for term in in_order(root):
-        found[id(term)] = _derivative(term, name, [found[id(x)] for x in term.operands])
-    return found[id(root)]
+        slopes[id(term)] = _derivative(term, name, [slopes[id(x)] for x in term.operands])
+    return slopes[id(root)]
 
 
 def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
@@ -81,12 +81,12 @@ def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
 
 def replaced(root: Term, by: Mapping[str, Term]) -> Term:
     """Put formulas for names."""
-    found: dict[int, Term] = {}
+    results: dict[int, Term] = {}
     for term in in_order(root):
         if term.operation == "name":
-            found[id(term)] = by.get(term.value, term)
+            results[id(term)] = by.get(term.value, term)
         elif term.operands:
-            found[id(term)] = applied(term.operation, *[found[id(x)] for x in term.operands])
+            results[id(term)] = applied(term.operation, *[results[id(x)] for x in term.operands])
         else:
-            found[id(term)] = term
-    return found[id(root)]
+            results[id(term)] = term
+    return results[id(root)]

@@ -169,8 +169,8 @@ def _width(character: str) -> int:
 
 def meant(name: str, names: Iterable[str]) -> str | None:
     """Format ``did you mean '...'?`` with the most similar names; None without any."""
-    like = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
-    close = [f"'{n}'" for n, ratio in like if ratio == like[0][1]]
+    ratios = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
+    close = [f"'{n}'" for n, ratio in ratios if ratio == ratios[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
@@ -191,17 +191,17 @@ def plural(count: float, noun: str) -> str:
 
 
 def unknown(
-    message: str, name: str, known: Iterable[str], hint: str | None = None, **where: Any
+    message: str, name: str, names: Iterable[str], hint: str | None = None, **where: Any
 ) -> ScriptError:
     """Make the error for a `name` that is not `known`; `where` gives the place."""
-    known = list(known)
-    few = nearest_few(name, known)
+    names = list(names)
+    few = nearest_few(name, names)
     return ScriptError(
         message,
         name=name,
         alike=few[0] if few else None,
-        expected=one_of(name, known),
-        hint=meant(name, known) or hint,
+        expected=one_of(name, names),
+        hint=meant(name, names) or hint,
         **where,
     )
 
@@ -211,8 +211,8 @@ def nearest_few(name: str, names: Iterable[str]) -> list[str]:
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
-    like = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
-    return list(dict.fromkeys([*([first] if first else []), *like, *begin]))[:3]
+    similar = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
+    return list(dict.fromkeys([*([first] if first else []), *similar, *begin]))[:3]
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
@@ -223,9 +223,9 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
         if candidate.lower() == lowered and candidate != name:
             return candidate
     # A longer name is not a misspelling of a short one: Ek_s is not Es.
-    like = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
-    by_lower = {candidate.lower(): candidate for candidate in like}
-    for word, among in (name, {n: n for n in like}), (lowered, by_lower):
+    candidates = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
+    by_lower = {candidate.lower(): candidate for candidate in candidates}
+    for word, among in (name, {n: n for n in candidates}), (lowered, by_lower):
         if close := difflib.get_close_matches(word, among, n=1, cutoff=0.6):
             return among[close[0]]
     # Part of a name: cubic for cubic-spline.

@@ -147,8 +147,8 @@ def _impossible(
     if isinstance(error, ZeroDivisionError) or (operation in ("^", "pow") and values[0] == 0):
         guilty = operands[0] if operation in ("^", "pow") else operands[-1]
         literal = isinstance(guilty, syntax.NumberLiteral)
-        what = "" if literal else f": {raw.code[guilty.start : guilty.end]} is 0"
-        message, expected = f"division by zero{what}", "a number other than 0"
+        which = "" if literal else f": {raw.code[guilty.start : guilty.end]} is 0"
+        message, expected = f"division by zero{which}", "a number other than 0"
         place, code = mark(raw, guilty), "division-by-zero"
         return ScriptError(message, place=place, expected=expected, code=code)
     if isinstance(error, OverflowError):

@@ -85,8 +85,8 @@ def open_parenthesis(text: str, start: int) -> Mistake:
     """Make the mistake of an unclosed parenthesis at `start`."""
     before = re.search(r"[^\W\d]\w*[ \t]*$", text[:start])
     begin = before.start() if before else start
-    what = f"the call of {before[0].rstrip()}" if before else "this parenthesis"
-    message = f"{what} is not closed: a ) is missing"
+    opened = f"the call of {before[0].rstrip()}" if before else "this parenthesis"
+    message = f"{opened} is not closed: a ) is missing"
     return Mistake(message, begin, start + 1, "as many ) as (", "add the missing )")
 
 

@@ -94,32 +94,32 @@ class Term:
 
 def in_order(root: Term) -> list[Term]:
     """List `root` and the terms below it once each, operands first."""
-    found: dict[int, Term] = {}
+    ordered: dict[int, Term] = {}
     open_terms = [(root, False)]
     while open_terms:
         term, done = open_terms.pop()
-        if id(term) in found:
+        if id(term) in ordered:
             continue
         if done:
-            found[id(term)] = term
+            ordered[id(term)] = term
         else:
             open_terms.append((term, True))
             open_terms += [(operand, False) for operand in reversed(term.operands)]
-    return list(found.values())
+    return list(ordered.values())
 
 
 def evaluated(root: Term, value_of: Callable[[str], float]) -> float:
     """Compute a formula from the values of its names."""
-    found: dict[int, float] = {}
+    results: dict[int, float] = {}
     for term in in_order(root):
         if term.operation == "number":
             result = term.value
         elif term.operation == "name":
             result = value_of(term.value)
         else:
-            result = compute_quietly(term.operation, *[found[id(t)] for t in term.operands])
-        found[id(term)] = result
-    return found[id(root)]
+            result = compute_quietly(term.operation, *[results[id(t)] for t in term.operands])
+        results[id(term)] = result
+    return results[id(root)]
 
 
 def constant(value: float) -> Term:
@@ -157,13 +157,13 @@ def _inverse_normal(p: Term) -> Term:
 
 def alike(one: Term, other: Term) -> bool:
     """Tell if two terms are equal everywhere, up to the order of operands of + and *."""
-    known: dict[tuple, int] = {}
+    numbers: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
         operands = [kinds[id(t)] for t in term.operands]
         if term.operation in ("+", "*"):
             operands.sort()
-        kinds[id(term)] = known.setdefault((term.operation, term.value, *operands), len(known))
+        kinds[id(term)] = numbers.setdefault((term.operation, term.value, *operands), len(numbers))
     return kinds[id(one)] == kinds[id(other)]
 
 
@@ -215,10 +215,10 @@ def text_of(term: Term) -> str:
 def _bracketed(term: Term, level: int) -> str:
     """Format `term`, in parentheses if it binds less than `level`."""
     if term.operation == "number":
-        own = 7 if math.copysign(1.0, term.value) < 0 else 9
+        precedence = 7 if math.copysign(1.0, term.value) < 0 else 9
     else:
-        own = _PRECEDENCE.get(term.operation, 9)
-    return text_of(term) if own >= level else f"({text_of(term)})"
+        precedence = _PRECEDENCE.get(term.operation, 9)
+    return text_of(term) if precedence >= level else f"({text_of(term)})"
 
 
 # ---- as programs ---------------------------------------------------------------------------------
@@ -262,19 +262,19 @@ class _Writer:
     def _number(self, root: Term) -> int:
         """Number all terms; equal terms get the same number."""
         numbers: dict[int, int] = {}
-        known: dict[tuple, int] = {}
+        indices: dict[tuple, int] = {}
         for term in in_order(root):
             operands = tuple(numbers[id(operand)] for operand in term.operands)
             value = term.value.hex() if term.operation == "number" else term.value
             key = term.operation, operands, value
-            if key not in known:
-                known[key] = len(self.terms)
+            if key not in indices:
+                indices[key] = len(self.terms)
                 self.terms.append(key)
                 self.uses.append(0)
                 self.uniform.append(self._is_uniform(*key))
                 for operand in operands:
                     self.uses[operand] += 1
-            numbers[id(term)] = known[key]
+            numbers[id(term)] = indices[key]
         return numbers[id(root)]
 
     def _is_uniform(self, operation: str, operands: tuple[int, ...], value: Any) -> bool:

@@ -13,8 +13,8 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
     """Tell whether values with these suffixes occupy consecutive slots in this order."""
-    known = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
-    return not known or known == list(range(known[0], known[0] + len(suffixes)))
+    places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
+    return not places or places == list(range(places[0], places[0] + len(suffixes)))
 
 
 class Values:
@@ -49,12 +49,12 @@ class Values:
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
-        first, own = self._first[ID], [s for s in suffixes if s not in SUFFIXES]
-        begin = self._slots.get(f"{ID}_{own[0]}", -1) if own else 0
-        if any(self._slots.get(f"{ID}_{s}") != begin + k for k, s in enumerate(own)):
-            begin = self._reserve(len(own))
+        first, further = self._first[ID], [s for s in suffixes if s not in SUFFIXES]
+        begin = self._slots.get(f"{ID}_{further[0]}", -1) if further else 0
+        if any(self._slots.get(f"{ID}_{s}") != begin + k for k, s in enumerate(further)):
+            begin = self._reserve(len(further))
         places = {s: first + k for k, s in enumerate(SUFFIXES) if s in suffixes}
-        places |= {s: begin + k for k, s in enumerate(own)}
+        places |= {s: begin + k for k, s in enumerate(further)}
         slots = {}
         for suffix, place in places.items():
             name = f"{ID}_{suffix}" if suffix else ID

@@ -249,18 +249,18 @@ class MeshSolid(Solid):
         mesh = read(file, domain.dimension, hub.settings.trusts, h / 2)
         parts = elements_of(mesh, domain.dimension, group)
         self._tell_of_left_out(hub, mesh)
-        found = [measured(part) for part in parts]
-        inside = [domain.contains(centroid) for _, _, centroid in found]
-        corners = [part.corners[kept] for (part, _, _), kept in zip(found, inside, strict=True)]
-        volume, centroid = (np.concatenate(of) for of in list(zip(*found, strict=True))[1:])
+        measures = [measured(part) for part in parts]
+        inside = [domain.contains(centroid) for _, _, centroid in measures]
+        corners = [part.corners[kept] for (part, _, _), kept in zip(measures, inside, strict=True)]
+        volume, centroid = (np.concatenate(of) for of in list(zip(*measures, strict=True))[1:])
         kept = np.concatenate(inside)
         reach = np.concatenate(
             [x.reshape(-1, domain.dimension) for x in corners if len(x)]
-            or [part.corners[:, 0] for part, _, _ in found]
+            or [part.corners[:, 0] for part, _, _ in measures]
         )
         _tell_of_units(hub, file, reach.min(axis=0), reach.max(axis=0))
         self.volumes = float(volume[kept].sum()), float(volume.sum())
-        mixed = len(found) > 1
+        mixed = len(measures) > 1
         self.put(
             hub,
             Placement(
@@ -270,7 +270,7 @@ class MeshSolid(Solid):
                 lo=reach.min(axis=0),
                 hi=reach.max(axis=0),
                 outside=int(np.count_nonzero(~kept)),
-                shape="several shapes" if mixed else found[0][0].shape.name,
+                shape="several shapes" if mixed else measures[0][0].shape.name,
                 corners=None if mixed else corners[0],
             ),
         )

@@ -99,8 +99,8 @@ class BlockRegion(Primitive):
     )
 
     def __init__(self, hub: Hub, *bounds: Argument):
-        given, exterior = region.split_exterior(bounds)
-        ends = tuple(self.forms.read(hub, given, require_domain(hub).dimension).values())
+        numbers, exterior = region.split_exterior(bounds)
+        ends = tuple(self.forms.read(hub, numbers, require_domain(hub).dimension).values())
         self.slabs = [(k // 2, *ends[k : k + 2]) for k in range(0, len(ends), 2)]
         for axis, *slab in self.slabs:
             region.check_order(*slab, _NAMES, 2 * axis)
@@ -140,9 +140,9 @@ class Cylinder(Primitive):
     )
 
     def __init__(self, hub: Hub, *shape: Argument):
-        given, exterior = region.split_exterior(shape)
+        numbers, exterior = region.split_exterior(shape)
         dimension = require_domain(hub).dimension
-        values = self.forms.read(hub, given, dimension)
+        values = self.forms.read(hub, numbers, dimension)
         names = tuple(values)
         self.radius = values["R"]
         region.check_radius(self.radius, argument=names.index("R"))
@@ -185,8 +185,8 @@ class Sphere(Primitive):
     )
 
     def __init__(self, hub: Hub, *shape: Argument):
-        given, exterior = region.split_exterior(shape)
-        *centre, self.radius = self.forms.read(hub, given, require_domain(hub).dimension).values()
+        numbers, exterior = region.split_exterior(shape)
+        *centre, self.radius = self.forms.read(hub, numbers, require_domain(hub).dimension).values()
         region.check_radius(self.radius, argument=len(centre))
         self.across, self.centre = range(len(centre)), np.array(centre)
         lo, hi = self.centre - self.radius, self.centre + self.radius
@@ -227,15 +227,15 @@ class Plane(Primitive):
         """A half-space has no volume; the domain cuts it anywhere."""
 
     def __init__(self, hub: Hub, *plane: Argument):
-        given, exterior = region.split_exterior(plane)
+        numbers, exterior = region.split_exterior(plane)
         d = require_domain(hub).dimension
-        values = np.array([*self.forms.read(hub, given, d).values()])
+        values = np.array([*self.forms.read(hub, numbers, d).values()])
         self.middle, normal = values[:d], values[d:]
         length = np.linalg.norm(normal)
         if length == 0:
             raise ScriptError(
                 "the direction across the plane has no length",
-                place=given[d].place,
+                place=numbers[d].place,
                 expected="a direction that is not 0",
             )
         self.normal = normal / (length or 1)
@@ -358,5 +358,5 @@ class Difference(region.Region):
 
 def outlines(parts: Sequence[region.Region]) -> tuple | None:
     """Return the descriptions of regions for kernels; None if a region has none."""
-    found = [part.outline() for part in parts]
-    return None if any(one is None for one in found) else tuple(found)
+    shapes = [part.outline() for part in parts]
+    return None if any(one is None for one in shapes) else tuple(shapes)

@@ -132,8 +132,8 @@ class RegionSolid(Solid):
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
         """Return the volume of the points, and of the shape in a file, if there is one."""
         whole = self.region.volume
-        own = float(np.sum(np.broadcast_to(placement.volume, self.count)))
-        return None if whole is None else (own, whole)
+        total = float(np.sum(np.broadcast_to(placement.volume, self.count)))
+        return None if whole is None else (total, whole)
 
     def _warn_of_size(self, hub: Hub) -> None:
         """Warn if all of the body fits into a cell: the grid sees next to no deformation then."""
@@ -145,10 +145,10 @@ class RegionSolid(Solid):
                 hint="cells of a quarter of its thinnest side or smaller",
             )
 
-    def _warn_of_volume(self, hub: Hub, own: float, whole: float) -> None:
+    def _warn_of_volume(self, hub: Hub, total: float, whole: float) -> None:
         hub.warn(
-            f"the points have {abs(own / whole - 1):.2%} {'more' if own > whole else 'less'} "
-            f"volume, and mass, than {self.described()}: {own:.4g} for {whole:.4g}",
+            f"the points have {abs(total / whole - 1):.2%} {'more' if total > whole else 'less'} "
+            f"volume, and mass, than {self.described()}: {total:.4g} for {whole:.4g}",
             hint="smaller cells" if self.cut else "points=cut, or smaller cells",
         )
 
@@ -215,9 +215,9 @@ class PointsSolid(Solid):
         columns, lengths = dict(table.columns), {np.shape(of) for of in table.columns.values()}
         missing = [name for name in (*AXES[:d], "volume") if name not in columns]
         if missing or len(lengths) > 1 or len(next(iter(lengths), ())) != 1:
-            what = f"has no column {missing[0]}" if missing else "has columns of several lengths"
+            problem = f"has no column {missing[0]}" if missing else "has columns of several lengths"
             raise ScriptError(
-                f"{self.table} {what}",
+                f"{self.table} {problem}",
                 argument="table",
                 expected=f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., T, s11 ...",
             )

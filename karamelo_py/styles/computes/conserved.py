@@ -164,7 +164,7 @@ class EnergyBalance(Compute):
         parts = [self.hub.fields.total(kind, self.group) for kind in kinds]
         work = self.work.evaluate(self.hub.values) if self.work is not None else 0.0
         energies = total(parts)
-        drift = self._drift(energies - work, max(abs(part) for part in (*parts, work)))
+        drift = self._drift(energies - work, max(abs(energy) for energy in (*parts, work)))
         self.publish_all(energies - work, energies, drift)
 
 

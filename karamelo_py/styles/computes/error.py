@@ -45,10 +45,10 @@ class PointField:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "PointField":
-        known = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
-        name = argument.words(known)
-        if name not in known:
-            raise unknown(f"unknown field '{name}'", name, known, place=argument.place)
+        fields = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
+        name = argument.words(fields)
+        if name not in fields:
+            raise unknown(f"unknown field '{name}'", name, fields, place=argument.place)
         ends = AXES[: require_domain(hub).dimension] if name in VECTORS else COMPONENTS
         letter = (VECTORS | TENSORS).get(name)
         return cls(name, tuple(letter + end for end in ends) if letter else (name,))
@@ -207,7 +207,7 @@ class Error(Compared, Compute):
                 expected=f"an expression for {'each of ' * (len(field.columns) > 1)}{wanted}",
             )
         pairs = zip(field.columns, field.weights, formulas, strict=False)
-        self.parts = [part for part in pairs if part[2] is not None]
+        self.parts = [pair for pair in pairs if pair[2] is not None]
         self.norm = Norm(words)
 
     def refresh(self) -> None:
@@ -305,12 +305,12 @@ class Reference(Compared, Compute):
             self._check_columns(hub, file, column)
 
     def _check_columns(self, hub: Hub, file: TableFile, column: Argument) -> None:
-        known = [*hub.fields.particle_names(), "ux", "uy", "uz"]
+        columns = [*hub.fields.particle_names(), "ux", "uy", "uz"]
         for name in (self.along, self.column):
-            if name not in known:
+            if name not in columns:
                 hint = f"in {file} the coordinate first, then columns named as in dumps"
                 message = f"points have no column '{name}'"
-                raise unknown(message, name, known, hint, place=column.place)
+                raise unknown(message, name, columns, hint, place=column.place)
         refuse_absent(hub, (self.column,))
 
     def refresh(self) -> None:

@@ -175,9 +175,9 @@ class MaxPosition(Compute):
     extreme = staticmethod(np.max)
 
     def refresh(self) -> None:
-        found = self.hub.fields.each(self, "furthest")
+        extremes = self.hub.fields.each(self, "furthest")
         # 0 without points, like the sums of other computes.
-        self.publish_components(self.extreme(found, axis=0) if found else np.zeros(3))
+        self.publish_components(self.extreme(extremes, axis=0) if extremes else np.zeros(3))
 
     def furthest(self, points: PointTable) -> np.ndarray | None:
         return self.extreme(points.position, axis=0) if points.count else None
@@ -244,22 +244,22 @@ class PositionQuantile(Compute):
                 # Fractions such as 0.1 of ten equal points must not fail by rounding.
                 wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
-                there = np.flatnonzero(of_bits)
-                up_to = below[axis] + np.cumsum(of_bits[there])
-                own = there[min(np.count_nonzero(up_to < wanted[axis]), len(there) - 1)]
-                below[axis] += of_bits[:own].sum()
-                first[axis] = first[axis] << BITS | int(own)
+                occupied = np.flatnonzero(of_bits)
+                up_to = below[axis] + np.cumsum(of_bits[occupied])
+                digit = occupied[min(np.count_nonzero(up_to < wanted[axis]), len(occupied) - 1)]
+                below[axis] += of_bits[:digit].sum()
+                first[axis] = first[axis] << BITS | int(digit)
         self.publish_components(_numbers(np.array(first, np.uint64)))
 
     def masses(self, points: PointTable, shift: int, first: list[int]) -> tuple:
         """Masses of points whose coordinates begin with these bits, by the next bits."""
-        found = []
+        terms_by_axis = []
         for axis, begin in enumerate(first):
             bits = _bits(points.position[:, axis].astype(float)) >> np.uint64(shift)
             rows = np.flatnonzero(bits >> np.uint64(BITS) == begin)
-            own = (bits[rows] & np.uint64(2**BITS - 1)).astype(np.int64)
-            found.append((own + axis * 2**BITS, points.mass[rows].astype(float)))
-        rows, terms = (np.concatenate(same) for same in zip(*found, strict=True))
+            digits = (bits[rows] & np.uint64(2**BITS - 1)).astype(np.int64)
+            terms_by_axis.append((digits + axis * 2**BITS, points.mass[rows].astype(float)))
+        rows, terms = (np.concatenate(same) for same in zip(*terms_by_axis, strict=True))
         return len(first) * 2**BITS, rows, terms
 
 
@@ -329,8 +329,8 @@ class Probe(Mean):
         if self.point is None and not self.at:
             super().refresh()
             return
-        found = self.hub.fields.each(self, "nearest")
-        self.publish_all(*(min(found)[2:] if found else [self.empty] * len(self.columns)))
+        nearest = self.hub.fields.each(self, "nearest")
+        self.publish_all(*(min(nearest)[2:] if nearest else [self.empty] * len(self.columns)))
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         volume = points.particle("volume")

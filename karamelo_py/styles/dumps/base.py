@@ -96,15 +96,15 @@ class TableDump(Dump):
     counts_rows = True
 
     def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
-        known = [*LEADING, *self.names(hub)]
-        if str(file) in known:
+        columns_available = [*LEADING, *self.names(hub)]
+        if str(file) in columns_available:
             raise ScriptError(
                 f"'{file}' is a column, not a file",
                 argument="file",
                 expected="the file name in front of the columns",
                 hint=f"dump_*.LAMMPS, {file}",
             )
-        check_columns(columns, known, first=2)
+        check_columns(columns, columns_available, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
         # A viewer needs all three positions; those not requested come first.
         if not set(POSITIONS) <= set(wanted):

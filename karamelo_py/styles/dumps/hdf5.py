@@ -76,8 +76,8 @@ class Hdf5Dump(TableDump):
                     raise
         except (OSError, RuntimeError) as error:  # from HDF5; the message is the system's
             reason = re.search("error message = '([^']*)'", str(error))
-            what = reason[1] if reason else str(error).splitlines()[0]
-            raise ScriptError(f"cannot write {path}: {what}") from error
+            message = reason[1] if reason else str(error).splitlines()[0]
+            raise ScriptError(f"cannot write {path}: {message}") from error
 
     def _reserve(self, path: Path, last: int) -> None:
         """Check that the disk has room for a snapshot of any content.
@@ -122,16 +122,16 @@ class Hdf5Dump(TableDump):
     def _past(self, old: Any, k: int) -> SnapshotRows:
         def tables(begins: Iterable[int]) -> Iterator[TableRows]:
             for begin in begins:
-                own = slice(begin, begin + PIECE)
-                columns = [old[name][k, own] for name in self.columns]
+                rows = slice(begin, begin + PIECE)
+                columns = [old[name][k, rows] for name in self.columns]
                 at = np.flatnonzero(~np.isnan(columns).all(axis=0))
-                ids, types = old["id"][own][at], old["type"][own][at]
+                ids, types = old["id"][rows][at], old["type"][rows][at]
                 yield TableRows(ids, types, [column[at] for column in columns])
 
         begins = range(0, len(old["id"]), PIECE)
-        there = (int(table.ids[-1]) for table in tables(reversed(begins)) if len(table.ids))
+        last_ids = (int(table.ids[-1]) for table in tables(reversed(begins)) if len(table.ids))
         time, step = float(old["time"][k]), int(old["step"][k])
-        return SnapshotRows(time, step, next(there, self._first - 1), tables(begins))
+        return SnapshotRows(time, step, next(last_ids, self._first - 1), tables(begins))
 
     @property
     def _first(self) -> int:
@@ -186,21 +186,21 @@ class Hdf5Dump(TableDump):
             at = table.ids - first
             # Pieces of a fixed size: a file has the same bytes however its rows arrive.
             for begin in range(0, count, PIECE):
-                own, here = (
+                block, here = (
                     slice(begin, min(begin + PIECE, count)),
                     slice(*np.searchsorted(at, (begin, begin + PIECE))),
                 )
                 if here.start == here.stop:
                     continue
                 rows = at[here] - begin
-                known = arrays["type"][own]
-                if (known[rows] != table.types[here]).any():
-                    known[rows] = table.types[here]
-                    arrays["type"][own] = known
-                row = np.full(len(known), np.nan)
+                types = arrays["type"][block]
+                if (types[rows] != table.types[here]).any():
+                    types[rows] = table.types[here]
+                    arrays["type"][block] = types
+                row = np.full(len(types), np.nan)
                 for name, column in zip(self.columns, table.columns, strict=True):
                     row[rows] = column[here]
-                    arrays[name][k, own] = row
+                    arrays[name][k, block] = row
         for array in arrays.values():
             array.flush()
         root.flush()

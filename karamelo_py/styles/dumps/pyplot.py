@@ -282,9 +282,9 @@ def look_of(
     """Options of a picture (`output.pictures`) from the words of a script or a command line."""
     for ends, low, high in (((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)):
         if None not in ends and ends[0] >= ends[1]:
-            what = "colours" if low == "vmin" else "picture"
+            range_of = "colours" if low == "vmin" else "picture"
             raise ScriptError(
-                f"the {what} cannot go from {ends[0]:g} to {ends[1]:g}",
+                f"the {range_of} cannot go from {ends[0]:g} to {ends[1]:g}",
                 argument=high,
                 expected=f"a number above {low}",
             )

@@ -127,7 +127,7 @@ class GridVtk(OfNodes, VtkDump):
             kept.append(ids)
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
-        there = np.concatenate(kept) if kept else np.empty(0, np.int64)
+        written = np.concatenate(kept) if kept else np.empty(0, np.int64)
         d = self.hub.domain.dimension
         for lattice in self.hub.lattices:
             last = [count - 2 for count in lattice.shape[:d]]
@@ -136,6 +136,8 @@ class GridVtk(OfNodes, VtkDump):
             for index in boxes([0] * d, last, 2**d):
                 nodes = (lattice.first + index @ steps)[:, None] + corners
                 if self.occupied:
-                    rows = np.searchsorted(there[:-1], nodes)
-                    nodes = rows[(there[rows] == nodes).all(axis=1)] if len(there) else nodes[:0]
+                    rows = np.searchsorted(written[:-1], nodes)
+                    nodes = (
+                        rows[(written[rows] == nodes).all(axis=1)] if len(written) else nodes[:0]
+                    )
                 vtu.add_cells(KINDS[d], nodes)

@@ -35,8 +35,10 @@ class EdgeHeat(OnEdge, HeatFix):
 
     def supply_heat(self, points: PointsView) -> None:
         faces = self.faces_at(points.ids - 1)
-        x, known = faces.middle, self.hub.values
-        heat = self.flows(points, faces, [f.evaluate_points(known, x, x) for f in self.formulas])
+        x, published = faces.middle, self.hub.values
+        heat = self.flows(
+            points, faces, [f.evaluate_points(published, x, x) for f in self.formulas]
+        )
         points.heat_supply = points.heat_supply + heat
         area = on_points(points, faces, faces.area)
         self.publish_all(points.total(heat), points.total(area))
@@ -120,10 +122,10 @@ class EdgeConvection(EdgeHeat):
         rate = on_points(points, faces, faces.area * h)
         warms = on_points(points, faces, faces.area * h * T_inf)
         capacity = points.mass * from_solids(self.hub, points.ids - 1, _heat_capacities)
-        there = capacity > 0  # points of other materials lack a temperature
-        slower = 1 + rate * self.hub.values.get("dt") / np.where(there, capacity, 1.0)
-        return np.where(there, (warms - rate * points.temperature) / slower, 0.0)
+        conducts = capacity > 0  # points of other materials lack a temperature
+        slower = 1 + rate * self.hub.values.get("dt") / np.where(conducts, capacity, 1.0)
+        return np.where(conducts, (warms - rate * points.temperature) / slower, 0.0)
 
 
-def _heat_capacities(solid: Solid, own: np.ndarray) -> np.ndarray:
-    return np.full(len(own), float(heat_capacity(solid.material.law, 1.0)))
+def _heat_capacities(solid: Solid, rows: np.ndarray) -> np.ndarray:
+    return np.full(len(rows), float(heat_capacity(solid.material.law, 1.0)))

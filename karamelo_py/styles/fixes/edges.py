@@ -46,8 +46,8 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     if not len(ids):
         return Faces(ids, ids, ids, np.empty(0), np.empty((0, d)))
     x0 = places_before(hub, ids)
-    half = from_solids(hub, ids, lambda solid, own: solid.half_size[own], d)
-    found = []
+    half = from_solids(hub, ids, lambda solid, rows: solid.half_size[rows], d)
+    faces = []
     inside = region.inside(x0)
     for axis in range(d):
         for sign in (-1, 1):
@@ -58,8 +58,8 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
             area = np.delete(2 * half[rows], axis, axis=1).prod(axis=1)
             area = area * hub.domain.depth(middle)
             ones = np.ones(len(rows), np.int64)
-            found.append(Faces(ids[rows], axis * ones, sign * ones, area, middle))
-    return joined(found)
+            faces.append(Faces(ids[rows], axis * ones, sign * ones, area, middle))
+    return joined(faces)
 
 
 class EdgePieces(NamedTuple):
@@ -74,8 +74,8 @@ class EdgePieces(NamedTuple):
 Columns = TypeVar("Columns", Faces, EdgePieces)
 
 
-def joined(found: Sequence[Columns]) -> Columns:
-    return type(found[0])(*map(np.concatenate, zip(*found, strict=True)))
+def joined(tables: Sequence[Columns]) -> Columns:
+    return type(tables[0])(*map(np.concatenate, zip(*tables, strict=True)))
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
@@ -88,9 +88,9 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     inside = region.inside(x0)
     ids, x0 = ids[inside], x0[inside]
     none = np.empty((0, d))
-    found = [EdgePieces(np.empty(0, np.int64), none, np.empty(0), none)]
+    pieces = [EdgePieces(np.empty(0, np.int64), none, np.empty(0), none)]
     if not len(ids):
-        return found[0]
+        return pieces[0]
     corner = x0.min(axis=0) - 2.5 * size  # puts points of whole boxes at the box centres
     shape = tuple(((x0.max(axis=0) - corner) / size + 5).astype(np.int64))
     cells = np.ravel_multi_index(tuple(((x0 - corner) / size).astype(np.int64).T), shape)
@@ -114,8 +114,8 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
                 nearest[nearer], taker[nearer] = apart[nearer], order[row[nearer]]
         kept = taker >= 0
         lengths = _lengths(region, x[kept], size / PARTS, area[kept])
-        found.append(EdgePieces(ids[taker[kept]], area[kept], lengths, middle[kept]))
-    return joined(found)
+        pieces.append(EdgePieces(ids[taker[kept]], area[kept], lengths, middle[kept]))
+    return joined(pieces)
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
@@ -127,7 +127,7 @@ def in_parts(x: np.ndarray, size: float) -> np.ndarray:
 
 def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
     """Measure the area (n,) of the surface in boxes around `x`: by parts at an edge."""
-    found, d = np.linalg.norm(area, axis=1), x.shape[1]
+    lengths, d = np.linalg.norm(area, axis=1), x.shape[1]
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
     depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
     depth = depth.reshape(-1, len(corners))
@@ -137,8 +137,8 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
     if edge.any():
         parts = in_parts(x[edge], size)
         of_parts = np.linalg.norm(surface(region, parts, size / PARTS)[0], axis=1)
-        found[edge] = of_parts.reshape(-1, PARTS**d).sum(axis=1)
-    return found
+        lengths[edge] = of_parts.reshape(-1, PARTS**d).sum(axis=1)
+    return lengths
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
@@ -150,14 +150,14 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
     pieces = surface_at(solid, region, ids)
     none = np.empty(0, np.int64)
-    found = [Faces(none, none, none, np.empty(0), np.empty((0, d)))]
+    faces = [Faces(none, none, none, np.empty(0), np.empty((0, d)))]
     for axis in range(d):
         some = np.flatnonzero(np.abs(pieces.area[:, axis]) > least)
         of_axis, place = pieces.area[some, axis], pieces.middle[some]
         depth = solid.domain.depth(place)
         signs, axes = np.sign(of_axis).astype(np.int64), np.full(len(some), axis)
-        found.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * depth, place))
-    return joined(found)
+        faces.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * depth, place))
+    return joined(faces)
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
@@ -197,14 +197,14 @@ class OnEdge(Fix):
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
-            known = faces._replace(point=before[faces.point])
-            found = joined([new, known])
-            found = found.some(np.isin(found.point, ids))
+            cached = faces._replace(point=before[faces.point])
+            faces = joined([new, cached])
+            faces = faces.some(np.isin(faces.point, ids))
             # Sum forces on a point in this order, whenever its faces were found.
-            found = found.some(np.lexsort((found.sign, found.axis)))
+            faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
-            rows = order[np.searchsorted(ids, found.point, sorter=order)]
-            self._seen = ids.copy(), found._replace(point=rows)
+            rows = order[np.searchsorted(ids, faces.point, sorter=order)]
+            self._seen = ids.copy(), faces._replace(point=rows)
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
@@ -215,20 +215,20 @@ class OnEdge(Fix):
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
         """Return solids whose faces come from the surface, with the faces of all their points."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
-        found = {}
+        by_solid = {}
         for solid in self.hub.solids.values():
             faces = self.cut_faces(solid, members[_of(solid, members)])
             if faces is not None:
-                found[solid.id] = solid, faces
-        return found
+                by_solid[solid.id] = solid, faces
+        return by_solid
 
     def _find(self, ids: np.ndarray) -> Faces:
-        whole, found = np.ones(len(ids), np.bool_), []
+        whole, tables = np.ones(len(ids), np.bool_), []
         for solid, faces in self._cut.values():
             whole &= ~_of(solid, ids)
-            found.append(faces.some(np.isin(faces.point, ids)))
-        found.append(faces_on(self.hub, self.region, ids[whole]))
-        faces = joined(found)
+            tables.append(faces.some(np.isin(faces.point, ids)))
+        tables.append(faces_on(self.hub, self.region, ids[whole]))
+        faces = joined(tables)
         loaded = faces.area > 0  # not the axis
         if self.side is not None:
             loaded &= 2 * faces.axis + (faces.sign > 0) == self.side

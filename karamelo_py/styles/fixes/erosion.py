@@ -60,8 +60,8 @@ class Erosion(Fix):
 
     def between_steps(self) -> bool:
         """Delete the points that meet the condition; return whether there were any."""
-        found = self.hub.fields.each(self, "meeting")
-        ids = np.sort(np.concatenate([np.empty(0, np.int64), *found]))
+        tables = self.hub.fields.each(self, "meeting")
+        ids = np.sort(np.concatenate([np.empty(0, np.int64), *tables]))
         if not len(ids):
             return False
         gone = len(ids), *take_away(self.hub, ids, self.place)

@@ -77,14 +77,14 @@ class BodyForce(Fix):
         units = hub.output.units
         densities = [1 / float(specific_volume(s.material.law)) for s in hub.solids.values()]
         if units and abs(units.si(ACCELERATION) - 1) > 1e-6:
-            given = f"units({', '.join(units[:3])})"
-            told, right = given, 9.81 / units.si(ACCELERATION)
+            units_line = f"units({', '.join(units[:3])})"
+            evidence, right = units_line, 9.81 / units.si(ACCELERATION)
         elif not units and densities and TONNES[0] < max(densities) < TONNES[1]:
-            told, right = f"a density of {max(densities):.3g}, as in mm, t, s,", 9810.0
+            evidence, right = f"a density of {max(densities):.3g}, as in mm, t, s,", 9810.0
         else:
             return
         hub.warn(
-            f"with {told} an acceleration of 9.81 is {9.81 / right:.3g} of gravity",
+            f"with {evidence} an acceleration of 9.81 is {9.81 / right:.3g} of gravity",
             hint=f"gravity is {right:.6g} there",
         )
 
@@ -331,7 +331,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
     """Find the bodies with a tension that they cannot sustain, in 10 % of their points."""
-    found = []
+    cases = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():
         law = elastic_law(law_on(solid.material.whole, solid.h, solid.T0))
@@ -339,15 +339,15 @@ def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
         x = solid.x0[fix.group.has(ids)]
         if not len(x) or not can(law, with_stress):
             continue
-        given = [f.evaluate_points(scene.hub.values, x, x) for f in normal if f is not None]
-        mean = np.sum(given, axis=0) / 3 if given else np.zeros(1)
+        stresses = [f.evaluate_points(scene.hub.values, x, x) for f in normal if f is not None]
+        mean = np.sum(stresses, axis=0) / 3 if stresses else np.zeros(1)
         pulled = np.count_nonzero(mean > 0.01 * np.abs(mean).max())
         most = float(mean.max())
         if pulled < 0.1 * len(x) or _is_borne(law, most):
             continue
         turned = ", ".join("NULL" if f is None else f"-({f.text})" for f in normal)
         shear = ", ".join("NULL" if f is None else f.text for f in fix.formulas[3:])
-        found.append(
+        cases.append(
             {
                 "solid": solid.id,
                 "most": most,
@@ -355,7 +355,7 @@ def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
                 "line": f"fix({fix.id}, initial_stress, {fix.group.id}, {turned}, {shear})",
             }
         )
-    return found
+    return cases
 
 
 known_failure(

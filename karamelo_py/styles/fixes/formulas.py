@@ -52,11 +52,11 @@ def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.n
     """
     asked = any(formula is not None and formula.names & FIRST for formula in formulas)
     x0 = first() if asked else x
-    found = np.zeros(x.shape)
+    values = np.zeros(x.shape)
     for k, formula in enumerate(formulas):
         if formula is not None:
-            found[:, k] = formula.evaluate_points(hub.values, x, x0)
-    return found
+            values[:, k] = formula.evaluate_points(hub.values, x, x0)
+    return values
 
 
 def unlike(one: Any, other: Any) -> list[int]:

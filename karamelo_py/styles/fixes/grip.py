@@ -50,6 +50,6 @@ class Gripping(Fix):
         """Clear the grips of an earlier fix."""
         if self.grip is not None and not self.has_touched:
             for block in self.hub.simulation.setup.blocks:
-                if (held := field(block.points.fields, self.grip)) is not None:
-                    held[:] = 0
+                if (grip := field(block.points.fields, self.grip)) is not None:
+                    grip[:] = 0
         self.has_touched = True

@@ -83,19 +83,21 @@ class PairContact(Gripping):
         d, grips = kin.dimension, [field(block.points.fields, self.grip) for block in blocks]
         self.begin_to_touch()
         if rows is not None:
-            own = [self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)]
+            tables = [
+                self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)
+            ]
             last = float(simulation.control.clock[0].last_dt)
             push = partial(self._push, kin, (last, points.contact_dt, points.contact_kick))
-            found, total = simulation.comm.at_first(push, np.concatenate(own))
+            result, total = simulation.comm.at_first(push, np.concatenate(tables))
         for block, grip, k in zip(blocks, grips, range(len(blocks)), strict=True):
             if grip is not None:
                 grip[:] = 0
             if rows is not None:
                 some = rows[k]
-                field(block.points.fields, Force)[:d, some] += found[: len(some), :d].T
+                field(block.points.fields, Force)[:d, some] += result[: len(some), :d].T
                 if grip is not None:
-                    grip[:, some] = found[: len(some), d:].T
-                found = found[len(some) :]
+                    grip[:, some] = result[: len(some), d:].T
+                result = result[len(some) :]
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
@@ -117,26 +119,26 @@ class PairContact(Gripping):
         low, high = -extents[:, :d].min(axis=0) - width, extents[:, 3 : 3 + d].min(axis=0) + width
         if (low > high).any():
             return None
-        found = []
+        near = []
         for block in s.blocks:
             x, rows = block.points.x[simulation.now], np.empty(block.points.id.size, np.int64)
             count = pairs.pick(s.kin, x, block.points, *self._ranges, low, high, rows)
-            found.append(rows[:count].copy())
-        return found
+            near.append(rows[:count].copy())
+        return near
 
     @staticmethod
     def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
         """Numbers, masses, radii, positions and velocities of some points, and their grip."""
         kin, x = simulation.kin, block.points.x[simulation.now]
-        found = np.empty((len(rows), 3 + 2 * kin.dimension))
-        pairs.collect(kin, x, block.points, block.laws, rows, found)
-        return found if grip is None else np.concatenate([found, grip[:, rows].T], axis=1)
+        table = np.empty((len(rows), 3 + 2 * kin.dimension))
+        pairs.collect(kin, x, block.points, block.laws, rows, table)
+        return table if grip is None else np.concatenate([table, grip[:, rows].T], axis=1)
 
     def _push(
-        self, kin: Any, times: tuple[float, float, float], found: list[np.ndarray]
+        self, kin: Any, times: tuple[float, float, float], tables: list[np.ndarray]
     ) -> list[tuple]:
         """Forces and grips of the points of each process, and the sum of forces on the first."""
-        of_all, d = np.concatenate(found), kin.dimension
+        of_all, d = np.concatenate(tables), kin.dimension
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
         order = np.lexsort((of_all[:, 0], second))
@@ -148,8 +150,8 @@ class PairContact(Gripping):
         pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, *times, total)
         force = np.empty((n, d + grip.shape[1]))
         force[order] = np.concatenate([bodies.force, bodies.grip], axis=1)
-        ends = np.cumsum([len(one) for one in found])[:-1]
-        return [(own, total) for own in np.split(force, ends)]
+        ends = np.cumsum([len(one) for one in tables])[:-1]
+        return [(rows, total) for rows in np.split(force, ends)]
 
 
 gain(

@@ -53,7 +53,7 @@ class PythonFunction:
             )
         try:
             exists = forget_other(module.partition(".")[0])
-            found = import_module(module)
+            imported = import_module(module)
         except FAILURES as error:
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}",
@@ -61,15 +61,15 @@ class PythonFunction:
                 hint=no_file
                 or (None if exists else f"{module}.py is not in {folder}, nor installed"),
             ) from error
-        if not callable(getattr(found, function, None)):
-            known = [key for key, value in vars(found).items() if callable(value)]
-            close = nearest(function, known)
+        if not callable(getattr(imported, function, None)):
+            functions = [key for key, value in vars(imported).items() if callable(value)]
+            close = nearest(function, functions)
             raise ScriptError(
                 f"the module {module} has no function '{function}'",
                 place=argument.place,
                 hint=no_file or (f"did you mean '{module}.{close}'?" if close else None),
             )
-        return getattr(found, function)
+        return getattr(imported, function)
 
 
 class Python(Fix):
@@ -178,31 +178,31 @@ class Python(Fix):
 
     def _act(self, view: Any) -> None:
         try:
-            given = self.function(view)
+            result = self.function(view)
         except KNOWN:
             raise
         except FAILURES as error:
-            what = f"{cause_of(error)}{place_in(self.function, error)}"
-            told = ScriptError(
-                f"fix python: {_name(self.function)}: {what}",
+            message = f"{cause_of(error)}{place_in(self.function, error)}"
+            failure = ScriptError(
+                f"fix python: {_name(self.function)}: {message}",
                 place=self.place,
                 hint="\n  ".join(["mend the function there:", *steps_to(error)]),
             )
-            told.complete = True
-            raise told from error
+            failure.complete = True
+            raise failure from error
         if self.point_by_point:
-            self._agree(given)
-        if given is None:
+            self._agree(result)
+        if result is None:
             return
-        numbers = np.asarray(given, float)
+        numbers = np.asarray(result, float)
         if numbers.ndim == 0:
             self.publish("", numbers)
         else:
             self.publish_components(numbers)
 
-    def _agree(self, given: Any) -> None:
-        own = None if given is None else np.asarray(given, float).tolist()
-        first, *others = map(repr, self.hub.simulation.comm.everyone("its end", own))
+    def _agree(self, result: Any) -> None:
+        values = None if result is None else np.asarray(result, float).tolist()
+        first, *others = map(repr, self.hub.simulation.comm.everyone("its end", values))
         other = next((one for one in others if one != first), None)
         if other is not None:
             raise ScriptError(

@@ -181,8 +181,12 @@ class VelocityNodes(Fix):
         if len(bounds) > 1:
             lines = []
             for k, one in enumerate(bounds, 1):
-                own = (one + v.text if v and v.bound == one else "NULL" for v in self.formulas)
-                lines.append(f"fix(ID{k}, velocity_nodes, {self.group.id}, {', '.join(own)})")
+                components = (
+                    one + v.text if v and v.bound == one else "NULL" for v in self.formulas
+                )
+                lines.append(
+                    f"fix(ID{k}, velocity_nodes, {self.group.id}, {', '.join(components)})"
+                )
             raise ScriptError(
                 "a fix has bounds of one kind: leq, geq, or none",
                 argument="velocity",

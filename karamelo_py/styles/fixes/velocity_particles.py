@@ -126,10 +126,10 @@ def gradient(
     for k in range(x.shape[1]):
         shift = np.zeros_like(out)
         shift[:, k] = step
-        here = shift if moves else shift * unmoved[:, None]
-        there = shift * unmoved[:, None] if moves else shift
-        ahead = evaluate(x + here, x0 + there)
-        behind = evaluate(x - here, x0 - there)
+        present = shift if moves else shift * unmoved[:, None]
+        reference = shift * unmoved[:, None] if moves else shift
+        ahead = evaluate(x + present, x0 + reference)
+        behind = evaluate(x - present, x0 - reference)
         out[:, k] = (ahead - behind) / (2 * step)
     return out
 
@@ -161,14 +161,14 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
 
 
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
-    held = other.prescribes_velocity
+    by_nodes = other.prescribes_velocity
     return {
         "other": other,
-        "points": "all nodes around " * held + plural(len(ids), "point"),
+        "points": "all nodes around " * by_nodes + plural(len(ids), "point"),
         "axes": " and ".join(f"v{AXES[k]}" for k in axes),
-        "more": HELD * held,
+        "more": HELD * by_nodes,
         "apart": "nodes that these points do not see"
-        if held
+        if by_nodes
         else "groups that have no points in common",
     }
 
@@ -187,18 +187,18 @@ def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -
     return bool((np.abs(a - b) > small).any())
 
 
-def _within(simulation: Any, held: Any, driven: Any) -> np.ndarray:
+def _within(simulation: Any, support: Any, driven: Any) -> np.ndarray:
     """Return the ids of the driven points in cells whose corners are all held."""
     hub, method = simulation.hub, simulation.hub.update.method
-    still = np.zeros(held.group.total(), np.bool_)
-    still[held.nodes] = True
+    still = np.zeros(support.group.total(), np.bool_)
+    still[support.nodes] = True
     ids = simulation.points.members(driven.group)
     x = hub.fields.position[ids] if method.frame.moves else places_before(hub, ids)
     caught = np.zeros(len(ids), np.bool_)
     for solid in hub.solids.values():
         lattice = hub.lattices[method.lattice_of(hub, solid)]
-        own = np.flatnonzero(hub.fields.solid[ids] == solid.index)
-        caught[own] = still[lattice.around(lattice.cells_of(x[own]), (0, 1))].all(axis=0)
+        rows = np.flatnonzero(hub.fields.solid[ids] == solid.index)
+        caught[rows] = still[lattice.around(lattice.cells_of(x[rows]), (0, 1))].all(axis=0)
     return ids[caught]
 
 

@@ -145,16 +145,16 @@ class Method:
         n, d = half.shape
         unit = np.eye(d)
         parts = [np.empty((n, 0))]
-        for part in basis.traits.shape:
-            if part == "corners":
+        for field in basis.traits.shape:
+            if field == "corners":
                 corners = _corners(basis.element, solid)
                 parts.append(corners.reshape(n, corners.shape[1] * d))
-            elif part == "half_edges":
+            elif field == "half_edges":
                 parts.append((half[:, :, None] * unit).reshape(n, d * d))
-            elif part == "deformation":
+            elif field == "deformation":
                 parts.append(np.tile(unit.ravel(), (n, 1)))
             else:
-                parts.append(getattr(solid, part))
+                parts.append(getattr(solid, field))
         return np.concatenate(parts, axis=1)
 
     def _lattice(

@@ -60,8 +60,8 @@ class Convected(Method):
                 hint=f"one of {', '.join(fit)} in its place" if fit
                 else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
             )  # fmt: skip
-        own = {n: v.element for n, v in VARIANTS.items() if v.dimension == d}
-        boxes = [n for n, other in own.items() if other is None or other.box]
+        elements = {n: v.element for n, v in VARIANTS.items() if v.dimension == d}
+        boxes = [n for n, other in elements.items() if other is None or other.box]
         for solid in solids:
             has = f"elements of the kind {solid.shape}"
             if solid.shape == "box":
@@ -69,7 +69,7 @@ class Convected(Method):
                 hint = f"a mesh of triangles or tetrahedra, or one of the shapes {', '.join(boxes)}"
             else:
                 fits = element is not None and element.kind == solid.shape
-                fit = [n for n, other in own.items() if other and other.kind == solid.shape]
+                fit = [n for n, other in elements.items() if other and other.kind == solid.shape]
                 hint = f"{fit[0]} instead of {name}" if fit else "a mesh of linear elements"
             if not fits:
                 raise ScriptError(

@@ -25,11 +25,13 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 def fields(hub: Hub) -> list[int]:
     """Return the velocity field of each solid; solids that are glued together have the same."""
-    found: dict[str, int] = {}
+    numbers: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
-        found[solid.id] = max(found.values(), default=-1) + 1 if other is None else found[other.id]
-    return list(found.values())
+        numbers[solid.id] = (
+            max(numbers.values(), default=-1) + 1 if other is None else numbers[other.id]
+        )
+    return list(numbers.values())
 
 
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
@@ -136,13 +138,13 @@ class ULMPMContacts(Method):
             return nodes
         of = np.array(fields(hub))
         solids = list(hub.solids.values())
-        found = nodes
+        united = nodes
         for k, lattice in enumerate(hub.lattices[: max(of, default=-1) + 1]):
             places = np.concatenate([solids[i].x0 for i in np.flatnonzero(of == k)])
             cells = np.unique(lattice.cells_of(places), axis=0)
             if np.isin(lattice.around(cells, range(2)), nodes).all():
-                found = np.union1d(found, lattice.around(cells, range(-1, 3)))
-        return found
+                united = np.union1d(united, lattice.around(cells, range(-1, 3)))
+        return united
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         """Return the tag of contact where the fields of two solids meet."""
@@ -219,9 +221,9 @@ class ULMPMContacts(Method):
     def check(self, hub: Hub) -> None:
         """Refuse two coefficients of friction for a pair of velocity fields."""
         super().check(hub)
-        known: dict[frozenset, Fix] = {}
+        by_pair: dict[frozenset, Fix] = {}
         for pair, fix in self._rubbing(hub):
-            other = known.setdefault(frozenset(pair), fix)
+            other = by_pair.setdefault(frozenset(pair), fix)
             if other is not fix:
                 first, second = (solid.id for solid in fix.solids)
                 line = f" (line {other.place.line})" if other.place else ""

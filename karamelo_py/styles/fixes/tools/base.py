@@ -45,9 +45,9 @@ class ToolFix(PointForces):
         return np.array([formula.evaluate(self.hub.values) for formula in formulas])
 
     def of_time(self, name: str, formulas: Sequence[Expression]) -> tuple[Expression, ...]:
-        found = per_direction(self.hub, name, formulas, all_given=True)
-        self.now(*found)
-        return found
+        components = per_direction(self.hub, name, formulas, all_given=True)
+        self.now(*components)
+        return components
 
     def from_place(
         self, points: PointsView | PointTable, place: Sequence[Expression]

@@ -76,15 +76,20 @@ class MeldTool(ToolFix):
 
     def depth_of(self, points: PointTable) -> np.ndarray:
         _, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
-        height, q, own, _ = self._seen(points, c1, c2, theta, lo)
-        ways = height, hi - lo - height, Rmax - np.linalg.norm(q, axis=1), abs(own).max(axis=1) - w
+        height, q, rotated, _ = self._seen(points, c1, c2, theta, lo)
+        ways = (
+            height,
+            hi - lo - height,
+            Rmax - np.linalg.norm(q, axis=1),
+            abs(rotated).max(axis=1) - w,
+        )
         return np.min(ways, axis=0)
 
     def forces(self, points: PointsView) -> np.ndarray:
         K, w, c1, c2, theta, lo, hi, Rmax = self.now(*self.numbers)
-        height, q, own, turn = self._seen(points, c1, c2, theta, lo)
+        height, q, rotated, turn = self._seen(points, c1, c2, theta, lo)
         r = np.linalg.norm(q, axis=1)
-        inward = (np.clip(own, -w, w) - own) @ turn
+        inward = (np.clip(rotated, -w, w) - rotated) @ turn
         outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
         # Ways out (n, 3): into the channel, radially, below; and their lengths.
         ways = np.zeros((3, len(r), 3))
