@@ -91,7 +91,6 @@ def delete_compute(hub: Hub, ID: str) -> None:
 
 
 def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
-    """Make a fix or a compute and publish its values."""
     catalogue, others = (hub.fixes, hub.computes) if kind == "fix" else (hub.computes, hub.fixes)
     _refuse_wrong_order(kind, ID, style, arguments)
     with signature.in_new_words(kind, ID, style, arguments):

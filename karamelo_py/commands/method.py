@@ -366,7 +366,6 @@ class _Call:
         return word is None or isinstance(self.hub.interpreter.variables.get(word), float)
 
     def _words(self, *families: str) -> list[str]:
-        """Words that some of the styles accept."""
         words = []
         for family in families:
             words += [w for p in signature.parameters(self.styles[family]) for w in p.kind.words]
@@ -405,7 +404,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """The word of `known` that an argument names; a variable of that name is ignored."""
+    """The word of `words` that an argument names; a variable of that name is ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

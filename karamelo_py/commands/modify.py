@@ -114,14 +114,12 @@ def _changed(hub: Hub, entry: MaterialPart, values: dict, numbers: tuple) -> Mat
 
 
 def _now(value: Any, changed: dict) -> Any:
-    """Return the new value of a value, perhaps a part or several."""
     if isinstance(value, tuple):
         return tuple(_now(one, changed) for one in value)
     return changed.get(value, value) if isinstance(value, MaterialPart) else value
 
 
 def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument, ...]) -> None:
-    """Refuse changes that existing points cannot follow."""
     if any(solid.material is before for solid in hub.solids.values()):
         names = ", ".join((argument.keyword() or ("",))[0] for argument in numbers)
         if specific_volume(after.law) != specific_volume(before.law):

@@ -27,7 +27,6 @@ class Solids(tuple):
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> "Solids":
-        """Return the solids that `argument` names."""
         if ALL in (argument.text, argument.word()):
             return cls(hub.solids.values())
         return cls((Solid.from_script(hub, argument),))

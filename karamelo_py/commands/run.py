@@ -222,7 +222,6 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
 
 
 def _check(command: str, condition: Expression) -> None:
-    """Refuse a condition that never changes, or differs from point to point."""
     if per_point := condition.names & set(POINT_SEEDS):
         raise ScriptError(
             f"the condition depends on {min(per_point)}, which differs from point to point",

@@ -42,7 +42,6 @@ class Argument:
 
     @property
     def statement(self) -> Any:
-        """The present statement of the script."""
         return self._interpreter.statement
 
     def __repr__(self) -> str:
@@ -50,7 +49,6 @@ class Argument:
 
     @property
     def is_null(self) -> bool:
-        """Tell if it is the word NULL."""
         return self.text == NULL
 
     def word(self) -> str | None:
@@ -119,7 +117,6 @@ class Argument:
             raise
 
     def behind(self, count: int) -> Argument:
-        """Remove the first `count` characters."""
         return self._from(self._raw.start + count)
 
     def _from(self, start: int, end: int | None = None) -> Argument:
@@ -127,7 +124,6 @@ class Argument:
         return Argument(Raw(self._raw.source, start, end), self._interpreter)
 
     def numbers(self) -> list[str]:
-        """List the variables that are numbers."""
         variables = self._interpreter.variables.items()
         return [name for name, value in variables if isinstance(value, float)]
 
@@ -162,7 +158,6 @@ class Named:
 
     @classmethod
     def from_script(cls, hub: Any, argument: Argument) -> Any:
-        """Find the part that `argument` names."""
         return look_up(getattr(hub, cls.catalogue), argument)
 
 

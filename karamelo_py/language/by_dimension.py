@@ -41,7 +41,6 @@ class Forms:
         self.open_ends = open_ends or {}
 
     def line(self, dimension: int) -> str:
-        """Format the call for `dimension`."""
         names = ", ".join(self.names[dimension])
         return self.pattern.format(dimension=dimension, names=names)
 

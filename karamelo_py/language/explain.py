@@ -135,7 +135,6 @@ def swapped(
 def misfit(
     parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
 ) -> ScriptError:
-    """Make the error for an argument that is of another kind."""
     which = f"argument {number} '{parameter.name}'" if number else f"'{parameter.name}'"
     family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
     if family and NUMBER.fullmatch(argument.text):

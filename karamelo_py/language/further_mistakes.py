@@ -96,7 +96,6 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     dependents = Dependents()
 
     def follows(error: ScriptError) -> bool:
-        """Tell if an error is a consequence of an earlier one."""
         if error.code == "unknown-ID":
             # The second of two equal IDs was meant to be another; and other programs name things
             # differently.
@@ -206,7 +205,6 @@ def _look_up(
 
 
 def _rest_of(interpreter: Any) -> list[Statement]:
-    """List the remaining statements, up to the end of the script."""
     rest = iter(interpreter.next_statement, None)
     return list(takewhile(lambda statement: statement.raw.code.strip() != "quit", rest))
 

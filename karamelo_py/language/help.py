@@ -25,7 +25,6 @@ class Help:
 
     @property
     def example(self) -> str:
-        """Lines of script."""
         return self.sections.get("Example", "")
 
 

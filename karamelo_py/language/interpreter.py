@@ -60,13 +60,11 @@ class Interpreter:
     # -- execution --------------------------------------------------------------------------------
 
     def run_file(self, path: str | Path) -> None:
-        """Execute a script file."""
         path = Path(path)
         self.files.append(path)
         self._run(read_script(path), str(path), path)
 
     def run_text(self, text: str, name: str = "<text>") -> None:
-        """Execute a script given as text."""
         self._run(text, name)
 
     @property
@@ -123,7 +121,6 @@ class Interpreter:
             self.files_ahead = other.files
 
     def _copy(self, hub: Any) -> "Interpreter":
-        """Copy the position in the script, on another hub."""
         other = Interpreter(hub, self.presets)
         other.variables = dict(self.variables)
         other.files = list(self.files)
@@ -133,7 +130,6 @@ class Interpreter:
 
     @property
     def folder(self) -> Path:
-        """Folder of the script in progress."""
         paths = (frame.path.parent for frame in reversed(self.frames) if frame.path)
         return next(paths, self.hub.folder)
 
@@ -318,7 +314,6 @@ class Interpreter:
     # -- expressions ------------------------------------------------------------------------------
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
-        """Evaluate an expression to a number, a text or a formula."""
         return evaluation.evaluate(node, raw, self)
 
     def knows(self, name: str) -> bool:
@@ -328,11 +323,9 @@ class Interpreter:
         )
 
     def hides(self, name: str) -> bool:
-        """Tell if a variable hides a function or command of this name."""
         return name in self.variables
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value:
-        """Return the value of a name in an expression."""
         if name in self.variables:
             return self.variables[name]
         if name in SEEDS:
@@ -353,7 +346,6 @@ class Interpreter:
         )
 
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
-        """Return the value of a command called in an expression."""
         name = node.name
         begin = raw.start + node.start
         place = raw.source.place(begin, begin + len(name))

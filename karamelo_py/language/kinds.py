@@ -44,7 +44,6 @@ NonNegative = Constraint("of at least 0", lambda value: value >= 0)
 
 
 def AtLeast(least: float) -> Constraint:
-    """Require a number of at least `least`."""
     return Constraint(f"of at least {least:g}", lambda value: value >= least)
 
 
@@ -73,7 +72,6 @@ class InputFile:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
-        """Read the path of the file."""
         name = _file_name(argument)
         folders = argument._interpreter.folders
         if path := next((f / name for f in folders if (f / name).is_file()), None):
@@ -105,7 +103,6 @@ class OutputFile:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Path:
-        """Read the path of the file."""
         name = _file_name(argument)
         path = hub.folder / name
         encoding = sys.getfilesystemencoding()

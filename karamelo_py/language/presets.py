@@ -71,12 +71,10 @@ class Presets(dict[str, str]):
                 self._texts[name] = statement.right.code.strip()
 
     def follow(self, statement: Assignment) -> None:
-        """Record how a script uses them."""
         if self:
             self._made_of[statement.name] = self._in(statement.right.code)
 
     def _in(self, code: str) -> dict[str, None]:
-        """Presets that some code depends on."""
         words = re.findall(_WORD, re.sub(r'"[^"]*"', " ", code))
         return {name: None for word in words for name in self._made_of.get(word, ())}
 

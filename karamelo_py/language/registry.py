@@ -59,7 +59,6 @@ def _origin(entry: EntryPoint) -> str:
 
 
 def families() -> list[str]:
-    """List all families, such as command, fix, region."""
     return [family for family in _families() if family != "engine"]
 
 
@@ -154,7 +153,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """The same for a statement whose first argument is an ID, not the style."""
+    """As `find`, for a statement whose first argument is an ID, not the style."""
     if not knows(family, name) and knows(family, ID):
         raise ScriptError(
             f"'{ID}' is a style, and the ID comes first",
@@ -187,7 +186,6 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
 
 
 def foreign() -> list[tuple[str, str]]:
-    """List the styles of other packages used so far."""
     return [key for key, style in _loaded.items() if not style.__module__.startswith(PREFIX)]
 
 

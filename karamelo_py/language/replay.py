@@ -35,7 +35,6 @@ class Record:
     values: dict[int, list[float]] = field(default_factory=dict)
 
     def note(self, value: float) -> None:
-        """Record the result of a call of value(...) in the last statement."""
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
     def forget_from(self, number: int) -> None:
@@ -60,7 +59,6 @@ class Replay:
 
     @property
     def at_end(self) -> bool:
-        """Tell if the present statement is the last of the record."""
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:

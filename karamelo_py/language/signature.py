@@ -246,7 +246,6 @@ def _bind(
 
 
 def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
-    """Convert an argument, with this index, to the value of a parameter."""
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
         raise explain.misfit(parameter, argument, number, Unfit(NULL))
     try:
@@ -281,7 +280,6 @@ _HOMES = {"transfer": "method", "basis": "method"}
 
 
 def syntax(target: Callable, name: str) -> str:
-    """Format the line that shows how a command or style is called."""
     form = getattr(target, "syntax", None)
     if not isinstance(form, str):
         form = _joined(documented(target))

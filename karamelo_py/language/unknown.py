@@ -29,7 +29,6 @@ MEANINGS = {
 
 
 def unknown_statement(script: Any, name: str) -> ScriptError:
-    """Make the error for a statement that is just an unknown name."""
     meaning = "quit" if name.lower() in ("exit", "stop", "end") else name
     words = ["quit", *registry.names("command"), *script.variables]
     message = f"'{name}' is neither a command nor a variable"
@@ -39,7 +38,6 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
 
 
 def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
-    """Make the error for a call of an unknown command or function."""
     commands = registry.names("command")
     kind = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
@@ -62,14 +60,12 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
 
 
 def no_value(name: str, place: Any) -> ScriptError:
-    """Make the error for a command without a value in an expression."""
     message, hint = f"{name}(...) gives no value", f"{name}(...) goes on a separate line"
     expected = "a function, or a command that gives a value, such as value(...)"
     return ScriptError(message, place=place, expected=expected, hint=hint)
 
 
 def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
-    """Make the error for a name in an expression."""
     kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
         expected = "a number or formula; NULL, INF and EDGE are arguments by themselves"
@@ -134,14 +130,12 @@ def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None
 
 
 def _publishing(script: Any) -> Iterator[tuple[str, str, Any]]:
-    """Yield the fixes and computes of a scene: kind, ID and object."""
     for catalogue in (script.hub.fixes, script.hub.computes):
         for ID, item in catalogue.items():
             yield catalogue.kind, ID, item
 
 
 def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
-    """Make the error for a value that the fix or compute of this ID does not publish."""
     for kind, ID, item in _publishing(script):
         if name in (ID, f"{ID}_{name[-1]}"):
             names = [f"{ID}_{s}" if s else ID for s in item.published]
@@ -186,7 +180,6 @@ def _needs(script: Any, name: str, other: str) -> bool:
 
 
 def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
-    """Make the error for a `name` that is defined later."""
     ID = re.sub(r"_[^_]+$", "", name)
     assigned = script.statement.name if isinstance(script.statement, Assignment) else ""
     for statement, kind, made, line in _ahead(script, back=1):
@@ -209,7 +202,6 @@ def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
 
 
 def check_name(name: str) -> None:
-    """Refuse to assign a name with another meaning."""
     kinds = {
         "a logical operator": name in ("and", "or", "not"),
         MEANINGS.get(name, ""): name in MEANINGS,
@@ -264,7 +256,6 @@ OWN_NAMES = {"T0": ("T0", "Tr", "Troom"), "Tm": ("Tm", "Tmelt", "Tmelting")}
 
 
 def words_of(statement: Any) -> list[str]:
-    """List the arguments of a call, as written."""
     arguments = statement.arguments if isinstance(statement, CommandCall) else ()
     return [" ".join(argument.code.split()) for argument in arguments]
 
@@ -302,7 +293,7 @@ def filled(statement: Any) -> str | None:
 
 
 def longer(name: str, arguments: Sequence[Any]) -> str | None:
-    """Complete the line of a style (`name`: ``eos shock``) that was `given` fewer arguments."""
+    """Complete the line of a style (`name`: ``eos shock``) that got fewer arguments."""
     forms = table()["shorter"].get(name)
     if forms is None or not arguments:
         return None

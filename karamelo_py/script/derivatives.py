@@ -8,7 +8,6 @@ ZERO, ONE = constant(0.0), constant(1.0)
 
 
 def is_number(term: Term, value: float) -> bool:
-    """Return True if a formula is this constant."""
     return term.operation == "number" and term.value == value
 
 
@@ -80,7 +79,6 @@ def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
 
 
 def replaced(root: Term, by: Mapping[str, Term]) -> Term:
-    """Put formulas for names."""
     results: dict[int, Term] = {}
     for term in in_order(root):
         if term.operation == "name":

@@ -141,7 +141,6 @@ def render_message(
 
 
 def _marked(place: Place) -> list[str]:
-    """Format the source line and the carets below the marked word."""
     text, start = place.text.rstrip(), place.column - 1
     length = max(place.length, 1)
     if len(text) > _WIDEST_LINE:
@@ -193,7 +192,7 @@ def plural(count: float, noun: str) -> str:
 def unknown(
     message: str, name: str, names: Iterable[str], hint: str | None = None, **where: Any
 ) -> ScriptError:
-    """Make the error for a `name` that is not `known`; `where` gives the place."""
+    """Make the error for a `name` that is none of `names`; `where` gives the place."""
     names = list(names)
     few = nearest_few(name, names)
     return ScriptError(

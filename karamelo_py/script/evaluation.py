@@ -44,7 +44,6 @@ def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
 
 
 def mark(raw: syntax.Raw, node: syntax.Node) -> Any:
-    """Return the place of `node`, a part of `raw`."""
     return raw.source.place(raw.start + node.start, raw.start + node.end)
 
 
@@ -105,7 +104,6 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
 
 
 def usage(name: str) -> str:
-    """Format how a function is called."""
     operands = {"if": "condition, a, b", "atan2": "y, x", "min": "a, b, ...", "max": "a, b, ..."}
     return f"{name}({operands.get(name) or ('a, b' if FUNCTIONS[name].least == 2 else 'a')})"
 
@@ -141,7 +139,6 @@ _DOMAINS = {
 def _impossible(
     operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw, error: Exception
 ) -> ScriptError:
-    """Make the error for an operation on constants that has no result."""
     operands = _operands(node)
     shown = ", ".join(f"{value:g}" for value in values)
     if isinstance(error, ZeroDivisionError) or (operation in ("^", "pow") and values[0] == 0):

@@ -44,7 +44,6 @@ class Expression:
 
     @classmethod
     def from_script(cls, hub: Any, argument: Any) -> Expression:
-        """Read the expression from a script argument."""
         value = argument.value(hub)
         if isinstance(value, str):
             raise ScriptError(
@@ -53,7 +52,6 @@ class Expression:
         return cls(value)
 
     def minus(self, other: Expression) -> Expression:
-        """Return the difference as a formula."""
         return Expression(terms.applied("-", self._term, other._term))
 
     @property
@@ -62,7 +60,6 @@ class Expression:
 
     @property
     def is_constant(self) -> bool:
-        """Tell if it is a constant number."""
         return not self._term.names
 
     @property

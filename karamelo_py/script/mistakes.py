@@ -121,27 +121,22 @@ class _Stop(NamedTuple):
 
     @property
     def last(self) -> Any:
-        """The previous token, or None."""
         return self.before[-1] if self.before else None
 
     @property
     def kind(self) -> str:
-        """The type of the token at this position."""
         return _type(self.here)
 
     @property
     def opened(self) -> list[int]:
-        """Positions of open parentheses."""
         return [t.start_pos for t in self.stack if _type(t) == "LPAR"]
 
     @property
     def after_call(self) -> bool:
-        """Tell if everything before is one call."""
         types = [_type(part) for part in self.stack]
         return types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR" and types.count("LPAR") == 1
 
     def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
-        """Make a mistake that marks this position."""
         return Mistake(message, self.start, self.end, expected, hint)
 
 

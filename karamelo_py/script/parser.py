@@ -19,7 +19,6 @@ _WRITTEN = (
 
 
 def read_script(path: Path) -> str:
-    """Read the text of a script file."""
     try:
         return reading.read_text(path)
     except IsADirectoryError:
@@ -77,7 +76,6 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
 
 
 def parse_expression(raw: syntax.Raw) -> syntax.Node:
-    """Parse an expression."""
     try:
         return _tree(raw.code)
     except Mistake as mistake:

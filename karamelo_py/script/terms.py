@@ -123,12 +123,10 @@ def evaluated(root: Term, value_of: Callable[[str], float]) -> float:
 
 
 def constant(value: float) -> Term:
-    """Make a constant term."""
     return Term("number", (), float(value))
 
 
 def applied(operation: str, *operands: Term) -> Term:
-    """Make an operation on terms."""
     return Term(operation, operands, None)
 
 
@@ -304,7 +302,6 @@ class _Writer:
         return kept
 
     def program(self) -> formula.Program:
-        """Write the program."""
         for k in range(len(self.terms)):
             if k in self.kept:
                 self._write(k)

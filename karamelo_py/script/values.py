@@ -66,7 +66,6 @@ class Values:
         self._of[ID] = slots
 
     def slot(self, name: str) -> int:
-        """Return the slot of `name`; KeyError if it is not published."""
         return self._slots[name]
 
     def names(self) -> list[str]:
@@ -77,11 +76,9 @@ class Values:
         return name in self._slots
 
     def get(self, name: str) -> float:
-        """Return the present value of `name`; KeyError if it is not published."""
         return float(self.array[self.slot(name)])
 
     def set(self, name: str, value: float) -> None:
-        """Set the value of `name`; KeyError if it is not published."""
         self.array[self.slot(name)] = value
 
     def _reserve(self, count: int) -> int:

@@ -24,7 +24,6 @@ VANISHED = 1e-9  # of the largest norm of the exact values so far: less is round
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
-    """A column of points, (n,), displacements included."""
     if name in DISPLACEMENTS:
         return points.particle(name[1]) - points.particle(name[1] + "0")
     return points.particle(name)
@@ -87,7 +86,6 @@ class Norm:
         return np.vstack([weight * sizes**self.power, weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
-        """Return the norms (2,) of differences and exact values, from sums and some maxima."""
         if self.kind == "max":
             return np.max([np.zeros(2), *largest], axis=0)
         mean = sums[:2] / sums[2] if sums[2] else np.zeros(2)

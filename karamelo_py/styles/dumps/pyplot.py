@@ -226,7 +226,6 @@ class PyPlot(Dump):
         return Snapshot(update.step, update.time, columns, domain.lo, domain.hi)
 
     def _chosen(self, table: PointTable, names: Iterable[str]) -> list[np.ndarray]:
-        """Return columns of the points of a table that are drawn."""
         of = self.formula
         columns = [
             of.of(table) if of and name == of.text else table.particle(name) for name in names

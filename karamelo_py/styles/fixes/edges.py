@@ -243,7 +243,6 @@ class EdgeFix(OnEdge, PointForces):
         self.region = region
 
     def loads(self, faces: Faces) -> np.ndarray:
-        """Return the force (m, d) on each face."""
         raise NotImplementedError
 
     def forces(self, points: PointsView) -> np.ndarray:

@@ -70,5 +70,4 @@ class Erosion(Fix):
         return True
 
     def meeting(self, points: PointTable) -> np.ndarray | None:
-        """Return the numbers of the points in a table that meet the condition."""
         return points.numbers[self.condition.holds(points)] if points.count else None

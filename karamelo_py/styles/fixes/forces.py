@@ -157,7 +157,6 @@ class PointForces(Fix):
         raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
-        """Apply the forces to the points, and publish the sum."""
         force = self.forces(points)
         points.force = points.force + force
         self.publish_components(points.total(force))

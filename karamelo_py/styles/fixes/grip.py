@@ -39,7 +39,6 @@ class Gripping(Fix):
     mu = 0.0
 
     def rubs(self, hub: Hub, mu: float) -> None:
-        """Set a coefficient of friction."""
         judge_friction(hub, mu)
         self.mu = mu
         if mu > 0:

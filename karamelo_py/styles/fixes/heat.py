@@ -100,7 +100,6 @@ class TemperatureNodes(HeatFix):
         self._compare(T)
 
     def defined(self) -> None:
-        """Warn of walls outside the domain."""
         if self.hub.domain.h is not None:
             self.group.warn_past_domain()
 
@@ -150,7 +149,6 @@ class FacesOfPoints(HeatFix):
     by_sizes = True
 
     def defined(self) -> None:
-        """Print the area that the group covers."""
         hub, d = self.hub, self.hub.domain.dimension
         if hub.rehearsing or d == 1 or not len(self.group):
             return

@@ -76,7 +76,6 @@ class PairContact(Gripping):
         raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
-        """Find the touching pairs and apply their forces."""
         simulation, total = self.hub.simulation, np.zeros(3)
         kin, blocks = simulation.kin, simulation.setup.blocks
         rows = self._near(simulation)
@@ -128,7 +127,6 @@ class PairContact(Gripping):
 
     @staticmethod
     def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
-        """Numbers, masses, radii, positions and velocities of some points, and their grip."""
         kin, x = simulation.kin, block.points.x[simulation.now]
         table = np.empty((len(rows), 3 + 2 * kin.dimension))
         pairs.collect(kin, x, block.points, block.laws, rows, table)

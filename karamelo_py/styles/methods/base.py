@@ -27,7 +27,6 @@ def publish_loads(hub: Hub, solid: Solid) -> None:
 
 
 def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
-    """Return the published slots of the force and torque on a solid."""
     return [hub.values.slot(f"{load}_{solid.id}_x") for load in LOADS]
 
 
@@ -112,7 +111,6 @@ class Method:
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
-        """Return the number of the grid of the points of a solid."""
         return 0
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:

@@ -185,7 +185,6 @@ class ULMPMContacts(Method):
         )
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Update friction and prescribed nodes from the fixes."""
         contact.friction[:] = 0
         contact.pair[:] = -1
         for (a, b), fix in self._rubbing(hub):
