@@ -1,4 +1,4 @@
-"""karamelo-py styles and karamelo-py help: list and explain commands and styles."""
+"""karamelo-py styles and karamelo-py help."""
 
 import inspect
 import re
@@ -16,19 +16,18 @@ from karamelo_py.script.errors import ScriptError, codes, meant, table
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
 HELP_USAGE = "karamelo-py help COMMAND, karamelo-py help STYLE, or karamelo-py help FAMILY STYLE"
-_WIDEST = 88  # running text in longer lines is hard to read
+_WIDEST = 88  # characters of a line of text
 
 
 # ---- contents -----------------------------------------------------------------------------------
 
 
 def families() -> list[str]:
-    """List families of styles: commands first, then by name."""
+    """List families of styles, commands first."""
     return sorted(registry.families(), key=lambda family: (family != COMMAND, family))
 
 
 def help_of(family: str, name: str) -> Help:
-    """Collect the help for a command or style."""
     target = registry.find(family, name)
     try:
         return describe(target, name if family == COMMAND else f"{family} {name}")
@@ -40,7 +39,7 @@ def help_of(family: str, name: str) -> Help:
 
 
 def describe_parameter(parameter: Parameter) -> str:
-    """Kind and default of a parameter, in words: ``a number above 0, 0.9 when left out``."""
+    """Describe kind and default: ``a number above 0, 0.9 when left out``."""
     if parameter.kind.text == "anything":  # interpreted by the command or style
         return ""
     family = parameter.kind.family
@@ -62,12 +61,12 @@ def describe_parameter(parameter: Parameter) -> str:
 # ---- the two commands ---------------------------------------------------------------------------
 
 
-def print_styles(given: Sequence[str]) -> int:
-    """List commands and styles, or a family, with their packages; return the exit status."""
-    if len(given) > 1:
-        raise ScriptError(f"too many arguments: {' '.join(given)}", expected=STYLES_USAGE)
+def print_styles(words: Sequence[str]) -> int:
+    """List commands and styles, or a family; return the exit status."""
+    if len(words) > 1:
+        raise ScriptError(f"too many arguments: {' '.join(words)}", expected=STYLES_USAGE)
     page = _Page()
-    for index, family in enumerate([_family(given[0])] if given else families()):
+    for index, family in enumerate([_family(words[0])] if words else families()):
         if index:
             page.say()
         page.say(_plural(family), "bold")
@@ -75,16 +74,16 @@ def print_styles(given: Sequence[str]) -> int:
     return 0
 
 
-def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
+def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
     """Explain a name, or a family and a name; return the exit status."""
-    if len(given) == 2 and (family := _singular(given[0])) in families():
+    if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
             with registry.modules_of(Path.cwd()):
-                return _explain(family, given[1])
+                return _explain(family, words[1])
         except ScriptError as error:
-            if error.hint or not _about(" ".join(given)):
+            if error.hint or not _about(" ".join(words)):
                 raise
-    name = " ".join(given)
+    name = " ".join(words)
     homes = [family for family in families() if registry.knows(family, name)]
     if COMMAND in homes or len(homes) == 1:
         return _explain(homes[0], name)
@@ -97,23 +96,25 @@ def print_help(given: list[str], commands: Iterable[str] = ()) -> int:
         return print_styles([name])
     if name in codes():
         return _explain_code(name, codes()[name]["title"], codes()[name]["text"])
-    # Of three or more words, one may be superfluous.
-    fewer = [" ".join(given[:k] + given[k + 1 :]) for k in range(len(given) * (len(given) > 2))]
+    # One of three or more words may be superfluous.
+    fewer = [" ".join(words[:k] + words[k + 1 :]) for k in range(len(words) * (len(words) > 2))]
     said = next(filter(_about, [name, *fewer]), name)
-    found, related = _arguments(name), _about(said)
-    known = [words for _, *words in rules.known_failures() if rules.code_of(words[0]) == name]
-    for about, reason, cure in known[:1]:
+    arguments, related = _arguments(name), _about(said)
+    failures = [words for _, *words in rules.known_failures() if rules.code_of(words[0]) == name]
+    for about, reason, cure in failures[:1]:
         _explain_code(name, f"known failure: {about}", f"{reason}.\n\nFix: {cure}")
-    if found:
-        _explain_argument(name, found)
+    if arguments:
+        _explain_argument(name, arguments)
     if related:
         page = _Page()
-        page.say("\nSee also" if found or known else f"Commands and styles about {said}", "bold")
+        page.say(
+            "\nSee also" if arguments or failures else f"Commands and styles about {said}", "bold"
+        )
         page.rows([(f"{family} {style}", family, style) for family, style in related])
-    if found or related or known:
+    if arguments or related or failures:
         return 0
-    if len(given) > 1 and meant(given[0], families()):
-        raise _unknown("family", given[0], families())
+    if len(words) > 1 and meant(words[0], families()):
+        raise _unknown("family", words[0], families())
     names = {n for f in families() for n in registry.names(f)}
     raise _unknown("command or style", name, names.union(commands))
 
@@ -133,7 +134,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """Return the family that a word means: fixes, Fix and fix are the same."""
+    """Return the family of a word: fixes, Fix and fix are the same."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -143,18 +144,18 @@ def _plural(family: str) -> str:
     return {"basis": "bases", "eos": "eos"}.get(family, usual)
 
 
-def _unknown(what: str, name: str, known: Iterable[str]) -> ScriptError:
-    known, called = sorted(known), table()["columns"].items()
-    said = (f"the column {c} of dumps and pictures" for c, w in called if name.lower() in w)
+def _unknown(noun: str, name: str, names: Iterable[str]) -> ScriptError:
+    names, columns = sorted(names), table()["columns"].items()
+    meanings = (f"the column {c} of dumps and pictures" for c, w in columns if name.lower() in w)
     return ScriptError(
-        f"unknown {what} '{name}'",
-        expected="one of " + ", ".join(known) if what == "family" else HELP_USAGE,
-        hint=next(said, None) or meant(name, known) or "karamelo-py styles lists them all",
+        f"unknown {noun} '{name}'",
+        expected="one of " + ", ".join(names) if noun == "family" else HELP_USAGE,
+        hint=next(meanings, None) or meant(name, names) or "karamelo-py styles lists them all",
     )
 
 
 def _summary(family: str, name: str) -> tuple[str, bool]:
-    """Return the summary line of a style, and whether it is broken."""
+    """Return the summary of a style, and whether it is broken."""
     try:
         target = registry.find(family, name)
     except ScriptError as error:
@@ -192,44 +193,44 @@ def _explain(family: str, name: str) -> int:
 
 
 def _about(word: str) -> list[tuple[str, str]]:
-    """Find commands and styles by parts of their name, then by summary, else by text."""
+    """Find styles by a part of their name, then by summary, else by text."""
     topics = {like: topic for topic, alike in table()["topics"].items() for like in alike}
     word = topics.get(word.lower(), word)
-    words = [part for part in word.split() if len(part) > 2] or [word]  # drops a, of, ...
+    words = [part for part in word.split() if len(part) > 2] or [word]  # without a, of, ...
     sought = [re.escape(topics.get(part.lower(), part)) for part in words]
     begins = [re.compile(rf"(?<![^\W_]){part}", re.IGNORECASE) for part in sought]
-    found: list[list[tuple[str, str]]] = [[], [], [], []]
+    matches: list[list[tuple[str, str]]] = [[], [], [], []]
     for family in families():
         for name in registry.names(family):
             summary, broken = _summary(family, name)
             text = "" if broken else registry.find(family, name).__doc__ or ""
-            said = name, f"{name} {summary}", f"{name} {text}"
-            places = (k for k in range(3) if all(each.search(said[k]) for each in begins))
-            found[next(places, 3)].append((family, name))
-    return found[0] + found[1] or found[2]
+            texts = name, f"{name} {summary}", f"{name} {text}"
+            levels = (k for k in range(3) if all(each.search(texts[k]) for each in begins))
+            matches[next(levels, 3)].append((family, name))
+    return matches[0] + matches[1] or matches[2]
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
-    """Find arguments with this name, or with this word as a value, by command or style."""
-    found = {}
+    """Find arguments named by this word, else with this value, by style."""
+    parameters = {}
     for family in families():
         for name in registry.names(family):
-            with suppress(ScriptError):  # errors of broken plug-ins do not matter here
+            with suppress(ScriptError):  # broken plug-ins
                 help_ = help_of(family, name)
                 for parameter in help_.parameters:
                     if word == parameter.name or word in parameter.kind.words:
-                        found[help_.name] = parameter
-    return {owner: p for owner, p in found.items() if p.name == word} or found
+                        parameters[help_.name] = parameter
+    return {owner: p for owner, p in parameters.items() if p.name == word} or parameters
 
 
-def _explain_argument(word: str, found: dict[str, Parameter]) -> None:
-    """Print the longest explanation of an argument, and list other places."""
+def _explain_argument(word: str, parameters: dict[str, Parameter]) -> None:
+    """Print the longest explanation of an argument, and other places."""
     page = _Page()
-    owner, parameter = max(found.items(), key=lambda item: len(item[1].description))
+    owner, parameter = max(parameters.items(), key=lambda item: len(item[1].description))
     page.say(word, "bold")
     page.say()
     of = f"{parameter.name}, an argument of " if word != parameter.name else "an argument of "
-    page.paragraph(of + ", ".join(found))
+    page.paragraph(of + ", ".join(parameters))
     page.say()
     page.paragraph(describe_parameter(parameter), indent=6)
     page.paragraph(parameter.description, indent=6)
@@ -241,7 +242,7 @@ def _explain_argument(word: str, found: dict[str, Parameter]) -> None:
 
 
 class _Page(Console):
-    """Writes to standard output, bold and coloured on a terminal."""
+    """Standard output, bold and coloured on a terminal."""
 
     def _write(self, text: str) -> None:
         super()._write(text)
@@ -249,12 +250,11 @@ class _Page(Console):
             raise BrokenPipeError  # nothing else to finish
 
     def heading(self, text: str) -> None:
-        """Write a heading."""
         self.say()
         self.say(text, "bold")
 
     def paragraph(self, text: str, indent: int = 0) -> None:
-        """Write running text, wrapped; empty lines separate paragraphs."""
+        """Write wrapped text; empty lines separate paragraphs."""
         width = min(self._rich.width if self.terminal else _WIDEST, _WIDEST) - indent
         for index, part in enumerate(text.replace("``", "").split("\n\n") if text else ()):
             if index:
@@ -263,7 +263,6 @@ class _Page(Console):
                 self.say(" " * indent + line)
 
     def rows(self, listed: Sequence[tuple[str, str, str]]) -> None:
-        """Write names with origin and summary of each style."""
         origins = [registry.origin(family, name) for _, family, name in listed]
         widths = [max(map(len, column), default=0) for column in ([s for s, *_ in listed], origins)]
         for (shown, family, name), origin in zip(listed, origins, strict=True):

@@ -29,7 +29,7 @@ from karamelo_py.output import record
 from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
 from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
-if TYPE_CHECKING:  # these take most of the start-up time
+if TYPE_CHECKING:  # slow imports
     from karamelo_py.scene.hub import Hub
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
@@ -53,11 +53,9 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line; return the exit status."""
     arguments = list(sys.argv[1:] if argv is None else argv)
     launch.keep_to_oneself()
-    # Signals that batch systems send to end the program; mpiexec handles them for several
-    # processes.
+    # Signals of batch systems; mpiexec handles them for several processes.
     unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
     with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = launch.outcome_of(
@@ -69,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _end(number: int, _: Any) -> NoReturn:
-    # All open files are consistent: they get their names when complete.
+    # All open files are consistent.
     os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
     os._exit(SIGNALLED + number)
 
@@ -79,8 +77,7 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# Subcommands in separate modules, imported on demand: DESCRIPTION, add_options(parser) and
-# run(options), which returns the exit status.
+# Subcommands with DESCRIPTION, add_options(parser) and run(options), imported on demand.
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
@@ -92,7 +89,7 @@ ELSEWHERE = {
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
     "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }
-OPTIONS = ("gpu", "ranks", "live", "threads")  # of run, as listed by help
+OPTIONS = ("gpu", "ranks", "live", "threads")  # of run
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
 
@@ -125,22 +122,24 @@ def _dispatch(arguments: list[str]) -> int:
         arguments = _one_file(arguments)
     parser, commands = _parser(arguments[0])
     choice = commands.choices.get(arguments[0])
-    known = choice.options() if choice else []
-    arguments = _values_below_zero(arguments, known)
-    # argparse takes -o for -out; two hyphens have no short forms, either.
-    begins = [w for w in arguments if w[:1] == "-" != w[1:2] and w[1:].isalpha() and w not in known]
-    if short := [w for w in begins if any(option.startswith(w) for option in known)]:
+    options_of = choice.options() if choice else []
+    arguments = _values_below_zero(arguments, options_of)
+    # argparse would take -o for -out.
+    begins = [
+        w for w in arguments if w[:1] == "-" != w[1:2] and w[1:].isalpha() and w not in options_of
+    ]
+    if short := [w for w in begins if any(option.startswith(w) for option in options_of)]:
         raise _surplus(arguments, short[:1], choice)
     try:
         options, surplus = parser.parse_known_args(arguments)
-    except SystemExit:  # argparse has printed the help
+    except SystemExit:  # after help
         return 0
     except ScriptError as error:
         # A missing option may be misspelt.
-        known = commands.choices[arguments[0]].options()
-        odd = [word for word in arguments if word[:1] == "-" and word not in known]
-        said = (f"{word}: {near}" for word in odd if (near := meant(word, known)))
-        error.hint = error.hint or next(said, None)
+        options_of = commands.choices[arguments[0]].options()
+        odd = [word for word in arguments if word[:1] == "-" and word not in options_of]
+        hints = (f"{word}: {near}" for word in odd if (near := meant(word, options_of)))
+        error.hint = error.hint or next(hints, None)
         raise
     if surplus:
         raise _surplus(arguments, surplus, commands.choices.get(arguments[0], parser))
@@ -153,27 +152,27 @@ def _dispatch(arguments: list[str]) -> int:
             )
         return launch.ERROR
     options.command_line = arguments
-    if options.act is not _run:  # run imports more before it begins
+    if options.act is not _run:  # run imports more first
         begun()
     return options.act(options)
 
 
 def begun() -> None:
-    """Turn on Python's garbage collector again, for new objects only."""
+    """Turn the garbage collector on, for new objects only."""
     if not gc.isenabled():
         gc.freeze()
         gc.enable()
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Take the last of the files after -restart, if a shell has expanded a pattern."""
+    """Choose the last of the files that a shell has put after -restart."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
-        if before in VARIABLE and (given := re.fullmatch(r"([^\W\d]\w*)=(.+)", word)):
+        if before in VARIABLE and (assignment := re.fullmatch(r"([^\W\d]\w*)=(.+)", word)):
             raise ScriptError(
                 f"-var takes a name and a value, with a blank between them, not {word}",
-                hint=f"-var {given[1]} {given[2]}",
+                hint=f"-var {assignment[1]} {assignment[2]}",
             )
         unnumbered = [re.sub(r"\d+", "#", name) for name in (word, before)]
         if chosen[-2:-1] and chosen[-2] in RESTART and unnumbered[0] == unnumbered[1]:
@@ -184,11 +183,11 @@ def _one_file(arguments: list[str]) -> list[str]:
 
 
 def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
-    """Put a blank before values such as -1e6 or -E/2, which argparse takes for options."""
+    """Put a blank before values such as -1e6, which argparse takes for options."""
 
     def is_value(k: int) -> bool:
         if re.match(r"-\.?\d", arguments[k]):
-            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])  # argparse recognises these
+            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])  # argparse knows these
         return (
             k > 1
             and arguments[k][:1] == "-" != arguments[k][1:2]
@@ -201,7 +200,7 @@ def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
 
 
 def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> ScriptError:
-    """Make the error for surplus words on a command line."""
+    """Make the error for surplus words."""
     command = arguments[0]
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
@@ -210,16 +209,16 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
             expected="--ranks for a script (karamelo-py SCRIPT --ranks N), check or bench",
         )
     close = nearest(option, parser.options()) if option else None
-    same = table()["options"].get((option or "").rstrip("0123456789"))
-    if same in parser.options():
-        close = same + " N" * (same != "--only")
+    alias = table()["options"].get((option or "").rstrip("0123456789"))
+    if alias in parser.options():
+        close = alias + " N" * (alias != "--only")
     close = close or next(
         (known for known in parser.options() if known.startswith(option or "?")), None
     )
     hint = f"did you mean {close}?" if close else None
     value = words[words.index(option) + 1 :] if option in words else []
     if (
-        same is None
+        alias is None
         and not (close and SequenceMatcher(None, option, close).ratio() > 0.75)
         and option
         and option[1:].isidentifier()
@@ -237,18 +236,16 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
 
 
 class CommandLine(argparse.ArgumentParser):
-    """A command line that reports errors in our format."""
+    """A command line with errors in our format."""
 
     def __init__(self, **options: Any):
         usual = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
         super().__init__(**(usual | options))
 
     def options(self) -> list[str]:
-        """List all words that start an option."""
         return [word for action in self._actions for word in action.option_strings]
 
     def plain_usage(self) -> str:
-        """Format the usage without the word 'usage'."""
         return self.format_usage().removeprefix("usage: ").rstrip()
 
     def error(self, message: str) -> NoReturn:
@@ -263,7 +260,7 @@ class CommandLine(argparse.ArgumentParser):
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:
-    """Make the command line and its subparsers; only those of `command` are complete."""
+    """Make the parsers; only that of `command` is complete."""
     parser = CommandLine(
         prog="karamelo-py",
         usage=USAGE,
@@ -333,11 +330,11 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
     explain = add("help", lambda o: _catalogue().print_help(o.words, COMMANDS), summary, HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
-        found = import_module(module) if name == command else None
-        added = add(name, found and found.run, summary)
-        if found:
-            added.description = found.DESCRIPTION
-            found.add_options(added)
+        command_module = import_module(module) if name == command else None
+        added = add(name, command_module and command_module.run, summary)
+        if command_module:
+            added.description = command_module.DESCRIPTION
+            command_module.add_options(added)
     return parser, commands
 
 
@@ -351,7 +348,7 @@ def _run(options: argparse.Namespace) -> int:
         command = "karamelo-py check" if options.checking else "karamelo-py"
         raise ScriptError("no script is named", expected=f"{command} SCRIPT")
     if launched()[0] > 1 and not options.checking:
-        with leaving_at_once():  # before the processes are connected
+        with leaving_at_once():  # before MPI
             import_module("karamelo_py.scene.hub")
         return launch.together(
             options.ranks, lambda comm: _carry_out(options, script, comm), debugging=options.debug
@@ -367,7 +364,6 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = None) -> int:
-    """Run a script; return the exit status."""
     with leaving_at_once():
         import numpy as np
 
@@ -377,7 +373,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.lower.card import use_card
         from karamelo_py.scene.hub import Hub
     begun()
-    # The program's errors replace NumPy's warnings.
+    # The program reports errors instead of NumPy.
     np.seterr(over="ignore", invalid="ignore", divide="ignore")
     hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads
@@ -401,8 +397,8 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.checkpoint.restart_file import Restart
 
         hub.restart = Restart(options.restart, options.out)
-        given, presets = presets, hub.restart.presets(presets)
-        if taken := [f"{name} = {text}" for name, text in presets.items() if name not in given]:
+        before, presets = presets, hub.restart.presets(presets)
+        if taken := [f"{name} = {text}" for name, text in presets.items() if name not in before]:
             hub.console.say(f"{', '.join(taken)} taken from {hub.restart.path}, as -var had it")
     interpreter, restart, finished = Interpreter(hub, presets=presets), hub.restart, False
     interpreter.replay = restart and restart.replay()
@@ -432,7 +428,6 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
 
 
 def _direct(hub: Hub, options: argparse.Namespace) -> None:
-    """Set where the files of a scene go."""
     if options.out is not None:
         if not hub.checking or options.out.exists():
             make_folder(options.out, "-out {}")
@@ -456,7 +451,7 @@ def _direct(hub: Hub, options: argparse.Namespace) -> None:
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """Warn of a script without a run command if it makes a scene."""
+    """Report that a script has no run command."""
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:

@@ -1,8 +1,8 @@
 """karamelo-py --ranks N: mpiexec starts the processes; they report and end as one.
 
 Each process reports over a socket to the `Launcher`, the process started by the user. Rank 0 gets
-the terminal (or redirected output) and the signals; the others report only what rank 0 cannot know.
-Output of mpiexec is shown only if no process was started.
+the terminal and the signals; the others report only what rank 0 cannot know. Output of mpiexec is
+shown only if no process was started.
 """
 
 import errno
@@ -32,17 +32,16 @@ if TYPE_CHECKING:
     from karamelo_py.scene.hub import Hub
 
 ERROR = 1
-# Operating system errors about disks and permissions, which are no fault of the program.
+# Errors of disks and permissions, no fault of the program.
 OF_THE_SYSTEM = tuple(
     getattr(errno, name)
     for name in ("ENOSPC", "EDQUOT", "EROFS", "EFBIG", "EIO", "EACCES", "EPERM", "EMFILE", "ENFILE",
                  "ESTALE")
     if hasattr(errno, name)
 )  # fmt: skip
-# Socket on which the launcher waits for reports.
+# Name of the launcher's socket.
 SOCKET = "KARAMELO_PY_LAUNCHER"
-# Settings of Open MPI: more processes than cores are allowed, processes have their own threads,
-# waiting processes yield, and root in a container may run.
+# Open MPI: more processes than cores, own threads, waiting processes yield, root in a container.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -50,21 +49,21 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-# Large pages for allocations, on Linux where enabled on request: NumPy requests them for new
-# arrays, not for growing ones. Four processes of a million points run 10 % faster.
+# Large pages on Linux: NumPy requests them for new arrays, not for growing ones. Four processes of
+# a million points run 10 % faster.
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 PAUSE = 0.05  # seconds between polls of mpiexec
-GRACE = 2.0  # seconds for processes to end after it
-AT_ONCE = 3  # signals that end all without waiting for the step
-LONGEST_FOLDER = 70  # of a socket, whose name must be short
-A_CORE = 16  # processes per core at most; more is a mistake
-# Seconds that a failed process waits for the others before it ends them: rank 0 reports the
-# error, others only what it does not know.
+GRACE = 2.0  # seconds for processes to end after mpiexec
+AT_ONCE = 3  # signals that end all at once
+LONGEST_FOLDER = 70  # characters; names of sockets must be short
+A_CORE = 16  # processes per core; more is a mistake
+# Seconds that a failed process waits before it ends the others: rank 0 reports the error, others
+# what only they know.
 PATIENCE, LONGER = 2.0, 6.0
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
-    """Run a function; return its exit status, and a message still to be printed."""
+    """Run a function; return its exit status, and a message to be printed."""
     try:
         return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
@@ -74,9 +73,9 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int,
 def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED, render_message("error", "interrupted")
-    # Rich converts it to a SystemExit.
+    # Rich makes it a SystemExit.
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-        # The reader of our output has gone; files stay.
+        # The reader of our output has gone.
         sys.stderr.close()
         return ERROR, ""
     if debugging:
@@ -85,7 +84,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
 
 
 def rendered(error: BaseException) -> str:
-    """Format an exception for the user, without a traceback even for faults of the program."""
+    """Format any exception for the user, without a traceback."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
@@ -104,7 +103,7 @@ def rendered(error: BaseException) -> str:
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
-    """Run a program on this number of local processes; return the exit status."""
+    """Run a program on this number of processes; return the exit status."""
     cores = os.cpu_count() or 1
     if ranks > A_CORE * cores:
         raise ScriptError(
@@ -134,11 +133,11 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
 
 
 class Launcher:
-    """The processes of a run as one: signals, exit status, final message."""
+    """The processes of a run as one: signals, exit status, message."""
 
     def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
-        self.links: dict[socket.socket, dict[str, Any]] = {}  # empty until they report their rank
+        self.links: dict[socket.socket, dict[str, Any]] = {}  # empty until the rank is known
         self.reports: dict[int, dict[str, Any]] = {}
         self.lost: list[dict[str, Any]] = []  # ended without a report, in order
         self.over = False  # rank 0 has finished
@@ -146,12 +145,11 @@ class Launcher:
         self.process: Any = None
 
     def run(self) -> int:
-        """Start the processes and wait for them; return the exit status."""
         with socket.socket(socket.AF_UNIX) as self.door, mpi.handled_signals(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
-            # A separate session, so that Ctrl-C reaches this process only.
+            # A separate session: Ctrl-C reaches this process only.
             self.process = subprocess.Popen(
                 self.command, env=environment, stdin=subprocess.DEVNULL, stdout=self.said,
                 stderr=self.said, start_new_session=True,
@@ -161,7 +159,7 @@ class Launcher:
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
-            for one in filter(None, self.links.values()):  # mpiexec has ended, but they have not
+            for one in filter(None, self.links.values()):  # left over by mpiexec
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
         status = self._outcome()
@@ -174,7 +172,7 @@ class Launcher:
     def _pass_on(self, number: int, _: Any) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
-        for one in filter(None, self.links.values()):  # the others would wait for a stopped one
+        for one in filter(None, self.links.values()):  # a stopped one would be waited for
             with suppress(ProcessLookupError):
                 os.kill(one["pid"], signal.SIGCONT)
         if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
@@ -209,7 +207,7 @@ class Launcher:
     # --- when they have ended ---------------------------------------------------------------------
 
     def _outcome(self) -> int:
-        """Determine the exit status, and report what no process could."""
+        """Determine the exit status; report what no process could."""
         first = self.reports.get(0)
         failed = [one for _, one in sorted(self.reports.items()) if one["status"]]
         if first is not None and first["status"]:
@@ -238,13 +236,13 @@ class Launcher:
         who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended{by}"
         if self.over:
             return render_message("error", f"{who} when the runs were over: all files are complete")
-        told = sent in mpi.ENDING
-        hint = None if told else "the system does that to who takes too much memory"
+        signalled = sent in mpi.ENDING
+        hint = None if signalled else "the system does that to who takes too much memory"
         who += ", and the run with it: files are complete up to there"
         return render_message("error", who, hint=hint)
 
     def _words(self) -> str:
-        """Read the output of mpiexec, which includes messages of C libraries."""
+        """Read the output of mpiexec, with messages of C libraries."""
         self.said.seek(0)
         return self.said.read().decode(errors="replace").strip()
 
@@ -255,23 +253,23 @@ class Launcher:
 
 def _received(link: socket.socket) -> bytes:
     """Read available data; close the link if the other end is closed."""
-    found = b""
+    data = b""
     with suppress(OSError):
         while part := link.recv(1 << 16):
-            found += part
-            if found.endswith(b"\n"):
-                return found
+            data += part
+            if data.endswith(b"\n"):
+                return data
     link.close()
-    return found
+    return data
 
 
 # ---- one of the processes -----------------------------------------------------------------------
 
-_link: socket.socket | None = None  # to the launcher, if that started this process
+_link: socket.socket | None = None  # to the launcher
 
 
 def keep_to_oneself() -> None:
-    """Silence all processes but rank 0, and connect rank 0 to its launcher."""
+    """Silence all ranks but 0, and connect it to its launcher."""
     size, rank = mpi.launched()
     if size > 1:
         _report_to_launcher(rank)
@@ -280,7 +278,7 @@ def keep_to_oneself() -> None:
 
 
 def _report_to_launcher(rank: int) -> None:
-    """Report this process to the launcher; rank 0 gets output streams and signals."""
+    """Report this process to the launcher; rank 0 gets streams and signals."""
     global _link
     name = os.environ.pop(SOCKET, None)
     if name is None:
@@ -290,7 +288,7 @@ def _report_to_launcher(rank: int) -> None:
         link.connect(name)
         link.sendall(_line(rank=rank, pid=os.getpid()))
         if rank == 0:
-            # Output of libraries to the standard streams is left to mpiexec.
+            # Libraries still write to mpiexec.
             out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
             sys.stdout = sys.__stdout__ = out
             sys.stderr = sys.__stderr__ = err
@@ -302,12 +300,12 @@ def _report_to_launcher(rank: int) -> None:
 
 
 def _stream(fd: int) -> TextIO:
-    usual = sys.__stderr__  # escapes what it cannot encode
+    usual = sys.__stderr__  # escapes unknown characters
     return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)
 
 
 def _heed(link: socket.socket) -> None:
-    """Receive signals from the launcher; if that is gone, end the run."""
+    """Receive signals from the launcher; end the run if that is gone."""
     with suppress(OSError):
         while number := link.recv(1):
             os.kill(os.getpid(), number[0])
@@ -319,14 +317,13 @@ def _line(**message: Any) -> bytes:
 
 
 def _report(**message: Any) -> None:
-    """Send a message to the launcher, if there is one."""
     if _link is not None:
         with suppress(OSError):
             _link.sendall(_line(**message))
 
 
 def has_terminal() -> bool | None:
-    """False if mpiexec pretends that this process writes to a terminal."""
+    """False if mpiexec pretends that output is a terminal."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
@@ -350,20 +347,20 @@ def together(asked: int | None, run: Callable[[Any], int], *, debugging: bool = 
         sys.stdout.flush()
         if not stays:
             comm.abort(status)
-        # mpiexec would comment on a status, and the launcher has it.
+        # mpiexec comments on a status; the launcher has it.
         return 0 if _link is not None and comm is not None else status
 
     status, text = outcome_of(act, debugging=debugging)
     if comm is None:
         end(status, text, tells=rank == 0, stays=True)
-        if status == INTERRUPTED:  # the others are starting: they would be waited for
+        if status == INTERRUPTED:  # others are still starting
             os._exit(status)
         return status
     if comm.parted:
         return end(status, text, tells=True, stays=True)
     patience = inf
     if not status and rank == 0:
-        _report(over=True)  # then wait for the others
+        _report(over=True)  # before waiting for the others
     if status:
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or comm.failed_within:

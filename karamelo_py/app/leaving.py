@@ -1,12 +1,11 @@
 """Exit with a message if the program is interrupted during its imports.
 
-An interrupt within an import may surface as any error; nothing is open yet, so the program just
-ends.
+An interrupt within an import may surface as any error. Nothing is open yet.
 """
 
 import os
 
-SIGNALLED = 128  # exit status of a shell for a signal: this plus its number
+SIGNALLED = 128  # exit status for a signal: this plus its number
 INTERRUPTED = SIGNALLED + 2
 
 
@@ -15,19 +14,19 @@ def _leave(*_):
     os._exit(INTERRUPTED)
 
 
-# No more imports here: until `leaving_at_once` is active, Python reports an interrupt.
+# No import before `leaving_at_once`: Python would report an interrupt.
 try:
     import signal
 except KeyboardInterrupt:
     _leave()
 
 
-STUDY = "KARAMELO_PY_STUDY"  # process number of the study that started this run
-_DEATH_SIGNAL = 1  # of Linux's prctl: signal sent when the parent ends
+STUDY = "KARAMELO_PY_STUDY"  # pid of the study
+_DEATH_SIGNAL = 1  # of prctl: signal at the parent's end
 
 
 def end_with(study: int) -> None:
-    """End this run when its study ends, for whatever reason (Linux)."""
+    """End this run when its study ends (Linux)."""
     import ctypes
     import sys
 
@@ -36,19 +35,19 @@ def end_with(study: int) -> None:
     ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     try:
         os.kill(study, 0)
-    except ProcessLookupError:  # it has ended already
+    except ProcessLookupError:  # ended
         os._exit(SIGNALLED + signal.SIGKILL)
     except OSError:
         pass
 
 
 class leaving_at_once:
-    """Let Ctrl-C end the program immediately, during imports."""
+    """Let Ctrl-C end the program at once, during imports."""
 
     def __enter__(self) -> None:
         try:
             self.before = signal.signal(signal.SIGINT, _leave)
-        except ValueError:  # not in the main thread, which gets signals
+        except ValueError:  # not the main thread
             self.before = None
 
     def __exit__(self, *_) -> None:

@@ -1,4 +1,4 @@
-"""Options of several subcommands: variables, numbers, folders."""
+"""Options of several subcommands."""
 
 import argparse
 from pathlib import Path
@@ -14,18 +14,17 @@ class _Variable(argparse.Action):
     """A variable and its value; each variable once."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option: Any = None) -> None:
-        given = getattr(namespace, self.dest)
-        for name, value in given:
+        pairs = getattr(namespace, self.dest)
+        for name, value in pairs:
             if name == values[0]:
                 raise ScriptError(
                     f"-var {name} is given twice, {value} and {values[1]}",
                     expected="each variable once",
                 )
-        setattr(namespace, self.dest, [*given, (values[0], values[1].strip())])
+        setattr(namespace, self.dest, [*pairs, (values[0], values[1].strip())])
 
 
 def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add the option that sets script variables."""
     parser.add_argument(
         *VARIABLE, nargs=2, action=_Variable, default=[], metavar=("NAME", "VALUE"),
         help=text,
@@ -33,7 +32,7 @@ def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def threads_option(text: str) -> int | None:
-    """Read the value of --threads: a number, or None for auto."""
+    """Read --threads: a number, or None for auto."""
     if text == "auto":
         return None
     if not text.isdecimal() or int(text) < 1:
@@ -42,14 +41,12 @@ def threads_option(text: str) -> int | None:
 
 
 def positive(text: str) -> int:
-    """Read a positive integer."""
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"'{text}' is not a whole number of at least 1")
     return int(text)
 
 
 def above_zero(text: str) -> float:
-    """Read a number above 0."""
     try:
         value = float(text)
     except ValueError:
@@ -60,7 +57,7 @@ def above_zero(text: str) -> float:
 
 
 def make_folder(folder: Path, option: str) -> None:
-    """Make a folder for the files of a scene, if needed, for an `option` such as -out {}."""
+    """Make a folder for files, for an `option` such as -out {}."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Read logs of earlier runs; karamelo-py plot draws their columns."""
+"""Read logs of earlier runs; karamelo-py plot."""
 
 import argparse
 import csv
@@ -32,13 +32,13 @@ def read_text(path: Path, expected: str | None = None) -> str:
 
 
 def read_rows(path: Path) -> list[dict[str, float]]:
-    """Read the rows of a log, by column; words, such as what limits the step, are NaN.
+    """Read the rows of a log by column; words are NaN.
 
     Lines that begin with # rename the columns. A line cut off by a killed run is skipped.
     """
     names: list[str] = []
     rows = []
-    # A line without a line end may be cut: 2.4 of 2.4e+10.
+    # A line without an end may be cut: 2.4 of 2.4e+10.
     lines = read_text(path).rpartition("\n")[0].splitlines()
     for cells in filter(
         None, csv.reader(lines) if path.suffix == ".csv" else map(str.split, lines)
@@ -56,9 +56,9 @@ def read_rows(path: Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Read the columns of a log in a folder; empty if it cannot be read.
+    """Read the columns of a folder's log; empty if it cannot be read.
 
-    If columns change between runs, all rows of each column.
+    Columns that change between runs have all their rows.
     """
     try:
         rows = read_rows(folder / name)
@@ -69,7 +69,6 @@ def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the subcommand."""
     parser.add_argument("log", metavar="LOG", type=Path)
     parser.add_argument("columns", metavar="Y", nargs="*", help="columns to draw")
     parser.add_argument("-x", help="column to draw over (default: Time, or Step)")
@@ -85,7 +84,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw as requested; return the exit status."""
     if not options.log.exists() and not options.log.suffix:
         raise ScriptError(
             f"there is no log {options.log}",
@@ -93,16 +91,16 @@ def run(options: argparse.Namespace) -> int:
             hint=f"karamelo-py plot log.mpm {options.log}",
         )
     rows = read_rows(options.log / "log.mpm" if options.log.is_dir() else options.log)
-    known = list(dict.fromkeys(name for row in rows for name in row))
+    columns = list(dict.fromkeys(name for row in rows for name in row))
     if not options.columns and not options.right:
-        print(" ".join(known))
+        print(" ".join(columns))
         return 0
     picture_format(options.output)
     if options.x is None:
-        options.x = "Step" if "Time" not in known and "Step" in known else "Time"
+        options.x = "Step" if "Time" not in columns and "Step" in columns else "Time"
     for name in (options.x, *options.columns, *options.right):
-        if name not in known:
-            raise unknown(f"{options.log} has no column '{name}'", name, known)
+        if name not in columns:
+            raise unknown(f"{options.log} has no column '{name}'", name, columns)
     curves, scale = [], "log" if options.log_scale else "linear"
     for side, names in (("left", options.columns), ("right", options.right)):
         for name in names:

@@ -10,14 +10,13 @@ from karamelo_py.app.leaving import STUDY, end_with, leaving_at_once
 def main() -> int:
     """Run the command line; return the exit status.
 
-    The garbage collector is off during start-up, where its repeated searches of all modules took
-    half the time of a small scene.
+    Without the garbage collector, whose searches took half the time of a small scene.
     """
     gc.disable()
     _open_what_is_closed()
     if study := os.environ.pop(STUDY, ""):
         end_with(int(study))
-    # In load steps, threads of OpenBLAS would mostly wait for each other.
+    # Threads of OpenBLAS would wait for each other in load steps.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with leaving_at_once():
         from karamelo_py.app.cli import main as command
@@ -25,10 +24,7 @@ def main() -> int:
 
 
 def _open_what_is_closed() -> None:
-    """Redirect closed standard streams, as by >&- in a shell, to nowhere.
-
-    Otherwise the next opened file would get their descriptors.
-    """
+    """Redirect closed standard streams to nowhere, or files would get their descriptors."""
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(handle)

@@ -1,4 +1,4 @@
-"""karamelo-py view: pictures or a movie from the dumps of an earlier run."""
+"""karamelo-py view: pictures or a movie from dumps."""
 
 import argparse
 import glob
@@ -43,7 +43,6 @@ DPI = 100
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of the subcommand."""
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path)
     parser.add_argument(
         *LIVE, action="store_true",
@@ -69,33 +68,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--size", nargs=2, type=_pixels, default=[600, 500], metavar=("WIDTH", "HEIGHT")
     )
     for word in _look_words():
-        said = word.description.replace("%", "%%")
+        description = word.description.replace("%", "%%")
         metavar = "|".join(word.kind.words) or word.name.upper()
-        parser.add_argument(f"--{word.name}", metavar=metavar, help=said)
+        parser.add_argument(f"--{word.name}", metavar=metavar, help=description)
     parser.add_argument("--fps", type=above_zero, default=25.0, help="frames per second of a movie")
 
 
 def _pixels(text: str) -> int:
-    """Read the width or height of a picture, as in dump pyplot."""
+    """Read a width or height, as in dump pyplot."""
     if not text.isdecimal() or not LEAST_PIXELS <= int(text) <= MOST_PIXELS:
-        said = f"'{text}' is no number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
-        raise argparse.ArgumentTypeError(said)
+        message = f"'{text}' is no number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
+        raise argparse.ArgumentTypeError(message)
     return int(text)
 
 
 def _look_words() -> list[Parameter]:
-    """List the options of dump pyplot that control the look."""
     return [word for word in help_of("dump", "pyplot").parameters if word.keyword]
 
 
 def run(options: argparse.Namespace) -> int:
-    """Draw as requested; return the exit status."""
     if options.live:
         return _live(options.files)
     movie = options.output.suffix.lower() in (".gif", ".mp4")
     (movie_format if movie else picture_format)(options.output)
     frames = Frames(options.fps)
-    # Sorted by number: 1000 comes after 999.
+    # By number: 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn, scene = 0, _scene(options)
     if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:
@@ -116,7 +113,7 @@ def run(options: argparse.Namespace) -> int:
             snapshot = chosen(snapshot)
             unit = snapshot.units.get("time", "")
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
-            # In file order, whatever the ids.
+            # In file order.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
             title = f"{look['title']}: " if look["title"] else ""
             tools = _tools(scene) if options.script and look["outlines"] else ()
@@ -138,9 +135,9 @@ def run(options: argparse.Namespace) -> int:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
     if look["outlines"] and options.script is None:
-        said = "dumps do not contain walls and tools: only solids are outlined"
+        message = "dumps do not contain walls and tools: only solids are outlined"
         hint = "--script FILE, the script of the run, shows its walls and tools, too"
-        print(render_message("note", said, hint=hint), file=sys.stderr)
+        print(render_message("note", message, hint=hint), file=sys.stderr)
     return 0
 
 
@@ -158,7 +155,7 @@ def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _scene(options: argparse.Namespace) -> Hub:
-    """Execute the script of the run without steps; without a script the scene is empty."""
+    """Execute the script without steps; without a script the scene is empty."""
     if options.script is None and options.var:
         raise ScriptError(
             f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
@@ -175,25 +172,36 @@ def _scene(options: argparse.Namespace) -> Hub:
 def _log_beside(
     file: Path, first: Snapshot, options: argparse.Namespace, scene: Hub
 ) -> dict[int, dict[str, float]]:
-    """Read the log in a dump's folder, by step, if a formula, the title or a tool may need it."""
+    """Read the log next to a dump, by step, if anything needs it."""
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
-    asked = re.findall(r"[^\W\d]\w*\b(?! *\()", " ".join(filter(None, formulas)))  # no calls
-    known = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
-    if known.issuperset(asked) and not (options.script and options.outlines):
+    names_used = re.findall(
+        r"[^\W\d]\w*\b(?! *\()", " ".join(filter(None, formulas))
+    )  # without calls
+    names_known = {
+        *first.columns,
+        *named_sets(scene),
+        "time",
+        "timestep",
+        "step",
+        "and",
+        "or",
+        "not",
+    }
+    if names_known.issuperset(names_used) and not (options.script and options.outlines):
         return {}
     rows = []
     for name in ("log.mpm", "log.csv"):
         with suppress(ScriptError):
             rows += [row for row in read_rows(file.parent / name) if "Step" in row]
     for name in filter(str.isidentifier, dict.fromkeys(name for row in rows for name in row)):
-        scene.interpreter.variables.pop(name, None)  # a formula's value is in the log
+        scene.interpreter.variables.pop(name, None)  # the log has its values
         if name not in scene.values and name not in KEYWORDS.values():
             scene.values.publish(name)
     return {int(row["Step"]): row for row in rows}
 
 
 def _tools(scene: Hub) -> list[Any]:
-    """List the walls and tools of all runs, at their present positions."""
+    """List walls and tools of all runs, at their present positions."""
     fixes = [part for part in dict.fromkeys(scene.in_runs) if isinstance(part, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
@@ -209,7 +217,6 @@ def _tools(scene: Hub) -> list[Any]:
 
 
 def _live(folders: list[Path]) -> int:
-    """Serve the page of a folder until interrupted."""
     from karamelo_py.app.live.folder import FolderPage
 
     if len(folders) > 1:
@@ -225,20 +232,19 @@ def _live(folders: list[Path]) -> int:
 
 def _matching(names: Iterable[Path]) -> set[Path]:
     """Expand names and patterns to files."""
-    found: set[Path] = set()
+    files: set[Path] = set()
     for name in names:
         is_pattern = glob.has_magic(str(name)) and not name.exists()
-        there = [Path(file) for file in glob.glob(str(name))] if is_pattern else [name]
-        if not there or name.is_dir():
-            hint = f"view '{name}/*.dump', or view --live {name}" if there else None
-            said, expected = f"no file matches {name}", "dumps of an earlier run"
-            raise ScriptError(said, expected=expected, hint=hint)
-        found.update(there)
-    return found
+        matches = [Path(file) for file in glob.glob(str(name))] if is_pattern else [name]
+        if not matches or name.is_dir():
+            hint = f"view '{name}/*.dump', or view --live {name}" if matches else None
+            message, expected = f"no file matches {name}", "dumps of an earlier run"
+            raise ScriptError(message, expected=expected, hint=hint)
+        files.update(matches)
+    return files
 
 
 def _all_in(files: Iterable[Path]) -> Iterator[Snapshot]:
-    """Yield the snapshots of several files in order."""
     return chain.from_iterable(map(read, files))
 
 
@@ -253,22 +259,22 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
     names = SimpleNamespace(
         particle_names=lambda: columns, shown_names=lambda: [*columns, *named_sets(scene)]
     )
-    none = SimpleNamespace(variables={})  # names of columns take precedence over script variables
+    none = SimpleNamespace(variables={})  # columns take precedence over variables
     hub = SimpleNamespace(fields=names, values=scene.values, interpreter=none)
     (field,) = (word for word in help_of("dump", "pyplot").parameters if word.name == "field")
     look = {}
     for word in [field, *_look_words()]:
         look[word.name] = word.default
         option = "column" if word is field else word.name
-        if (given := getattr(options, option)) is not None:
+        if (text := getattr(options, option)) is not None:
             if word.kind.text.startswith("a word"):
-                look[word.name] = given
+                look[word.name] = text
                 continue
-            (call,) = parse(f"view({given})", f"--{option}")
+            (call,) = parse(f"view({text})", f"--{option}")
             if len(call.arguments) != 1:
-                what = f"--{option} takes one value, not '{given}'"
-                raise ScriptError(what, expected=word.kind.text)
-            argument = Argument(Raw(Source(given, f"--{option}"), 0, len(given)), scene.interpreter)
+                message = f"--{option} takes one value, not '{text}'"
+                raise ScriptError(message, expected=word.kind.text)
+            argument = Argument(Raw(Source(text, f"--{option}"), 0, len(text)), scene.interpreter)
             look[word.name] = signature.convert(hub, word, argument)
     if look["title"] is not None:
         look["title"] = Caption(scene, look["title"], "--title")
@@ -278,14 +284,14 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
 def _chosen(
     look: dict[str, Any], scene: Hub, log: dict[int, dict[str, float]], snapshot: Snapshot
 ) -> Snapshot:
-    """Select the points to draw, and evaluate the formula that colours them as a column.
+    """Select the points to draw, and add the column of a colouring formula.
 
     Sets the scene to the time of the snapshot and the values of its log.
     """
     columns, field, only = snapshot.columns, look["field"], look["only"]
     values, row = scene.values, log.get(snapshot.step, {})
     for name in values.names():
-        values.set(name, row.get(name, np.nan))  # computed by a run only
+        values.set(name, row.get(name, np.nan))  # known to runs only
     values.set("time", snapshot.time)
     values.set("timestep", snapshot.step)
     formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
@@ -307,8 +313,8 @@ def _chosen(
     elif field in named_sets(scene):
         columns = {field: column(field)} | columns
     if only is not None:
-        held = only.holds(rows)
-        columns = {name: of[held] for name, of in columns.items()}
+        selected = only.holds(rows)
+        columns = {name: of[selected] for name, of in columns.items()}
     return snapshot._replace(columns=columns)
 
 
@@ -320,10 +326,10 @@ def _picture(
     scene: Hub,
     chosen: Callable[[Snapshot], Snapshot],
 ) -> Any:
-    """Make an empty picture for the first snapshot, with position and colours that fit all."""
+    """Make an empty picture with position and colours that fit all snapshots."""
     from karamelo_py.output import outlines, pictures
 
-    # A dump has zeros for unused directions.
+    # Unused directions are 0.
     dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
     if options.script is not None:
         has = [("dimension", scene.domain.dimension, dimension)]
@@ -335,7 +341,7 @@ def _picture(
                     f"the script has {plural(of_script, noun)}, the dump {of_dump:.0f}",
                     expected="the script of the run that has written the dump, and its -var",
                 )
-        dimension = scene.domain.dimension  # points of a 3D scene may all have z = 0
+        dimension = scene.domain.dimension  # points in 3D may all have z = 0
     first, field = chosen(first), look["field"]
     column = field.text if isinstance(field, ColumnFormula) else field
     if column is not None and column not in first.columns:
@@ -370,10 +376,10 @@ def _all(
     made_look: dict[str, Any],
     chosen: Callable[[Snapshot], Snapshot],
 ) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Find bounds of all snapshots, and limits of a column in them."""
+    """Return bounds of all snapshots, and limits of a column."""
     from karamelo_py.output.pictures import grown, in_window, within
 
-    corners, ends, there, left = [], [], 0, 0
+    corners, ends, count, left = [], [], 0, 0
     file_of: dict[int, Path] = {}
     for path, snapshot in ((file, one) for file in files for one in read(file)):
         if file_of.setdefault(snapshot.step, path) != path:
@@ -384,13 +390,13 @@ def _all(
             )
         corners.append((snapshot.lo, snapshot.hi))
         columns = in_window(chosen(snapshot).columns, made_look["window"])
-        there, left = there + len(snapshot.columns["x"]), left + len(columns["x"])
+        count, left = count + len(snapshot.columns["x"]), left + len(columns["x"])
         values = columns.get(column, np.empty(0))
         if made_look["log"]:
             values = np.log10(values[values > 0])
         values = within(values, made_look["quantile"])
         ends += [values.min(), values.max()] if len(values) else []
-    if there and not left:
+    if count and not left:
         ways = ("only", *(x + end for x in "xyz" for end in ("min", "max")))
         given = [f"--{way}" for way in ways if look[way] is not None]
         raise ScriptError(

@@ -1,8 +1,8 @@
-"""Workloads measured in separate processes: karamelo-py bench of several, and with --ranks.
+"""Workloads measured in separate processes: several of them, or with --ranks.
 
-So the memory left by earlier workloads does not affect the speed. This module is also the program
-of such a process: ``python -m karamelo_py.app.bench.apart``. It takes a `Measurement` in JSON as
-argument, writes results to a file, and ends when the process that started it closes its input.
+Memory left by earlier workloads would affect the speed. ``python -m karamelo_py.app.bench.apart``
+is the program of such a process: it gets a `Measurement` in JSON, writes results to a file, and
+ends when its parent closes its input.
 """
 
 import json
@@ -29,7 +29,7 @@ from karamelo_py.script.errors import ScriptError
 _SIGNALS = {one.value: one.name for one in signal.Signals}
 MODULE = "karamelo_py.app.bench.apart"
 COMMAND = (sys.executable, "-m", MODULE)
-# Default workloads with --ranks: those with a target for scaling.
+# Default workloads with --ranks.
 USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
 HEADING = (
     f"  {'processes x threads':<22}{'points':>9} {'million/s':>10} {'times one':>10} "
@@ -38,8 +38,6 @@ HEADING = (
 
 
 class Measurement(NamedTuple):
-    """Arguments of one measurement."""
-
     workload: str
     threads: int
     presets: dict[str, str]
@@ -47,15 +45,14 @@ class Measurement(NamedTuple):
     triad: float = 0.0  # memory bandwidth (bytes/s)
     debug: bool = False
     ranks: int = 1
-    scaling: bool = False  # requests a `Scaled`
-    file: str = ""  # for the results
+    scaling: bool = False  # measure a `Scaled`
+    file: str = ""  # of results
 
 
 # ---- one process --------------------------------------------------------------------------------
 
 
 def measured(part: Measurement) -> Measured | Solved:
-    """Measure a workload in this process."""
     workload = WORKLOADS[part.workload]
     simulation = measure.build(workload, part.threads, part.presets)
     return measure.measured(simulation, part.seconds, part.triad, workload.lead)
@@ -63,24 +60,24 @@ def measured(part: Measurement) -> Measured | Solved:
 
 def measured_apart(part: Measurement) -> Measured | Solved | int:
     """Measure a workload in a separate process; return its exit status if it failed."""
-    status, found = _found_apart(part)
-    if found:
-        return Solved(**found) if "stages" in found else Measured(**found)
+    status, results = _found_apart(part)
+    if results:
+        return Solved(**results) if "stages" in results else Measured(**results)
     if status == ERROR:
         return status
-    by = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"
-    raise ScriptError(f"{part.workload} could not be measured: its process was ended {by}")
+    end = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"
+    raise ScriptError(f"{part.workload} could not be measured: its process was ended {end}")
 
 
 def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
-    """Measure in separate processes; return their exit status and the results."""
+    """Measure in separate processes; return exit status and results."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(part._replace(file=str(file)))]
         if part.ranks > 1:
             status = launch(part.ranks, words, module=MODULE)
         else:
-            # A separate session: Ctrl-C reaches this process only, and the other ends with it.
+            # A separate session: Ctrl-C reaches this process only.
             with subprocess.Popen(
                 [*COMMAND, *words], stdin=subprocess.PIPE, start_new_session=True
             ) as process:
@@ -96,15 +93,15 @@ class Scaled(NamedTuple):
 
     ranks: int
     threads: int
-    weak: bool  # the scene grows with the number of processes
+    weak: bool  # weak scaling: the scene grows with `ranks`
     points: int
-    best: float  # particle-steps per second of the fastest repetition
-    exchange: float  # fraction of time that the least waiting process waits for others
-    imbalance: float  # mean fraction that the others wait longer
+    best: float  # best particle-steps per second
+    exchange: float  # fraction of time that the process with the least waits
+    imbalance: float  # mean fraction of longer waits
 
 
 def scaled(part: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
-    """Measure a workload with one process, with several or as many threads, then weak scaling."""
+    """Measure a workload with 1 and several processes and as many threads, then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
         yield measured_with_ranks(part._replace(ranks=n))
@@ -116,7 +113,7 @@ def scaled(part: Measurement, ranks: Sequence[int], available: int) -> Iterator[
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
-    """Return the variable setting for a scene with `times` the points."""
+    """Return the variable that gives a scene `times` the points."""
     d = int(re.search(r"dimension\((\d)", script)[1])
     name, value = re.search(r"^(N|coarser) = (\S+)$", script, re.M).groups()
     value = float(presets.get(name, value))
@@ -126,7 +123,6 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
 
 
 def measured_with_ranks(part: Measurement, *, weak: bool = False) -> Scaled:
-    """Measure a workload with several processes, started like a run."""
     status, found = _found_apart(part._replace(scaling=True))
     if not found:
         why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
@@ -137,12 +133,11 @@ def measured_with_ranks(part: Measurement, *, weak: bool = False) -> Scaled:
 
 
 def _share(part: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
-    """Measure as one of the processes of a `Scaled`."""
     workload = WORKLOADS[part.workload]
     simulation = measure.build(workload, part.threads, part.presets, comm)
     simulation.compile()
-    count, found = measure.repeated(simulation, part.seconds, workload.lead)
-    taken, waits = min(found, key=lambda one: one[0])
+    count, times = measure.repeated(simulation, part.seconds, workload.lead)
+    taken, waits = min(times, key=lambda one: one[0])
     least = float(np.min(waits))
     return {
         "points": simulation.count,
@@ -153,7 +148,7 @@ def _share(part: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
 
 
 def line(row: Scaled, one: Scaled) -> str:
-    """Format a line of the table: speeds, and ratios to one process."""
+    """Format a line of the table."""
     who = f"{row.ranks} x {row.threads}" + (" (larger)" if row.weak else "")
     shares = f"{'-':>9} {'-':>10}"
     if row.ranks > 1:
@@ -166,7 +161,6 @@ def line(row: Scaled, one: Scaled) -> str:
 
 
 def main() -> int:
-    """Measure according to the argument."""
     part = Measurement(*json.loads(sys.argv[1]))
     keep_to_oneself()
     if part.ranks > 1:
@@ -180,7 +174,6 @@ def main() -> int:
 
 
 def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
-    """Measure, and write the results on rank 0."""
     found = _share(part, comm) if part.scaling else measured(part)._asdict()
     if comm is None or comm.leads:
         Path(part.file).write_text(json.dumps(found), encoding="utf-8")

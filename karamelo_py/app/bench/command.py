@@ -1,7 +1,7 @@
 """karamelo-py bench: speed of this machine on known scenes.
 
-Speeds are of the fastest repetition. Compare them within one bench only, because machines are
-shared and clocks change.
+Speeds are of the fastest repetition. Compare them within one bench only: machines are shared and
+clocks change.
 """
 
 import json
@@ -37,7 +37,6 @@ workloads:
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options of the subcommand."""
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
     add_variables(parser, "set a variable of the scenes, such as N, their fineness")
     parser.add_argument(
@@ -65,22 +64,21 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Measure as requested; return the exit status."""
     for name in options.workloads:
         if name not in WORKLOADS:
             raise unknown(f"unknown workload '{name}'", name, WORKLOADS)
     usual = on_card.USUAL if options.gpu else apart.USUAL if options.ranks else list(WORKLOADS)
     chosen = options.workloads or usual
-    known = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
+    words_of = {name: set(re.findall(r"\w+", WORKLOADS[name].script)) for name in chosen}
     for variable, _ in options.var:
-        if not any(variable in words for words in known.values()):
+        if not any(variable in words for words in words_of.values()):
             raise ScriptError(
                 f"-var {variable}: no scene has a variable '{variable}'", expected="N or coarser"
             )
     out = out_file(options.o, ".json") if options.o else None
     earlier = read(options.against) if options.against else None
     if options.gpu:
-        return _on_card(options, chosen, known, out, earlier)
+        return _on_card(options, chosen, words_of, out, earlier)
     from numba import config
 
     available = config.NUMBA_NUM_THREADS
@@ -88,9 +86,9 @@ def run(options: Namespace) -> int:
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
     about = {"commit": commit(), "threads": threads, "triad": triad, "seconds": options.seconds}
-    found: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
+    record: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
     for name in chosen:
-        presets = {n: value for n, value in options.var if n in known[name]}
+        presets = {n: value for n, value in options.var if n in words_of[name]}
         part = apart.Measurement(name, threads, presets, options.seconds, triad, options.debug)
         if options.ranks:
             one = _scaling(part, options.ranks, available)
@@ -101,25 +99,24 @@ def run(options: Namespace) -> int:
                 return measured
             _print(name, measured, published=not presets)
             one = measured.record()
-        found["workloads"][name] = {"title": WORKLOADS[name].title, "variables": presets, **one}
+        record["workloads"][name] = {"title": WORKLOADS[name].title, "variables": presets, **one}
         if out:
-            write_whole(out, json.dumps(found, indent=1) + "\n")
-    return _ended(found, earlier, out)
+            write_whole(out, json.dumps(record, indent=1) + "\n")
+    return _ended(record, earlier, out)
 
 
-def _ended(found: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Path | None) -> int:
-    """Compare with an earlier bench, and name the file; return the exit status."""
+def _ended(record: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Path | None) -> int:
+    """Compare with an earlier bench, and name the file."""
     if earlier:
-        print("\n" + "\n".join(comparison(found, earlier)))
+        print("\n" + "\n".join(comparison(record, earlier)))
     if out:
         print(f"\nwritten: {out}")
     return 0
 
 
 def _on_card(
-    options: Namespace, chosen: Any, known: Mapping[str, set], out: Path | None, earlier: Any
+    options: Namespace, chosen: Any, words_of: Mapping[str, set], out: Path | None, earlier: Any
 ) -> int:
-    """Measure workloads on the GPU."""
     try:
         gpu = card()
     except NoCard as error:
@@ -127,17 +124,17 @@ def _on_card(
     copied = bandwidth(gpu)
     print(f"{gpu.name}, copies of memory {copied / 1e9:.0f} GB/s, read and written")
     about = {"commit": commit(), "card": gpu.name, "bandwidth": copied, "seconds": options.seconds}
-    found: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
+    record: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
     for name in chosen:
-        presets = {n: value for n, value in options.var if n in known[name]}
+        presets = {n: value for n, value in options.var if n in words_of[name]}
         for variables in on_card.sizes_of(name, presets):
             one = on_card.measured(name, variables, gpu, copied, options.seconds)
             on_card.say(name, one, variables)
             key = " ".join([name, *(f"{n}={value}" for n, value in variables.items())])
-            found["workloads"][key] = {"variables": variables, **one.record()}
+            record["workloads"][key] = {"variables": variables, **one.record()}
             if out:
-                write_whole(out, json.dumps(found, indent=1) + "\n")
-    return _ended(found, earlier, out)
+                write_whole(out, json.dumps(record, indent=1) + "\n")
+    return _ended(record, earlier, out)
 
 
 def _counts(text: str) -> list[int]:
@@ -148,7 +145,7 @@ def _counts(text: str) -> list[int]:
 
 
 def _scaling(part: apart.Measurement, ranks: list[int], available: int) -> dict[str, Any]:
-    """Measure and print the scaling of a workload; the record starts with one process."""
+    """Measure and print the scaling of a workload; return its record."""
     rows: list[apart.Scaled] = []
     print(f"\n{part.workload}: {WORKLOADS[part.workload].title}\n{apart.HEADING}")
     for row in apart.scaled(part, ranks, available):
@@ -196,7 +193,7 @@ def _print_solved(one: measure.Solved) -> None:
 
 
 def commit() -> str | None:
-    """Return the commit of the program if it runs from its repository."""
+    """Return the commit if the program runs from its repository."""
     folder = Path(karamelo_py.__file__).parent
 
     def git(*words: str) -> str:
@@ -206,29 +203,28 @@ def commit() -> str | None:
         ).stdout.strip()  # fmt: skip
 
     try:
-        git("ls-files", "--error-unmatch", "__init__.py")  # excludes folders in other repositories
+        git("ls-files", "--error-unmatch", "__init__.py")  # not a folder in another repository
         return git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
     except (OSError, subprocess.SubprocessError):
         return None
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read a bench file."""
     expected = "a file that karamelo-py bench -o has written"
     text = read_text(path, expected)
     try:
-        found = json.loads(text)
-        speeds = [one["best"] for one in found["workloads"].values()]
-        good = found["kind"] == KIND and all(0 < best < inf for best in speeds)
+        record = json.loads(text)
+        speeds = [one["best"] for one in record["workloads"].values()]
+        good = record["kind"] == KIND and all(0 < best < inf for best in speeds)
     except (ValueError, LookupError, TypeError, AttributeError):
         good = False
     if not good:
         raise ScriptError(f"{path} is not the output of a bench", expected=expected)
-    return found
+    return record
 
 
 def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
-    """Compare two benches: ratios of speeds, then other differences, as lines."""
+    """Return lines that compare two benches."""
     lines = [f"{'workload':<24} {'then':>10} {'now':>10} {'ratio':>7}   (best, million/s)"]
     ours, theirs = now["workloads"], then["workloads"]
     for name in dict.fromkeys((*ours, *theirs)):
@@ -236,7 +232,7 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
         before, after = (f"{each['best'] / 1e6:.2f}" if each else "-" for each in (other, one))
         ratio, said = "-", "new" if other is None else "not measured now"
         if one and other:
-            # If these differ, ratios also reflect the environment.
+            # If these differ, ratios mean nothing.
             about = ("points", "precision", "variables")
             said = ", ".join(f"other {key}" for key in about if one.get(key) != other.get(key))
             ratio = "-" if said else f"{one['best'] / other['best']:.2f}"
@@ -245,12 +241,12 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
 
 
 def _differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
-    """List other differences between two benches: machine, threads, versions."""
+    """List differences of machine, threads and versions."""
 
-    def about(found: Mapping[str, Any]) -> dict[str, Any]:
+    def about(record: Mapping[str, Any]) -> dict[str, Any]:
         keys = ("processor", "cores", "system", "commit", "threads")
-        versions = found.get("versions") or {}
-        return {key: found.get(key) for key in keys} | {
+        versions = record.get("versions") or {}
+        return {key: record.get(key) for key in keys} | {
             f"version of {name}": version for name, version in versions.items()
         }
 

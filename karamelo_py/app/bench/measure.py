@@ -1,4 +1,4 @@
-"""Speed of a scene: times of its stages, memory traffic, and memory bandwidth."""
+"""Speed of a scene: times of stages, memory traffic, and memory bandwidth."""
 
 import statistics
 import time
@@ -27,28 +27,26 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-MOST_STEPS = 2500  # in the scenes nothing leaves the domain before
+MOST_STEPS = 2500  # nothing leaves the domain before
 ARRAYS = 3 * 256 * 2**20  # bytes, far larger than caches
 REPETITIONS = 5
-ALONE = 0.5  # fraction of a step that counts as a bottleneck
-APART = 1.5  # largest ratio of separately timed sweeps to a compiled step that is trusted
+ALONE = 0.5  # fraction of a step that limits it
+APART = 1.5  # trusted ratio of separate sweeps to a compiled step
 
 
 class Workload(NamedTuple):
-    """A scene to be timed."""
-
     title: str
     script: str
     # Steps before the measurement.
     lead: int = 3
-    # Published million particle-steps per second of Karamelo (C++), one core of a small AMD EPYC.
+    # Published, in million particle-steps/s of one core of a small AMD EPYC.
     karamelo: float | None = None
 
 
 def _read_workloads() -> dict[str, Workload]:
     path = Path(__file__).with_name("workloads.toml")
-    found = tomllib.loads(path.read_text(encoding="utf-8"))
-    texts = found["scenes"]
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    texts = tables["scenes"]
 
     def workload(
         title: str, scenes: Sequence[str], variables: Mapping[str, str | int],
@@ -60,17 +58,14 @@ def _read_workloads() -> dict[str, Workload]:
             lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value}")
         return Workload(title, "\n".join([*lines, *(texts[name] for name in scenes)]), **rest)
 
-    return {name: workload(**each) for name, each in found["workloads"].items()}
+    return {name: workload(**each) for name, each in tables["workloads"].items()}
 
 
 WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """Mode that records the time of each sweep, then does as `mode` does.
-
-    The time of the same call on no points is subtracted.
-    """
+    """Mode that times each sweep of `mode`, and the same call without points, to be subtracted."""
 
     mode: Any
     of_points: dict[str, list[float]]
@@ -78,18 +73,16 @@ class Timed(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """Measured speed of a workload."""
-
     points: int
     speeds: list[float]  # particle-steps per second of each repetition
     bytes_per_particle: int
-    bytes_per_particle_step: float  # memory traffic of a particle-step without caches
-    roofline: float  # fraction of the memory bandwidth used at the best speed
-    roofline_in_place: float  # the same for arrays as large as the scene, which may be cached
-    # Seconds per step in sweeps over points and over nodes, without call overhead.
+    bytes_per_particle_step: float  # without caches
+    roofline: float  # fraction of the memory bandwidth at the best speed
+    roofline_in_place: float  # of arrays as large as the scene, which may be cached
+    # Seconds per step, without call overhead.
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
-    waits: float  # seconds per step that threads spend starting and waiting
+    waits: float  # seconds per step to start and join threads
     precision: str
 
     @property
@@ -102,34 +95,33 @@ class Measured(NamedTuple):
 
     @property
     def swept(self) -> float:
-        """Time of separate sweeps as a fraction of a step in one compiled loop."""
+        """Separate sweeps over one compiled step, in time."""
         swept = sum(self.sweeps_of_points.values()) + sum(self.sweeps_of_nodes.values())
         return (swept - self.waits) * self.best / self.points
 
     @property
     def told_apart(self) -> bool:
-        """True if sweeps are long enough to be timed separately, which needs many points."""
+        """True if sweeps are long enough to be timed, with many points."""
         return self.swept <= APART
 
     @property
     def rest(self) -> float:
-        """Fraction of the step outside of sweeps: control and waiting threads."""
+        """Fraction of the step outside sweeps: control and waiting threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
     def nodes(self) -> float:
-        """Fraction of the time of sweeps spent on nodes."""
+        """Fraction of sweeps spent on nodes."""
         nodes = sum(self.sweeps_of_nodes.values())
         swept = nodes + sum(self.sweeps_of_points.values())
         return nodes / swept if swept else 0.0
 
     @property
     def limit(self) -> str:
-        """Return the first of these that takes at least half of a step.
+        """Return what takes at least half of a step, the first of these.
 
-        ``overhead`` (the rest), ``nodes``, ``memory`` (at least half of the bandwidth of arrays as
-        large as the scene), else ``arithmetic``: sweeps over points that are limited by
-        instructions or latency. ``unknown`` if sweeps are not `told_apart`.
+        ``overhead`` (the rest), ``nodes``, ``memory`` (of the bandwidth of arrays as large as the
+        scene), else ``arithmetic`` (instructions or latency); ``unknown`` if not `told_apart`.
         """
         if not self.told_apart:
             return "unknown"
@@ -140,7 +132,7 @@ class Measured(NamedTuple):
         return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
     def record(self) -> dict[str, Any]:
-        """Return the data for a file; speeds in particle-steps/s, times in seconds."""
+        """Return the results; speeds in particle-steps/s, times in seconds."""
         speeds = {"best": self.best, "median": self.median, "limited_by": self.limit}
         return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
@@ -159,7 +151,6 @@ class Solved(NamedTuple):
     median = Measured.median
 
     def record(self) -> dict[str, Any]:
-        """Return the data for a file; speeds in particle-steps/s."""
         return {"best": self.best, "median": self.median} | self._asdict()
 
 
@@ -200,10 +191,7 @@ def build(
     workload: Workload, threads: int | None, presets: Mapping[str, str],
     comm: MpiComm | None = None, card: Any = None,
 ) -> Simulation:  # fmt: skip
-    """Build the simulation of a workload, ready to step; `presets` set script variables.
-
-    With a `card`, steps run on it.
-    """
+    """Build a workload's simulation; `presets` set variables, steps run on a `card` if given."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
     if card is not None:
@@ -220,16 +208,16 @@ def measured(simulation: Simulation, seconds: float, triad: float, lead: int) ->
     """Measure a scene for about `seconds`; `triad` is the memory bandwidth."""
     if simulation.implicit:
         return _solved(simulation, seconds, lead)
-    count, found = repeated(simulation, seconds, lead)
-    rates = [simulation.count * count / taken for taken, _ in found]
-    per_step, held, regions = traffic(simulation)
+    count, times = repeated(simulation, seconds, lead)
+    rates = [simulation.count * count / taken for taken, _ in times]
+    per_step, scene_bytes, regions = traffic(simulation)
     return Measured(
         simulation.count,
         rates,
         sum(size for _, _, size in point_fields(simulation.setup.blocks[0])),
         per_step,
         max(rates) * per_step / triad,
-        max(rates) * per_step / bandwidth(simulation.threads, held),
+        max(rates) * per_step / bandwidth(simulation.threads, scene_bytes),
         *stages(simulation, seconds / 4),
         regions * start_of_threads() if simulation.threads > 1 else 0.0,
         simulation.hub.settings.precision,
@@ -237,7 +225,6 @@ def measured(simulation: Simulation, seconds: float, triad: float, lead: int) ->
 
 
 def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
-    """Measure load steps."""
     timed_steps(simulation, lead)  # includes compilation
     steps, before = simulation.load_steps, simulation.step
     steps.seconds.clear()
@@ -245,8 +232,8 @@ def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
     taken = timed_steps(simulation, 5)
     shares = {stage: spent / taken for stage, spent in steps.seconds.items()}
     corrections = steps.corrections / (simulation.step - before)
-    count, found = repeated(simulation, seconds, 0)
-    rates = [simulation.count * count / spent for spent, _ in found]
+    count, times = repeated(simulation, seconds, 0)
+    rates = [simulation.count * count / spent for spent, _ in times]
     shares["rest"] = 1 - sum(shares.values())
     precision = simulation.hub.settings.precision
     return Solved(simulation.count, rates, steps.unknowns, corrections, shares, precision)
@@ -255,30 +242,26 @@ def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
 def repeated(
     simulation: Simulation, seconds: float, lead: int
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
-    """Repeat steps from the state after `lead` steps, for `seconds` in all.
+    """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Returns
-    -------
-    count, found
-        Steps per repetition; the seconds of each, and the seconds that each process waited.
+    Returns the steps per repetition, and for each the seconds taken and waited by each process.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
     count = int(seconds / REPETITIONS / (timed_steps(simulation, 5) / 5))
     count = simulation.comm.bcast(min(max(5, count), MOST_STEPS))
-    found = []
+    times = []
     for _ in range(REPETITIONS):
         simulation.restore(start)
         before, begun = _waits(simulation), time.perf_counter()
         timed_steps(simulation, count)
-        after = _waits(simulation)  # synchronises all processes
-        found.append((time.perf_counter() - begun, after - before))
+        after = _waits(simulation)  # synchronises processes
+        times.append((time.perf_counter() - begun, after - before))
     simulation.restore(start)
-    return count, found
+    return count, times
 
 
 def _waits(simulation: Simulation) -> np.ndarray:
-    """Seconds that each process has waited for others so far."""
     return np.array(simulation.comm.allgather(simulation.comm.waited))
 
 
@@ -295,9 +278,9 @@ def timed_steps(simulation: Simulation, count: int) -> float:
 
 
 def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Time each sweep of a fused step over points and nodes, in seconds per step.
+    """Return seconds per step of each sweep over points, and over nodes.
 
-    Sweeps are called separately, some more than once per step; returns sums of medians.
+    Sweeps are called separately; medians of repeated ones are summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {}, {})
@@ -311,7 +294,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
         _take_step(simulation, timed)
         count += 1
         clock = s.control.clock[0]
-        if clock.drift > clock.drift_limit:  # points would be out of date
+        if clock.drift > clock.drift_limit:  # tiles are out of date
             simulation.sort()
             begin(StepKind(scheme, Fused(), simulation.mode), s)
     of_points, of_nodes = (
@@ -321,7 +304,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
 
 
 def _per_step(taken: list[float], count: int) -> float:
-    real, way = taken[::2], taken[1::2]  # a sweep, then the same without points
+    real, way = taken[::2], taken[1::2]  # alternately with and without points
     return len(real) / count * max(0.0, statistics.median(real) - statistics.median(way))
 
 
@@ -333,12 +316,12 @@ def _take_step(simulation: Simulation, mode: Any) -> None:
 
 
 class _Recorder(NamedTuple):
-    """Mode that records what a sweep would read and write, without sweeping."""
+    """Mode that records what a sweep would read and write."""
 
     points: list
     nodes: list
     sums: list
-    regions: list  # number of parallel regions
+    regions: list  # parallel regions
 
 
 @sweep_points.on(_Recorder)
@@ -358,33 +341,33 @@ def _sweep_nodes_recorder(mode, task, s, dt):
 @sum_buffers.on(_Recorder)
 def _sum_buffers_recorder(mode, quantities, s, due):
     if due:
-        there = {type(one) for one in s.nodes.fields}
+        kinds = {type(one) for one in s.nodes.fields}
         columns = columns_of(quantities, s.kin)
-        mode.sums.extend(b - a for array, a, b in columns if type(array) is str or array in there)
+        mode.sums.extend(b - a for array, a, b in columns if type(array) is str or array in kinds)
         mode.regions.append(1)
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Count bytes per particle-step moved without caches, bytes of the scene, and thread starts.
+    """Return bytes per particle-step without caches, bytes of the scene, and parallel regions.
 
-    Point fields count once per sweep that reads and once per sweep that writes them; node fields,
-    in loops over nodes; buffers of tiles, when written and summed.
+    Point fields count once per sweep that reads and once per sweep that writes them; node fields in
+    loops over nodes; tile buffers when written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])
     control = s.control
-    kept = control.values.copy(), control.clock.copy()
+    before = control.values.copy(), control.clock.copy()
     step(StepKind(scheme, Fused(), recorder), s, simulation.hooks, True)
-    control.values[:], control.clock[:] = kept
+    control.values[:], control.clock[:] = before
     of_point = {name: size for name, _, size in point_fields(s.blocks[0])}
     of_node = {name: array.itemsize * array.shape[1] for name, array in node_fields(s)}
     active = nodes_in_use(s)
-    given = sum(float(np.ptp(b.tiling.buffer[: b.tiling.count[0], :2])) for b in s.blocks)
+    buffered = sum(float(np.ptp(b.tiling.buffer[: b.tiling.count[0], :2])) for b in s.blocks)
     total = simulation.count * sum(of_point.get(name, 0) for name in recorder.points)
     total += active * sum(of_node.get(name, 0) for name in recorder.nodes)
-    total += (active + 2 * given) * sum(recorder.sums) * s.nodes.sums.itemsize
-    held = simulation.count * sum(of_point.values()) + active * sum(of_node.values())
-    return total / simulation.count, held, sum(recorder.regions)
+    total += (active + 2 * buffered) * sum(recorder.sums) * s.nodes.sums.itemsize
+    scene_bytes = simulation.count * sum(of_point.values()) + active * sum(of_node.values())
+    return total / simulation.count, scene_bytes, sum(recorder.regions)
 
 
 @shared_out
@@ -409,7 +392,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Measure bytes/s of a[i] = b[i] + factor c[i] over three arrays of `size` bytes in total."""
+    """Measure bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes in total."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     team = new_team(threads)
@@ -419,5 +402,5 @@ def bandwidth(threads: int, size: float = ARRAYS) -> float:
 
 
 def start_of_threads() -> float:
-    """Measure the seconds to start and join threads without work."""
+    """Measure the seconds to start and join threads."""
     return _fastest(200, _triad, Threaded(), *np.ones((3, 64)), 0.5, config.NUMBA_NUM_THREADS, 1)

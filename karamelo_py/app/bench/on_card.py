@@ -22,12 +22,10 @@ SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
 
 
 class OnCard(NamedTuple):
-    """Measured speed of a workload on a GPU."""
-
     points: int
     speeds: list[float]  # particle-steps per second of each repetition
-    bytes_per_particle_step: float  # memory traffic of a particle-step without caches
-    roofline: float  # fraction of the memory bandwidth used at the best speed
+    bytes_per_particle_step: float  # without caches
+    roofline: float  # fraction of the memory bandwidth at the best speed
     bytes_on_card: int
     stages: dict[str, float]  # seconds per step
     made: float  # seconds to compile a step
@@ -37,7 +35,7 @@ class OnCard(NamedTuple):
 
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Yield the variables of a workload for each of `SIZES`; unchanged if one is set."""
+    """Yield variables for each of `SIZES`; `presets` if they set the size."""
     if {"N", "coarser"} & {*presets}:
         yield dict(presets)
         return
@@ -50,7 +48,7 @@ def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
 def measured(
     name: str, presets: Mapping[str, str], card: Any, copied: float, seconds: float
 ) -> OnCard:
-    """Measure a workload on a GPU for about `seconds`; `copied` is the memory bandwidth."""
+    """Measure a workload on a GPU for about `seconds`; `copied` is its memory bandwidth."""
     simulation = build(WORKLOADS[name], 1, presets, card=card)
     begun = perf_counter()
     simulation.compile()
@@ -63,17 +61,16 @@ def measured(
     stages: dict[str, float] = defaultdict(float)
     for launch, spent in steps.seconds_of_step():
         stages[STAGES.get(launch.name, OTHERS)] += spent
-    found = OnCard(
+    result = OnCard(
         simulation.count, rates, per_step, max(rates) * per_step / copied, steps.images.size,
         dict(sorted(stages.items(), key=lambda item: -item[1])), made,
         simulation.hub.settings.precision,
     )  # fmt: skip
     steps.images.close()
-    return found
+    return result
 
 
 def say(name: str, one: OnCard, presets: Mapping[str, str]) -> None:
-    """Print the results."""
     words = ", ".join(f"{variable} = {value}" for variable, value in presets.items())
     print(f"\n{name}: {WORKLOADS[name].title}; {words}; {one.points} points, {one.precision}")
     print(

@@ -17,18 +17,15 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-PAUSE = 0.5  # seconds between polls of the folder, once all files are read
-FILES = 8  # files read per poll, so that the first are shown early
-WHOLE = (".h5", ".hdf5", ".pvd")  # dumps with many states in a file
+PAUSE = 0.5  # seconds between polls once all files are read
+FILES = 8  # files per poll, so that the first are shown early
+WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 
 
 class FolderPage:
-    """Shows the content of a folder and its updates.
+    """The page of a folder and its updates.
 
-    Raises
-    ------
-    ScriptError
-        If there is no such folder, or it has neither a log nor a particle dump.
+    ScriptError if there is no such folder, or neither log nor particle dump in it.
     """
 
     def __init__(self, folder: Path):
@@ -37,8 +34,8 @@ class FolderPage:
         self.folder = folder
         self._states: list[tuple[Path, int, int, float, int]] = []  # file, index, step, time, count
         self._seen: dict[Path, float] = {}
-        self._read: dict[Path, int] = {}  # number of states read from each file
-        self._widths: dict[str, int] = {}  # number of columns, by dump name
+        self._read: dict[Path, int] = {}  # states read of each file
+        self._widths: dict[str, int] = {}  # columns by dump name
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
         self._dimension, self._column, self._more = 2, "", False
@@ -53,7 +50,7 @@ class FolderPage:
         )
 
     def follow(self) -> None:
-        """Poll for news until interrupted."""
+        """Poll until interrupted."""
         while True:
             if self.look():
                 self.server.changed()
@@ -61,7 +58,7 @@ class FolderPage:
                 time.sleep(PAUSE)
 
     def look(self) -> bool:
-        """Read the folder; tell whether anything is new."""
+        """Read the folder; return True if anything is new."""
         log, before = read_log(self.folder), len(self._states)
         grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
         self._log, files = log, 0
@@ -72,8 +69,8 @@ class FolderPage:
                 changed = path.stat().st_mtime
                 if self._seen.get(path) == changed:
                     continue
-                known = self._read.get(path, 0)
-                for place, snapshot in enumerate(read(path, known), known):
+                count = self._read.get(path, 0)
+                for place, snapshot in enumerate(read(path, count), count):
                     self._add(path, place, snapshot)
                     self._read[path] = place + 1
                 self._seen[path], files = changed, files + 1
@@ -83,7 +80,7 @@ class FolderPage:
         return grown or len(self._states) > before
 
     def _dumps(self) -> list[Path]:
-        """List particle dumps whose names differ by number only: the set with most columns."""
+        """List the particle dumps with most columns whose names differ by number only."""
         kinds: dict[str, list[Path]] = {}
         for path in sorted(self.folder.iterdir()):
             if path.is_file() and (path.suffix in WHOLE or _is_text_dump(path)):
@@ -101,8 +98,8 @@ class FolderPage:
         if not self._states:
             directions = [axis for axis in "yz" if np.ptp(columns.get(axis, 0.0)) > 0]
             self._dimension = 3 if "z" in directions else 1 + len(directions)
-            known = [name for name in ("seq", "type") if name in columns]
-            self._column = [*known, *self._columns][0]
+            preferred = [name for name in ("seq", "type") if name in columns]
+            self._column = [*preferred, *self._columns][0]
         self._states.append((path, place, snapshot.step, float(snapshot.time), len(columns["x"])))
 
     def _news(self, seen: int) -> tuple[int, dict]:
@@ -124,20 +121,20 @@ class FolderPage:
                 enumerate(self._states), key=lambda state: state[1][2]
             )
         ]
-        told: dict[str, Any] = {
+        news: dict[str, Any] = {
             "rows": rows, "frames": listed, "flags": [], "paused": False,
             "unwatched": "the page of a run has it, not a log",
         }  # fmt: skip
         if not seen:
-            told["about"] = {
+            news["about"] = {
                 "title": self.folder.resolve().name, "dimension": self._dimension,
                 "columns": self._columns, "column": self._column,
                 "method": "", "bounds": [], "steers": False,
             }  # fmt: skip
-        return count, {**told, "over": False}
+        return count, {**news, "over": False}
 
     def _frame(self, words: Mapping[str, str]) -> bytes | None:
-        """Read a state again, with the column that the page shows now."""
+        """Read a state with the column that the page shows now."""
         k = number_in(words)
         if not 0 <= k < len(self._states):
             return None

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 PAGE = Path(__file__).with_name("run.html")
-POINTS = 1_000_000  # of a frame, approximately at most
+POINTS = 1_000_000  # in a frame, about
 BYTES = 1 << 29  # of all frames
 COUNT = 400
-SEEN = 1.0  # seconds for a page to request an announced frame
+SEEN = 1.0  # seconds for a page to request a frame
 
 
 class Frame(NamedTuple):
@@ -25,7 +25,7 @@ class Frame(NamedTuple):
     time: float
     column: str
     numbers: np.ndarray  # (d + 1, n) positions and the column
-    of: int  # number of points before thinning
+    of: int  # points before thinning
 
     @classmethod
     def of_columns(
@@ -41,10 +41,9 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """Select about `POINTS` of many points (n,): randomly, but the same ones in each state.
+    """Select about `POINTS` of the points (n,), the same ones in each state.
 
-    Small solids, of up to 10 % of that in equal parts, stay complete; the others are thinned
-    equally.
+    Solids of up to 10 % of an equal part stay complete; the others are thinned by one factor.
     """
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
@@ -56,7 +55,7 @@ def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
 
 
 class KeptFrames:
-    """States of points by number; if there are too many, every second one is dropped."""
+    """States by number; if there are too many, every second one is dropped."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}
@@ -65,7 +64,6 @@ class KeptFrames:
         self._lock = threading.Lock()
 
     def add(self, frame: Frame) -> None:
-        """Add a frame."""
         with self._lock:
             now = time.perf_counter()
             self._kept[self._next] = frame
@@ -86,25 +84,25 @@ class KeptFrames:
             self._new[-1] = (self._next - 1, time.perf_counter())
 
     def listed(self) -> list[list]:
-        """List number, step, time, column and count of each frame."""
+        """List number, step, time, column and count of the frames."""
         with self._lock:
             return [[k, f.step, plain(f.time), f.column, f.of] for k, f in self._kept.items()]
 
     def answer(self, words: Mapping[str, str]) -> bytes | None:
-        """Return the numbers of a frame, position by position, then the column."""
+        """Return the positions of a frame, one coordinate after another, then its column."""
         with self._lock:
             frame = self._kept.get(number_in(words))
         return None if frame is None else frame.numbers.tobytes()
 
 
 def number_in(words: Mapping[str, str]) -> int:
-    """Read the number of a frame; -1 if there is none."""
+    """Return the number of a frame, or -1."""
     text = words.get("k", "")
     return int(text) if text.isdecimal() and len(text) < 19 else -1
 
 
 def plain(value: Any) -> Any:
-    """Convert numbers to those that JSON has; others are unchanged."""
+    """Return None for numbers that JSON lacks."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return value

@@ -26,7 +26,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
 
 WINDOW = 2000  # rows of the log sent to a new page
-GRACE = 10.0  # seconds that a paused run waits without an open page, which may be reloading
+GRACE = 10.0  # seconds that a paused run waits for its page to be reloaded
 
 
 class Row(NamedTuple):
@@ -36,20 +36,12 @@ class Row(NamedTuple):
     time: float
     dt: float
     limit: str  # what limits the step
-    gain: float | None  # energy gain in percent, if monitored
+    gain: float | None  # energy gain in %, if monitored
     log: dict[str, float]
 
 
 class RunPage(Rhythmic, Listener):
-    """Shows a run in browsers: updated with the log, and pauses the run on request.
-
-    Parameters
-    ----------
-    hub
-        The scene, before its script is executed.
-    title
-        Heading of the page.
-    """
+    """The page of a run: updated with the log; it can pause the run."""
 
     remembers = ()
     id, place = "live", None
@@ -62,7 +54,7 @@ class RunPage(Rhythmic, Listener):
         self._rows: list[Row] = []
         self._paused = self._once = False
         self._column, self._unwatched = "seq", ""
-        self._ended, self._failed = "", ""  # status, and the message of an error
+        self._ended, self._failed = "", ""  # status, and message of an error
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
             {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
@@ -72,20 +64,19 @@ class RunPage(Rhythmic, Listener):
         hub.listeners.append(self)
 
     def signalled(self, number: int) -> None:
-        """Resume a paused run."""
         self._paused = False
 
     # ---- in the thread of the run ---------------------------------------------------------------
 
     def write(self) -> None:
-        """Show the present state; wait here while the page pauses the run."""
+        """Show the present state; wait while the page pauses the run."""
         hub, simulation = self.hub, self.hub.simulation
-        self.every = hub.output.log.every  # each run starts with an output
+        self.every = hub.output.log.every  # a run starts with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         clock = simulation.control.clock[0]
-        known = clock.watch_energy and clock.looks >= FEW  # a mean over this many
-        gain = -100 * share_lost(simulation) if known else None
+        has_gain = clock.watch_energy and clock.looks >= FEW  # mean over these
+        gain = -100 * share_lost(simulation) if has_gain else None
         why = unknown_work(hub)
         self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""
         limit = "load steps" if simulation.implicit else ruling_limit(simulation)
@@ -95,10 +86,9 @@ class RunPage(Rhythmic, Listener):
         self._wait()
 
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
-        """Send the last news to open pages, including an error that ends the run.
+        """Send the last news, with an error that ends the run, and wait for open pages to close.
 
-        Requests are answered until the pages are closed. With `waits`, at a terminal, waits for a
-        page that has not been opened yet.
+        With `waits`, at a terminal, also wait for the first page.
         """
         server = self.server
         error = sys.exception()
@@ -106,7 +96,7 @@ class RunPage(Rhythmic, Listener):
         if isinstance(error, FAILURES):
             ended, self._failed = "failed", rendered(error)
             self.hub.warned.append((self.hub.update.time, self._failed))
-        self._ended = ended  # last, so that a page sees a running run until then
+        self._ended = ended  # last: until then a page shows a running run
         server.changed()
         server.flush()
         waits = waits and self.hub.console.terminal and not server.opened
@@ -119,7 +109,6 @@ class RunPage(Rhythmic, Listener):
         server.close()
 
     def detach(self) -> None:
-        """Close the page; the run continues."""
         if self not in self.hub.output.pages:
             return
         self.hub.output.pages.remove(self)
@@ -154,7 +143,7 @@ class RunPage(Rhythmic, Listener):
         rows = new = self._rows[seen:]
         if len(rows) > WINDOW:  # enough for the curves of a new page
             rows = [rows[k] for k in np.linspace(0, len(rows) - 1, WINDOW).astype(int)]
-        told = {
+        news = {
             "rows": [
                 {**row._asdict(), "log": {k: plain(float(v)) for k, v in row.log.items()}}
                 for row in rows
@@ -168,7 +157,7 @@ class RunPage(Rhythmic, Listener):
             "failed": self._failed,
         }
         if not seen and self.hub.domain is not None:
-            told["about"] = {
+            news["about"] = {
                 "title": self.title,
                 "dimension": self.hub.domain.dimension,
                 "columns": self.hub.fields.particle_names(),
@@ -177,12 +166,12 @@ class RunPage(Rhythmic, Listener):
                 "bounds": [-100 * energy.LOSS, 100 * WITHIN],
                 "steers": True,
             }
-        return seen + len(new), told
+        return seen + len(new), news
 
     def _choose(self, words: Mapping[str, str]) -> None:
         if words.get("name") in self.hub.fields.particle_names():
             self._column = words["name"]
-            if self._rows and not self.hub.in_run:  # nothing else would show it
+            if self._rows and not self.hub.in_run:  # no output follows
                 self._take_again()
 
     def _pause(self, _: Mapping[str, str]) -> None:
@@ -197,6 +186,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Interrupt the run, if there is one, like Ctrl-C: the last state is written."""
+        """Interrupt the run like Ctrl-C: the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

@@ -1,4 +1,4 @@
-"""Server of a live page: answers at a secret address, and pushes news (server-sent events)."""
+"""Server of a live page: a secret address, news as server-sent events."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from urllib.parse import parse_qsl, urlsplit
 
 from karamelo_py.script.errors import ScriptError
 
-PATIENCE = 1.0  # seconds for the last news to reach a page at the end
-BEAT = 2.0  # seconds between keep-alive messages, which reveal closed pages
-STUCK = 30.0  # seconds after which a page that receives nothing counts as closed
-UNKNOWN = 5.0  # seconds for a connection to send a request with the secret word
-MOST = 64  # connections at once: leaves file descriptors to the run
-LARGEST = 1 << 16  # bytes in the body of a request, which is not needed
-# Names of this machine; another one means a site that resolves its name to this machine.
+PATIENCE = 1.0  # seconds for the last news at the end
+BEAT = 2.0  # seconds between messages that reveal closed pages
+STUCK = 30.0  # seconds until a page that receives nothing counts as closed
+UNKNOWN = 5.0  # seconds to send the secret word
+MOST = 64  # connections; file descriptors remain for the run
+LARGEST = 1 << 16  # bytes of a request's body, which is ignored
+# Names of this machine; a site could resolve another name to it.
 HERE = ("127.0.0.1", "localhost", "::1")
 # Plotly creates styles and functions while drawing.
 POLICY = (
@@ -40,47 +40,30 @@ Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
 
 
 class Server:
-    """Serve a page to browsers on this machine.
+    """Serves a page to browsers on this machine, at the URL `address`.
 
-    Parameters
-    ----------
-    page
-        The HTML file of the page.
-    news
-        ``news(seen)`` returns the new `seen` and what is new since the old one (0 at first); called
-        in server threads when a page opens, then after each `changed`.
-    answers
-        Responses to further addresses by name: bytes, something JSON can express, or None. Called
-        with the query parameters.
-    actions
-        Actions that a page may request (POST), by name.
-
-    Attributes
-    ----------
-    address
-        The URL; with it anybody on this machine can see the page and use its actions.
+    ``news(seen)`` returns the new `seen` and the news since the old one (0 at first); called in
+    server threads when a page opens and after each `changed`. `answers` are responses (bytes, JSON
+    or None) to further addresses by name, `actions` (POST) functions by name; both get the query.
     """
 
     def __init__(
-        self,
-        page: Path,
-        news: Callable[[Any], tuple[Any, dict]],
-        answers: Mapping[str, Answer],
+        self, page: Path, news: Callable[[Any], tuple[Any, dict]], answers: Mapping[str, Answer],
         actions: Mapping[str, Callable[[Mapping[str, str]], None]],
-    ):
+    ):  # fmt: skip
         require_plotly()
         self.page, self.news = page, news
         self.answers = {"plotly.js": _plotly, "points.js": _points, **answers}
         self.actions = actions
         self.version = 0
         self._changed = threading.Condition()
-        self._shown: dict[int, int] = {}  # the version sent to each open page
-        self.opened = False  # some page has been open
-        self.framed = False  # displayed in a notebook
+        self._shown: dict[int, int] = {}  # version sent to each open page
+        self.opened = False  # a page has been open
+        self.framed = False  # in a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
-        # A short poll interval, so that it ends quickly.
+        # A short poll interval: closing does not wait.
         threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
@@ -91,7 +74,6 @@ class Server:
 
     @property
     def watched(self) -> bool:
-        """Tell whether a page is open."""
         return bool(self._shown)
 
     def flush(self) -> None:
@@ -102,12 +84,11 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Keep serving until a page has been opened and all are closed."""
+        """Serve until a page has been opened and all are closed."""
         with self._changed:
             self._changed.wait_for(lambda: self.opened and not self._shown)
 
     def close(self) -> None:
-        """Send the last news, and close."""
         self.flush()
         self._http.shutdown()
         self._http.server_close()
@@ -120,12 +101,12 @@ class Server:
                 with self._changed:
                     self._changed.wait_for(lambda: self.version != version, BEAT)  # noqa: B023
                     version = self.version
-                seen, told = self.news(seen)
-                write(b"data: " + json.dumps(told).encode() + b"\n\n")
+                seen, news_ = self.news(seen)
+                write(b"data: " + json.dumps(news_).encode() + b"\n\n")
                 with self._changed:
                     self._shown[key], self.opened = version, True
                     self._changed.notify_all()
-                time.sleep(0.1)  # more often is not visible
+                time.sleep(0.1)  # more is not visible
         finally:
             with self._changed:
                 self._shown.pop(key, None)
@@ -133,7 +114,7 @@ class Server:
 
 
 def require_plotly() -> None:
-    """Check that Plotly is installed, without importing it, which is slow."""
+    """Check that Plotly is installed, without its slow import."""
     if importlib.util.find_spec("plotly") is None:
         raise ScriptError(
             "a page needs the package plotly",
@@ -142,7 +123,7 @@ def require_plotly() -> None:
 
 
 class _Quiet(ThreadingHTTPServer):
-    """Ignores pages that close while loading, and limits the number of connections."""
+    """Ignores pages that close while loading; limits connections."""
 
     daemon_threads = True
 
@@ -210,7 +191,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             name, words = self._asked()
             length = self.headers.get("Content-Length", "0")
             if length.isdecimal() and len(length) < 9 and int(length) <= LARGEST:
-                self.rfile.read(int(length))  # otherwise it would be read as the next request
+                self.rfile.read(int(length))  # or it would be read as the next request
             else:
                 self.close_connection = True
             if not self._is_from_here():
@@ -222,7 +203,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 self._give(b"{}", "application/json")
 
         def _is_from_here(self) -> bool:
-            """Tell whether the request comes from a page of this server, if browsers report it."""
+            """Return True if Host and Origin, if sent, are this server."""
             host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
             try:
                 here = urlsplit(f"//{host}").hostname in HERE
@@ -231,7 +212,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 return False
 
         def _asked(self) -> tuple[str | None, dict[str, str]]:
-            """Return the requested address; None without the secret word."""
+            """Return the requested name (None without the secret word) and the query."""
             asked = urlsplit(self.path)
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())

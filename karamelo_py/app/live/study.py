@@ -20,20 +20,10 @@ LINES = 12  # last lines of a run's output
 
 
 class StudyPage:
-    """Shows a study in browsers; `stopped` is set when a viewer ends it.
+    """The page of a study; `stopped` is set when a viewer ends it.
 
-    Parameters
-    ----------
-    script
-        Path of the script.
-    names
-        The variables of the study.
-    recorded
-        Names of the values recorded for each run.
-    axes
-        Initial axes of the chart; empty: chosen from the names.
-    base
-        The folder that folders of rows are relative to.
+    `recorded` are names of recorded values, `axes` initial axes of the chart, `base` the folder
+    that folders of rows are relative to.
     """
 
     def __init__(
@@ -76,7 +66,7 @@ class StudyPage:
         running: Sequence[tuple[Mapping[str, str], Path, float]],
         **progress: Any,
     ) -> None:
-        """Update the rows of finished runs, and cases with their folders."""
+        """Update rows of finished runs, and cases with their folders."""
         for row in rows[len(self._rows) :]:
             case = {name: row[name] for name in self._names}
             self._rows.append({**self._judged(row), "title": worded(case)})
@@ -90,7 +80,7 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """Return new rows and cases; cases without a row that do not run are waiting."""
+        """Return new rows and cases; those without a row that do not run are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         news = {
@@ -103,7 +93,7 @@ class StudyPage:
         return (first_row + len(rows), first_case + len(cases)), news
 
     def _run(self, words: Mapping[str, str]) -> dict | None:
-        """Return the last lines of a run's output, and the columns of its log."""
+        """Return the last lines of a run's output, and its log."""
         folder = self._folders.get(words.get("title", ""))
         if folder is None:
             return None
@@ -119,5 +109,4 @@ class StudyPage:
 
 
 def _some(count: int) -> np.ndarray:
-    """Choose rows of a log to draw, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(int))
