@@ -34,10 +34,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     keeping = timestep.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if share > 1 + 1e-9:
-        return (
-            f"time step is {share:.3g} x the stability limit",
-            timestep.own_step_instead(hub),
-        )
+        return (f"time step is {share:.3g} x the stability limit", timestep.own_step_instead(hub))
     if update.boundary == "reflect" and simulation.bounces:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
