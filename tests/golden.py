@@ -164,7 +164,7 @@ def _texts(script):
             card = gpu.Emulator()
             card.loaded = lambda code: None
             card.made = lambda text: b"-"
-            own = (simulation.hooks, simulation.python.functions)
+            own = (simulation.hooks, simulation.fixes.lasting.functions)
             try:
                 steps = StepsOnCard(card, simulation.setup,
                                     (hub.update.scheme, type(simulation.visits)), own)  # fmt: skip

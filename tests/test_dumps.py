@@ -2,8 +2,6 @@
 
 import gzip
 import shutil
-import subprocess
-import sys
 from itertools import product
 
 import numpy as np
@@ -12,7 +10,6 @@ from fakes import FakeHub
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scenes import block
 from selection import parameters
 
 from karamelo_py.output import files, text
@@ -566,32 +563,3 @@ def test_rhythm_of_time_with_growing_steps():
             written.append((time, dt))
     assert [int(time) for time, _ in written] == [1, 2, 3, 4, 5]
     assert all(time - int(time) < dt for time, dt in written)
-
-
-WATCHED = """
-import sys
-from karamelo_py.app.simulation import Simulation
-from karamelo_py.styles.dumps.lammps import Particle
-seen, write = set(), Particle.write
-def watched(dump):
-    sys.setprofile(lambda frame, *_: seen.add(frame.f_globals.get("__name__", "")))
-    try:
-        write(dump)
-    finally:
-        sys.setprofile(None)
-Particle.write = watched
-Simulation(sys.argv[1], out=".").run()
-print(*sorted(seen))
-"""
-
-
-def test_few_modules_write_a_dump(tmp_path, starts_are_cheap):
-    """In a run, outside of kernels, points and compiler."""
-    text = block(2, "dump(d, all, particle, 1, d.*.txt, x, vy, s11)", "run(2)")
-    words = [sys.executable, "-c", WATCHED, text]
-    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True)
-    below = ("karamelo_py.kernels", "karamelo_py.points", "karamelo_py.compiler")
-    rooms = [name for name in done.stdout.split() if not name.startswith(below)]
-    rooms = [name for name in rooms if name.startswith("karamelo_py.")]
-    assert len(list(tmp_path.glob("d.*.txt"))) == 3
-    assert "karamelo_py.output.fields" in rooms and len(rooms) <= 8, rooms

@@ -6,6 +6,7 @@ from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
+from journeys import STATEMENTS, modules
 from walked import MODULES, PACKAGE, walked
 
 ROOT = Path(__file__).parent.parent
@@ -138,6 +139,7 @@ def changing_containers() -> set[tuple[str, str]]:
 
 
 COUNTS = {
+    **{f"modules of {name}": lambda name=name: len(modules(name)) for name in STATEMENTS},
     "containers of the process that change in compiler/": lambda: len(changing_containers()),
     "functions of kernels and points with more than five parameters": long_signatures,
     "getattr with a default": guesses,

@@ -29,7 +29,7 @@ from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.implicit.load_steps import LoadSteps
 from karamelo_py.run.lower.memory import bytes_per_point, node_fields, point_fields
-from karamelo_py.run.timestep import own_weight_of_drift
+from karamelo_py.run.stable_step import own_weight_of_drift
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit, ScriptError
 

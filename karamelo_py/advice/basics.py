@@ -9,7 +9,7 @@ import numpy as np
 from karamelo_py.language import registry
 from karamelo_py.points.laws import law_traits
 from karamelo_py.points.transfers import flip_coefficient, stores_moment
-from karamelo_py.run import timestep
+from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion, motions
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
@@ -52,7 +52,7 @@ class BasicFacts:
         # Laws that store all work and sustain tension.
         self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
         # Solids with about one point per cell and direction.
-        self.single = [s.id for s in solids if timestep.one_a_cell(s)]
+        self.single = [s.id for s in solids if stable_step.one_a_cell(s)]
         self.sparse = bool(self.single)
 
     motions = cached_property(lambda self: motions(self.simulation))

@@ -17,7 +17,7 @@ from karamelo_py.advice.bodies import sides
 from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
-from karamelo_py.run import timestep
+from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.run.listening import when
 
@@ -81,7 +81,7 @@ def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
     bodies = [b for b in facts.bodies if not can(b.solid.material.law, constrained_velocity)]
     if not bodies:
         return
-    c = np.array([timestep.elastic_speed(facts.simulation, body.solid)[0] for body in bodies])
+    c = np.array([stable_step.elastic_speed(facts.simulation, body.solid)[0] for body in bodies])
     z = c / np.array([float(specific_volume(body.solid.material.law)) for body in bodies])
     boxes = boxes_of([body.motion for body in bodies])
     lengths = np.array([sides(body) for body in bodies])

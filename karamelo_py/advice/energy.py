@@ -2,13 +2,14 @@
 
 import numpy as np
 
+from karamelo_py.advice import step_size
 from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.kernels.watch import LOOKS
 from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.transfers import flip_coefficient
-from karamelo_py.run import timestep
-from karamelo_py.run.energy import TOLD, has_grown, share_lost
+from karamelo_py.run import stable_step
+from karamelo_py.run.energy import TOLD
 from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
@@ -30,25 +31,28 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     moves, jumps = method.frame.moves, method.basis.traits.gradient_jumps
     if simulation.implicit:
         return _gain_of_implicit_steps(hub)
-    share = simulation.dt / timestep.stable_step(hub, simulation, simulation.limit)
-    keeping = timestep.keeping_share(hub)
+    share = simulation.dt / step_size.stable_step(simulation, simulation.steps.limit)
+    keeping = stable_step.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if share > 1 + 1e-9:
-        return (f"time step is {share:.3g} x the stability limit", timestep.own_step_instead(hub))
+        return (
+            f"time step is {share:.3g} x the stability limit",
+            step_size.own_step_instead(simulation),
+        )
     if update.boundary == "reflect" and simulation.bounces:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
-    courant, _ = timestep.own_step_of_waves(hub, still=False)
+    courant, _ = stable_step.own_step_of_waves(hub, still=False)
     # Of undeformed bodies: later they may be softer.
-    fastest = timestep.fastest_wave(simulation)
+    fastest = stable_step.fastest_wave(simulation)
     across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
     if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
-        alone = " of an isolated point" * (courant == timestep.lone_point(hub))
+        alone = " of an isolated point" * (courant == stable_step.lone_point(hub))
         return (
             f"time step is {simulation.dt / borne:.3g} x the stability limit{alone} in the "
             f"undeformed state ({borne:.4g})",
-            f"set_dt({timestep.USUAL * borne:.3g}) or less, or remove set_dt",
+            f"set_dt({stable_step.USUAL * borne:.3g}) or less, or remove set_dt",
         )
     if moves and jumps and update.transfer.traits.inverts_spread:
         return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
@@ -57,8 +61,8 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
         return "F-bar in the updated frame", "remove anti_volumetric_locking"
-    if keeping < timestep.USUAL and share > keeping * (1 + 1e-9):
-        points = " with one point per cell" if timestep.sparse(hub) else ""
+    if keeping < stable_step.USUAL and share > keeping * (1 + 1e-9):
+        points = " with one point per cell" if stable_step.sparse(hub) else ""
         return (
             f"points crossing cells: {transfer} and {scheme} with {basis}{points} at "
             f"{share:.2g} x the stability limit",
@@ -91,7 +95,7 @@ def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
 
 def _step_of(hub: Hub, simulation: Simulation, share: float) -> str:
     if hub.update.fixed_dt is not None:
-        return f"set_dt({share * simulation.limit:.3g})"
+        return f"set_dt({share * simulation.steps.limit:.3g})"
     return f"dt_factor({share:g})"
 
 
@@ -103,7 +107,7 @@ def swelling(points: PointTable) -> np.ndarray:
 def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
     """Describe a spurious energy gain; None without one."""
     clock = simulation.control.clock[0]
-    if not has_grown(simulation):
+    if not simulation.energy_watch.has_grown():
         return None
     cause, fix = cause_of_gain(hub, simulation)
     gain, since = clock.grown, "since the start"
@@ -138,7 +142,7 @@ def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | 
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
-    lost = share_lost(simulation)
+    lost = simulation.energy_watch.share_lost()
     if lost <= within or taken_by(hub):
         return None
     cause, fix = cause_of_loss(hub)

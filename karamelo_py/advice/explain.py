@@ -3,17 +3,16 @@
 import numpy as np
 
 from karamelo_py.advice import energy
+from karamelo_py.advice.step_size import own_step_instead, step_by_script
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
 from karamelo_py.language.rules import code_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
 from karamelo_py.points.laws import by_rates
-from karamelo_py.run.energy import has_grown
 from karamelo_py.run.listening import Trouble, when, where
 from karamelo_py.run.no_number import no_number
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import own_step_instead, step_by_script
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
 
@@ -32,24 +31,24 @@ def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") ->
         return _above_limit(hub, simulation)
     if status == SHRUNK:
         return _shrunk(hub, simulation)
-    smaller, too_large = _smaller_step(hub, simulation, smaller), simulation.too_large
+    smaller, too_large = _smaller_step(hub, simulation, smaller), simulation.steps.too_large
     if status in (GAINED, HEATED):
         result = (_gained if status == GAINED else _heated)(hub, simulation)
         result = result._replace(fix=smaller) if too_large else result
-    elif simulation.implicit and simulation.load_steps.failure:
-        message = f"{simulation.load_steps.failure} ({when(simulation, 1)})"
+    elif simulation.failure:
+        message = f"{simulation.failure} ({when(simulation, 1)})"
         fix = "smaller load steps; above the limit load there is no equilibrium"
         return Trouble(message, fix, "no-equilibrium")
     else:
         result = _wrong_point(hub, simulation, smaller)
         seen = f" after a spurious energy gain ({when(simulation, 1)})"
-        if result.place is None and has_grown(simulation):
+        if result.place is None and simulation.energy_watch.has_grown():
             cause, fix = energy.cause_of_gain(hub, simulation)
             fix = smaller if too_large else fix
             result = result._replace(message=result.message + seen, fix=fix, cause=cause)
         else:
             result = result._replace(message=f"{result.message} ({when(simulation, 1)})")
-    if result.place is None and not result.cause and (too_large or simulation.above_limit()):
+    if result.place is None and not result.cause and (too_large or simulation.steps.above_limit()):
         return result._replace(cause=_above_limit_as_cause(hub, simulation))
     return result
 
@@ -59,7 +58,7 @@ def _above_limit_as_cause(hub: Hub, simulation: Simulation) -> str:
     if step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of:
         return "time step above the stability limit (see the warning)"
     # The limit of the failed state is meaningless.
-    here = "" if simulation.too_large else f" {simulation.limit:.4g}"
+    here = "" if simulation.steps.too_large else f" {simulation.steps.limit:.4g}"
     return f"time step {simulation.dt:.4g} above the stability limit{here}"
 
 
@@ -67,9 +66,10 @@ def _above_limit(hub: Hub, simulation: Simulation) -> Trouble:
     speed, fastest = simulation.points.largest(_speeds)
     message = (
         f"time step {simulation.dt:g} is above the stability limit, which has fallen to "
-        f"{simulation.limit:.4g}: {named(hub, fastest)} moves at {speed:.4g} ({when(simulation)})"
+        f"{simulation.steps.limit:.4g}: {named(hub, fastest)} moves at {speed:.4g} "
+        f"({when(simulation)})"
     )
-    fix, place = own_step_instead(hub), hub.update.dt_place
+    fix, place = own_step_instead(simulation), hub.update.dt_place
     return Trouble(message, fix, "step-above-limit", place=place)
 
 
@@ -110,15 +110,15 @@ def _heated(hub: Hub, simulation: Simulation) -> Trouble:
     )
     if share > 1:
         cause = f"time step is {share:.3g} x the stability limit of conduction"
-        return Trouble(message, own_step_instead(hub), "temperature", cause)
+        return Trouble(message, own_step_instead(simulation), "temperature", cause)
     return Trouble(message, _smaller_step(hub, simulation), "temperature")
 
 
 def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
     (speed, fastest), (volume, widest) = map(simulation.points.largest, (_speeds, energy.swelling))
     message = (
-        f"the stability limit of the time step has fallen to {simulation.limit:.3g}, less than a "
-        f"millionth of the first: {named(hub, fastest)} moves at {speed:.3g}, "
+        f"the stability limit of the time step has fallen to {simulation.steps.limit:.3g}, less "
+        f"than a millionth of the first: {named(hub, fastest)} moves at {speed:.3g}, "
         f"{named(hub, widest)} has {volume:.3g} x its initial volume ({when(simulation)})"
     )
     fix = f"look at earlier dumps for what went wrong before; {_smaller_step(hub, simulation)}"
@@ -145,7 +145,7 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         hint = "check fixes that act on heat: a formula that gives NaN, or heat without bounds"
-        return no_number(hub, simulation, "the temperature of a point is not a number", hint)
+        return no_number(simulation, "the temperature of a point is not a number", hint)
     if not wrong:
         return Trouble("a point went wrong", "a smaller time step", "point")
     number, old, position, v, grid = min(wrong, key=lambda one: one[0])
@@ -153,11 +153,11 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
     old, new = old[:d], position[:d]
     if not np.isfinite(old).all():
         hint = f"look for a formula that gives NaN; else {smaller}"
-        return no_number(hub, simulation, f"{name} has no position (NaN)", hint)
+        return no_number(simulation, f"{name} has no position (NaN)", hint)
     if not np.isfinite(new).all() or not np.isfinite(v).all():
         seen = f"{name} at {where(old)} gets a velocity that is not a number"
         hint = f"look for a formula that gives NaN, such as a division by zero; else {smaller}"
-        return no_number(hub, simulation, seen, hint)
+        return no_number(simulation, seen, hint)
     lo, hi = hub.domain.lo[:d], hub.domain.hi[:d]
     move = float(np.abs(new - old).max()) / h
     unstable = smaller
@@ -170,7 +170,7 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
             )
             return Trouble(seen, unstable, "point-lost")
         side = next(k for k in range(d) if new[k] < lo[k] or new[k] > hi[k])
-        if simulation.above_limit():
+        if simulation.steps.above_limit():
             seen = f"{name} at {where(old)} is thrown out of the domain"
             return Trouble(seen, smaller, "point-lost")
         loose = _loose(simulation, number, old, LOOSE * h)
@@ -237,7 +237,7 @@ def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
     if simulation.implicit:
         inertia = simulation.hub.update.scheme.traits.inertia
         return "a smaller time step (set_dt)" if inertia else "more and smaller load steps"
-    if simulation.above_limit():
-        return own_step_instead(hub)
+    if simulation.steps.above_limit():
+        return own_step_instead(simulation)
     fixed = hub.update.fixed_dt is not None
     return "a smaller time step (set_dt)" if fixed else "a smaller dt_factor"

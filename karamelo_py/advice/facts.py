@@ -70,7 +70,7 @@ class SceneFacts(BasicFacts):
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
     # The step over the stable one, and over the limit for neighbours of different density.
-    share = property(lambda self: self.simulation.dt / self.simulation.limit)
+    share = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
     share_of_uneven = property(lambda self: self.share * self.uneven.of_step)
     fastest = cached_property(lambda self: self.simulation.fastest())  # velocity component
     turns = property(lambda self: self.turn > TURN)
@@ -105,7 +105,7 @@ class SceneFacts(BasicFacts):
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
-        dt = self.simulation.limit if self.transfer.traits.per_time else 0.0
+        dt = self.simulation.steps.limit if self.transfer.traits.per_time else 0.0
         dt = dt or self.simulation.dt
         return PIC * (1 - self.kept) * self.hub.domain.h**2 / dt if dt > 0 else 0.0
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.advice import step_size
 from karamelo_py.advice.basics import is_zero
 from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
@@ -19,8 +20,8 @@ from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
-from karamelo_py.run import timestep
-from karamelo_py.run.no_number import formulas_of, refuse_endless_speeds
+from karamelo_py.run import stable_step
+from karamelo_py.run.no_number import refuse_endless_speeds
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -79,7 +80,7 @@ def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None
     why, hint = mixed_units(hub, simulation), UNITS
     if hub.update.fixed_dt is not None:
         why, hint = "", "a larger step with set_dt, or an earlier end"
-    elif timestep.ruling_limit(simulation) == "conduction":
+    elif simulation.steps.ruling_limit == "conduction":
         why = (
             f"heat goes through cells of {hub.domain.h:g} that fast. The units of conductivities, "
             "heat capacities, lengths and times may be mixed"
@@ -90,7 +91,7 @@ def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None
 
 def mixed_units(hub: Hub, simulation: Simulation) -> str:
     """Describe wave speed and cell size, for a step that does not fit them."""
-    speed = timestep.fastest_wave(simulation)
+    speed = stable_step.fastest_wave(simulation)
     return (
         f"waves move at {speed:.3g} through cells of {hub.domain.h:g}. The units of densities, "
         "moduli, lengths and times may be mixed"
@@ -134,17 +135,17 @@ def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
     """Warn once (or `again`) of a step of this or a later run above the stable limit."""
-    present, limit = step_of(hub, halves), simulation.limit_moving
+    present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.clock[0].heat_limit)
-    stable = timestep.stable_step(hub, simulation, limit)
+    stable = step_size.stable_step(simulation, limit)
     for step in (present, *later_steps(hub)):
         asked = step.fixed_dt or (step.dt_factor or 0) * limit
         if step.scene != present.scene or not asked > stable * (1 + 1e-12):
             continue
-        name = timestep.step_by_script(step.fixed_dt, step.dt_factor)
+        name = step_size.step_by_script(step.fixed_dt, step.dt_factor)
         command = name.split()[0]
         words = f"time step {asked:.4g} of {command} is "
-        hint = timestep.own_step_instead(hub, command)
+        hint = step_size.own_step_instead(simulation, command)
         if asked > BORNE * of_heat and not step.halves:
             words += f"{asked / of_heat:.3g} x the stability limit of conduction: "
             words += "temperatures would oscillate"
@@ -155,7 +156,7 @@ def warn_about_steps(
             words += f"temperatures oscillate above {BORNE:g} x this limit"
         else:
             words += f"above the stability limit {stable:.4g}"
-            words += timestep.what_follows(hub, simulation, asked)
+            words += step_size.what_follows(simulation, asked)
             if step.fixed_dt and asked > MIXED * stable:
                 words += f"; {mixed_units(hub, simulation)}"
                 hint = f"{UNITS}. If they are as they should be, {hint}"
@@ -183,7 +184,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
     for solid in s.hub.solids.values() if units else ():
         law = solid.material.law
         density = units.si(DENSITY) / float(specific_volume(law))
-        speed = units.si(VELOCITY) * timestep.elastic_speed(s.simulation, solid)[0]
+        speed = units.si(VELOCITY) * stable_step.elastic_speed(s.simulation, solid)[0]
         least = min(law_traits(kind).least_density for kind in law_kind(law))
         odd = []
         if not least <= density <= DENSITIES[1]:
@@ -204,18 +205,15 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
     """Warn of what will go wrong in a run of `duration` and the runs after it; once each."""
     _warn_about_groups(hub, simulation)
-    refuse_endless_speeds(hub, simulation)
+    refuse_endless_speeds(simulation)
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
-    one_step = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.limit)
-    if (
-        one_step
-        and timestep.ruling_limit(simulation) == "end"
-        and hub.update.first_time("one step")
-    ):
-        words = f"one step covers the whole run, where one of {simulation.limit:.3g} is stable"
+    one_step = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.steps.limit)
+    if one_step and simulation.steps.ruling_limit == "end" and hub.update.first_time("one step"):
+        limit = simulation.steps.limit
+        words = f"one step covers the whole run, where one of {limit:.3g} is stable"
         hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS, code="one-step")
-    if scene.waves > 0 and timestep.blows_up(hub, simulation):
+    if scene.waves > 0 and step_size.blows_up(simulation):
         scene.duration = 0.0  # the run ends before
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
@@ -240,7 +238,7 @@ def warn_about_factor(hub: Hub) -> None:
 def warn_about_loads(hub: Hub, steps: float) -> None:
     """Warn once if constant loads act in the first of several load steps only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
-    formulas_by_fix = {fix: list(formulas_of(tuple(vars(fix).values()))) for fix in acting}
+    formulas_by_fix = {fix: fix.all_formulas for fix in acting}
     change = any(
         not formula.is_constant for formulas in formulas_by_fix.values() for formula in formulas
     )

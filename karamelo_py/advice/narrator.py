@@ -5,16 +5,7 @@ from typing import Any
 
 from karamelo_py.advice import crossing, energy, explain, known_failures
 from karamelo_py.advice.facts import SceneFacts
-from karamelo_py.kernels.step import DONE
-from karamelo_py.kernels.watch import WITHIN
-from karamelo_py.points.basis import support
-from karamelo_py.run.energy import change_of_energy, unknown_work
-from karamelo_py.run.listening import Listener, Trouble
-from karamelo_py.run.loop import RunLoop
-from karamelo_py.run.lower.memory import bytes_per_point
-from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.tiles import DIRECT_UP_TO
-from karamelo_py.run.timestep import (
+from karamelo_py.advice.step_size import (
     NO_LIMITS,
     own_step_instead,
     own_step_instead_of,
@@ -22,6 +13,15 @@ from karamelo_py.run.timestep import (
     words_of_own_step,
     words_of_share,
 )
+from karamelo_py.kernels.step import DONE
+from karamelo_py.kernels.watch import WITHIN
+from karamelo_py.points.basis import support
+from karamelo_py.run.energy import unknown_work
+from karamelo_py.run.listening import Listener, Trouble
+from karamelo_py.run.loop import RunLoop
+from karamelo_py.run.lower.memory import bytes_per_point
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.tiles import DIRECT_UP_TO
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import words_of_volumes
@@ -60,8 +60,8 @@ class Narrator(Listener):
         """Start the record of this run, and print the banner."""
         hub, why = self.hub, unknown_work(self.hub)
         # For the first state: a failed one has no meaningful limit.
-        if simulation.too_large:
-            self.smaller = self.smaller or own_step_instead(hub)
+        if simulation.steps.too_large:
+            self.smaller = self.smaller or own_step_instead(simulation)
         facts: dict[str, Any] = {
             "method": hub.update.words,
             "points": int(simulation.present.sum()),
@@ -85,12 +85,13 @@ class Narrator(Listener):
             "dt": facts["dt"],
         }
         if not simulation.implicit:
-            facts["stable_dt"] = shown["stable dt"] = stable_step(hub, simulation, simulation.limit)
-            facts["own_dt"] = dt = own_step_instead_of(hub, simulation)
-            shown["own dt"] = words_of_own_step(hub, simulation, dt) if dt else None
-            facts["limited_by"] = simulation.ruling_limit
-            self.limits, self.least = {facts["limited_by"]}, simulation.limit
-            shown["limited by"] = f"{facts['limited_by']}; {words_of_share(hub)}"
+            stable = stable_step(simulation, simulation.steps.limit)
+            facts["stable_dt"] = shown["stable dt"] = stable
+            facts["own_dt"] = dt = own_step_instead_of(simulation)
+            shown["own dt"] = words_of_own_step(simulation, dt) if dt else None
+            facts["limited_by"] = simulation.steps.ruling_limit
+            self.limits, self.least = {facts["limited_by"]}, simulation.steps.limit
+            shown["limited by"] = f"{facts['limited_by']}; {words_of_share(simulation)}"
         if why and simulation.moves:
             facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
         hub.record.begin(facts)
@@ -106,10 +107,10 @@ class Narrator(Listener):
         )
 
     def stepped(self, simulation: Simulation) -> None:
-        hub = self.hub
-        if not simulation.told_of_growth and (gain := energy.words_of_growth(hub, simulation)):
+        hub, watch = self.hub, simulation.energy_watch
+        if not watch.told_of_growth and (gain := energy.words_of_growth(hub, simulation)):
             hub.warn(gain.message, hint=gain.fix, code=gain.code, cause=gain.cause)
-            simulation.told_of_growth = True
+            watch.growth_was_told()
         self._tell_of_loss(simulation, WITHIN)
         if simulation.step % simulation.states_every == 0 and not simulation.implicit:
             self._tell_of_limit(simulation)
@@ -117,7 +118,7 @@ class Narrator(Listener):
 
     def _tell_of_limit(self, simulation: Simulation) -> None:
         """Note a limit of the step that rules for the first time, or has halved."""
-        name, limit, before = simulation.ruling_limit, simulation.limit, self.least
+        name, limit, before = simulation.steps.ruling_limit, simulation.steps.limit, self.least
         if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
             return
         self.limits.add(name)
@@ -130,11 +131,11 @@ class Narrator(Listener):
 
     def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
         """Warn once of an energy loss above a fraction of the largest energy."""
-        hub = self.hub
-        loss = None if simulation.told_of_loss else energy.words_of_loss(hub, simulation, within)
+        hub, watch = self.hub, simulation.energy_watch
+        loss = None if watch.told_of_loss else energy.words_of_loss(hub, simulation, within)
         if loss is not None:
             hub.warn(loss.message, hint=loss.fix, code=loss.code, cause=loss.cause)
-            simulation.told_of_loss = True
+            watch.loss_was_told()
 
     def wrong(self, simulation: Simulation, status: int, too_large: bool) -> Trouble | None:
         if status == DONE:
@@ -152,7 +153,7 @@ class Narrator(Listener):
             "wall_s": wall,
             "steps": steps,
             "time": simulation.time,
-            "energy_change_percent": change_of_energy(simulation),
+            "energy_change_percent": simulation.energy_watch.change(),
             "path_cells": inf if simulation.implicit else float(simulation.control.clock[0].path),
             "point_steps_per_s": steps * simulation.count / in_steps if in_steps > 0 else 0.0,
             "processor_s_in_steps": float(worked),

@@ -8,7 +8,7 @@ from karamelo_py.advice.basics import BasicFacts
 from karamelo_py.advice.bodies import held, vibrating
 from karamelo_py.advice.crossing import BodyBoxes, boxes_of, meetings
 from karamelo_py.points.laws import can, constrained_velocity, specific_volume
-from karamelo_py.run import timestep
+from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
 
@@ -101,7 +101,7 @@ def uneven(facts: BasicFacts) -> Uneven:
         ratio = np.where(lattices == lattices[a], volumes / volumes[a], 0.0)
         if not ratio.max() > 1:
             continue
-        c = timestep.elastic_speed(facts.simulation, heavy)[0]
+        c = stable_step.elastic_speed(facts.simulation, heavy)[0]
         courant = c * dt / heavy.h * np.sqrt(np.maximum(ratio, 1.0))
         near = np.flatnonzero((ratio > 1) & (courant > max(BREAKS, most.courant)))
         chosen = BodyBoxes(*(array[near] for array in boxes))

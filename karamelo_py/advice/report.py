@@ -5,6 +5,12 @@ from math import inf
 from typing import Any
 
 from karamelo_py.advice.energy import not_watched
+from karamelo_py.advice.step_size import (
+    own_step_instead_of,
+    stable_step,
+    words_of_own_step,
+    words_of_share,
+)
 from karamelo_py.advice.suggestions import seconds_of_step, suggestions
 from karamelo_py.compiler.gpu import NoCard, card
 from karamelo_py.kernels.step import Staged, rows_of
@@ -18,13 +24,6 @@ from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.no_number import refuse_endless_speeds
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.timestep import (
-    own_step_instead_of,
-    ruling_limit,
-    stable_step,
-    words_of_own_step,
-    words_of_share,
-)
 from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -38,7 +37,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
-    refuse_endless_speeds(hub, simulation)
+    refuse_endless_speeds(simulation)
     simulation.sort_if_due()
     set_up = machine_memory.age()
     say = hub.console.say
@@ -62,12 +61,12 @@ def report(hub: Hub, end_time: float = inf) -> None:
     if simulation.implicit:
         _say_of_equations(say, simulation, nodes)
     else:
-        stable = stable_step(hub, simulation, simulation.limit)
+        stable = stable_step(simulation, simulation.steps.limit)
         say(f"first dt       {simulation.dt:.6g} (stable limit {stable:.6g})")
-        say(f"               {words_of_share(hub)}")
-        if (step := own_step_instead_of(hub, simulation)) is not None:
-            say(f"own dt         {words_of_own_step(hub, simulation, step)}")
-        say(f"limited by     {ruling_limit(simulation)}")
+        say(f"               {words_of_share(simulation)}")
+        if (step := own_step_instead_of(simulation)) is not None:
+            say(f"own dt         {words_of_own_step(simulation, step)}")
+        say(f"limited by     {simulation.steps.ruling_limit}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
             one = seconds_of_step(hub, simulation.count)
             say(f"steps          about {n:.0f}, {n * one:.1g} s or more")

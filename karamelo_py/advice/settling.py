@@ -14,7 +14,7 @@ import numpy as np
 from karamelo_py.advice.basics import BasicFacts, Body
 from karamelo_py.advice.bodies import fixes_at, lattice_at, sides, yields
 from karamelo_py.advice.crossing import loses
-from karamelo_py.run import timestep
+from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 
 CELLS = 0.25  # displacement at rest: with less, hardly a point crosses a cell
@@ -41,7 +41,7 @@ def expected(facts: BasicFacts) -> Settling:
     k = int(np.abs(g).argmax())
     for body in facts.bodies if g[k] else ():
         motion, solid = body
-        c = timestep.elastic_speed(facts.simulation, solid)[0]
+        c = stable_step.elastic_speed(facts.simulation, solid)[0]
         if yields(solid.material.whole) or not (c > 0 and _clamped(facts, body, k)):
             continue
         length = float(sides(body)[k])

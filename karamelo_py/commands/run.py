@@ -48,10 +48,9 @@ def carry_out(hub: Hub, **length: Any) -> None:
         report(hub, run.end_time)
         run.tell(lambda to: to.begun(run, hub.simulation))
         hub.simulation.refuse()
-        if hub.simulation.implicit:
-            hub.simulation.load_steps.refuse_all_loose()
         raise Quit
-    take_card(hub)
+    if hub.settings.card:
+        take_card(hub)
     replay = hub.interpreter.replay
     if replay is None or replay.at_end:
         run.run()

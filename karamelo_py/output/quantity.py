@@ -76,7 +76,7 @@ class Quantity:
     def read(self) -> float | int | str:
         """Current number or word; the first NaN is reported."""
         if self.is_word:
-            return self.hub.simulation.ruling_limit
+            return self.hub.simulation.steps.ruling_limit
         source = self._source()
         is_formula = isinstance(source, Expression)
         number = float(source.evaluate(self.hub.values)) if is_formula else source

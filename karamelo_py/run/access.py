@@ -1,4 +1,4 @@
-"""Nodes by number: all of a scene, or a limited number at a time."""
+"""Nodes of a simulation by number: all of them, or a limited number at a time."""
 
 from __future__ import annotations
 
@@ -15,21 +15,18 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes, rows_at
 
 
 class NodesByNumber:
-    """The nodes of a simulation that has `points`."""
-
     def __init__(self, points: Fields):
         self.points, self.simulation = points, points.simulation
 
     def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeTable]:
-        """Yield all nodes in pieces, with those sums over points that the columns `names` need."""
+        """Yield all nodes in pieces, with the sums over points that the columns `names` need."""
         simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
         simulation.show_on_nodes()
         s = simulation.setup
         sums = {name: brought(simulation, name) for name in names if name in BROUGHT}
         weights = loaded(hub, simulation) if sums else {}
         kept = kept_at_nodes(s)
-        if simulation.subdomain is not None:
-            simulation.subdomain.share_kept()
+        simulation.domain.share_kept()
         gather = comm.gather if to_first else comm.allgather
         for first, end in ranges(hub.fields.node_count):
             if comm.size == 1:
@@ -45,7 +42,6 @@ class NodesByNumber:
             yield NodeTable(hub, np.arange(first, end), s.kin, arrays, own, weights)
 
     def _sums_between(self, first: int, end: int, sums: dict, gather: Callable) -> dict:
-        """Sum over the points of all processes at the nodes from `first` to before `end`."""
         nodes = numbers(self.simulation.setup.spans)
         used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
         own = {name: np.zeros((end - first, 2)) for name in sums}
@@ -55,19 +51,15 @@ class NodesByNumber:
         return own
 
     def counted(self) -> np.ndarray:
-        """Return the numbers of the nodes in use, each on one process only."""
-        simulation = self.simulation
-        if simulation.subdomain is not None:
-            return simulation.subdomain.counted()
-        return numbers(simulation.setup.spans)
+        """Return the nodes in use, each on one process only."""
+        return self.simulation.domain.counted()
 
     def with_mass(self) -> np.ndarray:
-        """Return the numbers of those nodes that have mass."""
         nodes = self.counted()
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
     def mass_of(self, group: Any) -> np.ndarray:
-        """Sum the nodal mass of a group, and its moments about 0 (4,); rounded once."""
+        """Return the nodal mass of a group and its first moments (4,); rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
         nodes = np.intersect1d(self.with_mass(), hub.groups[group.id].members, assume_unique=True)

@@ -1,4 +1,4 @@
-"""Motion of the solids of a scene: sums over their points, without the points."""
+"""Motion of each solid, from sums over its points."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -11,8 +11,6 @@ from karamelo_py.run.boxes import unique
 
 
 class BodyMotion(NamedTuple):
-    """Motion of a solid with points."""
-
     number: int  # of the solid in the scene
     mass: float
     centre: np.ndarray  # (d,) of mass
@@ -26,16 +24,16 @@ class BodyMotion(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Return half of the longest side of the box around it."""
+        """Half of the longest side of its bounding box."""
         return float((self.high - self.low).max()) / 2
 
     def drift(self, axisymmetric: bool) -> np.ndarray:
-        """Return the velocity (d,) of the body as a whole; the radial component is 0."""
+        """Return the rigid velocity (d,); the radial component is 0."""
         return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
 
     @property
     def turning(self) -> np.ndarray:
-        """Return the angular velocity (3,), I^-1 L: none about an axis without extent across it."""
+        """Angular velocity (3,), I^-1 L; zero about an axis without extent across it."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear
@@ -49,7 +47,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Find the largest distance of an ellipsoid in its box from its axis of rotation."""
+        """Largest distance from the rotation axis, of an ellipsoid in the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)
@@ -57,13 +55,13 @@ class BodyMotion(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Find the largest stretching of the gradient nearest to the velocities of all points."""
+        """Largest principal stretching of the least-squares velocity gradient."""
         gradient = np.linalg.lstsq(self.spread, self.shear, rcond=None)[0]
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 
 
 def motions(simulation: Any) -> list[BodyMotion]:
-    """Measure the motion of all solids with points, on all processes; sums without rounding."""
+    """Measure the motion of all solids with points, over all processes; sums are exact."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
     ends = np.full((count, 4 * d), -np.inf)
@@ -89,7 +87,7 @@ def motions(simulation: Any) -> list[BodyMotion]:
 
 
 def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield the number of a solid, masses (n,), places and velocities (d, n) of some points."""
+    """Yield solid number, masses (n,), positions and velocities (d, n), block by block."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
     for block, rows in simulation.points.rows_of(None):
         points = block.points

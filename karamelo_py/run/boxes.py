@@ -1,4 +1,4 @@
-"""Boxes of nodes, ranges of their numbers, and buffers for the contributions of points."""
+"""Boxes of nodes, ranges of node numbers, and buffers for the contributions of points."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ SPAN = 256  # nodes of a span at most
 
 
 class Boxes(NamedTuple):
-    """Boxes of nodes, of b tiles of points."""
+    """Boxes of the nodes that b tiles of points reach."""
 
     order: np.ndarray  # (b,) in which they are summed
     grid: np.ndarray  # (b,)
@@ -33,7 +33,7 @@ class Reached(NamedTuple):
 
 
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """List first nodes of the rows of boxes of nodes (see `Buffers`), and the ends of the rows."""
+    """Return the first nodes of the rows of boxes (see `Buffers`), and the ends of the rows."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
     own = boxes[row]
     begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
@@ -41,7 +41,7 @@ def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def joined_spans(boxes: np.ndarray) -> np.ndarray:
-    """Join the rows (k, 2) of boxes of nodes (see `Buffers`) where they meet."""
+    """Merge adjoining rows (k, 2) of boxes of nodes (see `Buffers`) into spans."""
     begin, end = rows_of(boxes)
     order = np.argsort(begin, kind="stable")
     begin, end = begin[order], np.maximum.accumulate(end[order])
@@ -53,7 +53,7 @@ def joined_spans(boxes: np.ndarray) -> np.ndarray:
 
 
 def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
-    """Make `Setup.ranges`: rows (k, 2) of `count` owners, joined where two of one owner meet."""
+    """Make `Setup.ranges` from rows (k, 2) of `count` owners; adjoining rows are merged."""
     order = np.lexsort((rows[:, 0], owner))
     rows, owner = rows[order], owner[order]
     apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
@@ -65,19 +65,19 @@ def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndar
 
 
 def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the minimum and maximum of the rows from each start to the next."""
+    """Reduce rows from each start to the next to their minimum and maximum."""
     if not len(starts):
         return begin, end
     return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
 
 
 def used(spans: np.ndarray) -> np.ndarray:
-    """Return the rows of an array of spans that are in use, the first row with their number."""
+    """Return the rows in use of an array of spans, whose first row is their count."""
     return spans[: 1 + spans[0, 0]]
 
 
 def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the parts of spans (k, 2) outside all the others; neither of them overlap."""
+    """Return the parts of spans (k, 2) outside `others`; neither overlap."""
     edges = np.concatenate([spans.T.ravel(), others.T.ravel()])
     steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
     order = np.argsort(edges, kind="stable")
@@ -87,18 +87,18 @@ def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def numbers(spans: np.ndarray) -> np.ndarray:
-    """List the numbers of the nodes in spans, of which the first row is the count."""
+    """Return the node numbers in spans, whose first row is their count."""
     return between(*used(spans)[1:].T)
 
 
 def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """List all integers from each begin to before its end."""
+    """Return all integers in the ranges [begin, end)."""
     of, left = ragged(end - begin)
     return begin[of] + left
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for each item of k lists of these lengths, its list and its index there."""
+    """Return the list, and the index in it, of each item of k lists of these lengths."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -109,18 +109,17 @@ def numbered(shapes: np.ndarray) -> np.ndarray:
 
 
 def steps_of(shapes: np.ndarray) -> np.ndarray:
-    """Return strides (k, d) between neighbours in boxes of these shapes (k, d)."""
+    """Return the strides (k, d) of boxes of shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
 
 
 def unique(numbers: np.ndarray) -> np.ndarray:
-    """As ``np.unique(numbers)``, but without its import of numpy.ma: some 0.03 s."""
+    """As ``np.unique``, but without its import of numpy.ma (0.03 s)."""
     return np.unique(numbers, return_counts=True)[0]
 
 
 def no_nodes() -> dict[str, np.ndarray]:
-    """Make empty arrays for the nodes in use of a setup."""
     return {name: np.zeros((1, 2), np.int64) for name in ("spans", "ranges")}
 
 
@@ -129,32 +128,31 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """List the arrays that points scatter to, of the kinds in `what` (`sums.arrays_given`)."""
+    """Return the arrays that points scatter to, of the kinds in `what` (`sums.arrays_given`)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
 
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
-    """List the arrays that points scatter to."""
+    """Return the arrays that points scatter to."""
     own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
     return [nodes.sums, nodes.velocity, *own]
 
 
 def room_of(rows: int, like: np.ndarray) -> np.ndarray:
-    """Make `rows` zero rows like the array's; with none it can grow."""
+    """Return `rows` zero rows of the width and type of an array; with none it can grow."""
     width, kind = like.shape[1], like.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 
 
 def give_up(array: np.ndarray) -> None:
-    """Release the memory of an unused array."""
     if array.flags.owndata:
         forget_array(array)
         array.resize((0,) * array.ndim, refcheck=False)
 
 
 def grow(array: np.ndarray, rows: int) -> None:
-    """Give an array at least `rows` rows, in place, since setups hold it."""
+    """Resize an array in place to at least `rows` rows, since setups hold it."""
     if len(array) < rows:
         forget_array(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

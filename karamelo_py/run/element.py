@@ -1,6 +1,6 @@
-"""One point of a material under prescribed strains and stresses (commands load_path, element).
+"""One material point under prescribed strains and stresses (commands load_path, element).
 
-The law's own point functions are called from plain Python: nothing is compiled.
+The point functions of the law run in plain Python: nothing is compiled.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Targets at the end of a piece of path; every strain that is not named stays as it is."""
+    """Targets at the end of a load path; strains that are not named do not change."""
 
     increments: int  # number of equal ones
     duration: float
@@ -66,7 +66,6 @@ class LoadPath(Named):
             )
 
     def strain_at_end(self, strain: np.ndarray, free: Sequence[str]) -> np.ndarray:
-        """Find the strain (6,) at the end, from that at the start and the `free` components."""
         end = strain.copy()
         for name, value in self.strain.items():
             end[COMPONENTS.index(name)] = value
@@ -101,12 +100,10 @@ ROUNDING = 1e-13  # stress that cannot be resolved, over the modulus
 
 
 class Unreachable(Exception):
-    """No strain was found that gives the prescribed stress."""
+    """No strain gives the prescribed stress."""
 
 
 class Loading(NamedTuple):
-    """Load on the point along a whole path, and the stress at its ends."""
-
     strain: np.ndarray  # (6,) change of strain, 0 where the stress is prescribed
     turn: float
     shear: tuple[int, ...]  # components in simple shear
@@ -116,13 +113,10 @@ class Loading(NamedTuple):
 
 
 def stress_after(law, kin, state, dl, dt):
-    """Return the Cauchy stress after an increment."""
     return laws.cauchy_stress(law, kin, laws.advance(law, kin, state, dl, dt))
 
 
 class Point:
-    """A point of a material, and where it has come to."""
-
     def __init__(self, law: NamedTuple, kin: NamedTuple):
         self.law, self.kin = law, kin
         self.state = laws.initial_state(law, kin, 1.0)
@@ -144,7 +138,7 @@ class Point:
         return np.pad(found, (0, 6 - len(found)))
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
-        """Go along a path; `observe` is called after every increment."""
+        """Go along a path; call `observe` after every increment."""
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
         motion = Loading(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
@@ -169,7 +163,7 @@ class Point:
     def _go(
         self, motion: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
     ) -> np.ndarray:
-        """Go from the part `a` of a motion to the part `b`, in halves where it must be."""
+        """Go from fraction `a` of a path to fraction `b`, in halves if an increment fails."""
         try:
             found = self._solve(motion, (b - a) * duration, a, b, rate)
         except Unreachable:
@@ -183,13 +177,13 @@ class Point:
     def _solve(
         self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
     ) -> np.ndarray:
-        """Solve one increment: Newton's iteration for the strains whose stress is prescribed."""
+        """Solve an increment for the strains whose stress is prescribed."""
         prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)
 
         def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
-            """Return the state and its stress; None where there is none."""
+            """Return the state and its stress; None if there is none."""
             increment[prescribed] = unknown
             dl = self._strained(increment, motion.shear) + rigid
             try:
@@ -221,10 +215,10 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """Find the tangent (n, m) of the last increment.
+        """Return the tangent (n, m) of the last increment.
 
-        Derivatives of the n components of Cauchy stress, by the m strains that there can be; shears
-        are angles, twice the strain of the tensor.
+        Derivatives of the n components of Cauchy stress by the m free strains; shears are
+        engineering shear strains.
         """
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
@@ -233,7 +227,7 @@ class Point:
     def _slopes(
         self, state: tuple, dl: np.ndarray, dt: float, ways: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Find derivatives (6, w) of the stress after an increment `dl` by w changes (3, 3)."""
+        """Return derivatives (6, w) of the stress after `dl` by w changes (3, 3) of it."""
         places = GRADIENT[type(self.kin)]
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
         found = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
@@ -248,7 +242,6 @@ class Point:
         increment: np.ndarray,
         target: np.ndarray,
     ) -> np.ndarray:
-        """Find the strains at which `misfit` vanishes, by its exact tangent."""
         if not len(guess):
             return guess
         volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
@@ -281,7 +274,7 @@ class Point:
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
-        """Return dt grad v (3, 3) of a strain increment, pure, or simple in `shear`."""
+        """Return dt grad v (3, 3) of a strain increment: pure shear, or simple in `shear`."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():
             simple = k in shear
@@ -316,7 +309,6 @@ class Point:
         return tensor(self.kin, [float(gradient[place]) for place in GRADIENT[type(self.kin)]])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
-        """Take the new state; the work is computed with the mean Kirchhoff stress."""
         weights = np.where(np.arange(6) < 3, 1, 2)
         before = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.state = state
@@ -332,7 +324,7 @@ WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take,
 
 
 def shown(point: Point) -> dict[str, float]:
-    """Return what is written of a point, by column; q is the von Mises stress, sqrt(3/2 s:s)."""
+    """Return the output columns of a point; q is the von Mises stress, sqrt(3/2 s:s)."""
     law, kin, state, stress = point.law, point.kin, point.state, point.stress
     names = COMPONENTS[: len(kin.symmetric_names)]
     xx, yy, zz, *shear = stress
@@ -351,8 +343,6 @@ def shown(point: Point) -> dict[str, float]:
 
 
 class Response:
-    """The answer of a point so far, a row for each increment."""
-
     def __init__(self, point: Point):
         self.point = point
         self.names = list(shown(point))
@@ -367,14 +357,13 @@ class Response:
         return dict(zip(self.names, self.rows[-1], strict=True))
 
     def write(self, path: Path) -> None:
-        """Write the table, in the form of the log: a line of names, a line for each row."""
         formats = [f"%-{WIDTH}.10g"] * (len(self.names) - 1) + ["%.10g"]
         header = "".join(name.ljust(WIDTH) for name in self.names).rstrip()
         with whole(path) as file:
             np.savetxt(file, self.rows, fmt=formats, delimiter="", header=header, comments="")
 
     def draw(self, path: Path, title: str) -> None:
-        """Draw the stresses over the strain that changes most, and q over p."""
+        """Plot the stresses over the strain that changes most, and q over p."""
         table = dict(zip(self.names, np.transpose(self.rows), strict=True))
         strains = [name for name in self.names if name.startswith("e") and name[1:] in COMPONENTS]
         driven = max(strains, key=lambda name: np.ptp(table[name]))

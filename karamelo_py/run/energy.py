@@ -1,11 +1,27 @@
-"""The balance of energy of a run: whether it is watched, has grown, and what is lost."""
+"""The energy balance of a run: whether it is watched, has grown, and what is lost."""
 
-from typing import Any
+from __future__ import annotations
+
+import numpy as np
 
 from karamelo_py.kernels.hooks import HEAT_STAGES, CompiledHook
-from karamelo_py.kernels.watch import BORNE, FEW, WITHIN, growth, keeps, unit_of
+from karamelo_py.kernels.totals import agree_on_heat
+from karamelo_py.kernels.watch import (
+    BORNE,
+    COARSE,
+    FEW,
+    ROUND_OFF,
+    WITHIN,
+    begin_to_look,
+    growth,
+    keeps,
+    measure_heat,
+    sum_energies,
+    unit_of,
+)
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
@@ -33,7 +49,6 @@ def unknown_work(hub: Hub) -> str:
 
 
 def unknown_heat(hub: Hub) -> bool:
-    """Return True if a fix in Python may supply heat, or friction does."""
     return warms_by_friction(hub) or any(
         name in HEAT_STAGES and not isinstance(hook, CompiledHook)
         for fix in hub.fixes.values()
@@ -41,49 +56,121 @@ def unknown_heat(hub: Hub) -> bool:
     )
 
 
-def has_grown(simulation: Any) -> bool:
-    """Judge, by looks at it, that energy shows a spurious gain."""
-    clock = simulation.control.clock[0]
-    return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
+class EnergyWatch:
+    """Watches the balance of energy and the range of temperatures of a simulation.
 
+    Besides the kernels, only this class writes them to the clock.
+    """
 
-def share_lost(simulation: Any) -> float:
-    """Fraction of the largest energy so far lost since the first step; negative: a gain."""
-    clock = simulation.control.clock[0]
-    mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
-    return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
+    def __init__(self, simulation: Backend):
+        self.simulation, self.clock = simulation, simulation.control.clock[0]
+        self.followed = False  # the clock knows the balance up to the present state
+        self.told_of_growth = False  # a warning was given since the balance is followed
+        self.told_of_loss = False
 
+    def begin(self, *, set_anew: bool) -> None:
+        """Begin to watch, or continue unless fields were `set_anew` since the last step."""
+        simulation, clock = self.simulation, self.clock
+        update = simulation.hub.update
+        clock.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)
+        anew = not self.followed or set_anew
+        self.followed = simulation.moves  # load steps are not in the balance
+        if anew:
+            self.told_of_growth = self.told_of_loss = False
+        if clock.watch_energy:
+            # Velocities belong to half a step earlier, stresses to the fraction strained before.
+            self._begin_to_look(0.25 + 0.5 * update.scheme.traits.strained_before, anew)
+        known = simulation.notes_temperatures and not unknown_heat(simulation.hub)
+        clock.watch_heat = int(update.thermal and known)
+        if clock.watch_heat and anew:
+            measure_heat(simulation.setup)
+            agree_on_heat(simulation.control.ranks, simulation.control)
+            clock.coldest, clock.hottest = clock.T_low, clock.T_high
 
-def grown_little(simulation: Any) -> bool:
-    """Return True if the present state is good, judged by its energy and its last step."""
-    clock = simulation.control.clock[0]
-    swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
-    if swings or has_grown(simulation):
-        return False
-    if not clock.watch_energy:
-        return True
-    # The last look, too: noise that grows by half in a hundred steps is already in the state.
-    before = clock.first_mean if clock.looks >= FEW else clock.first_balance
-    return bool(keeps(before, clock.balance, unit_of(clock)))
+    def _begin_to_look(self, level: float, anew: bool) -> None:
+        simulation, clock = self.simulation, self.clock
+        points = simulation.points
+        strain = COARSE * float(np.finfo(simulation.setup.nodes.sums.dtype).eps)
+        clock.energy_floor = (
+            max(ROUND_OFF, strain**2) * points.total("mass") * float(clock.rate) ** 2
+        )
+        clock.born_with = points.total("born with")
+        if anew:
+            clock.to_and_fro = 2 * self._length() / max(float(clock.wave or clock.rate), 1e-300)
+        # Energies are summed by tile.
+        if not simulation.in_tiles():
+            simulation.sort()
+            simulation.mapped = False
+        begin_to_look(simulation.setup, simulation.mode, level, anew)
 
+    def _length(self) -> float:
+        simulation = self.simulation
+        d = simulation.kin.dimension
+        ends = np.full(2 * d, -np.inf)
+        for block in simulation.setup.blocks:
+            x = block.points.x[simulation.now][:d]
+            extremes = [x.max(axis=1, initial=-np.inf), (-x).max(axis=1, initial=-np.inf)]
+            ends = np.maximum(ends, np.concatenate(extremes))
+        ends = simulation.comm.allreduce_max(ends)
+        return float((ends[:d] + ends[d:]).max())
 
-def growth_since(simulation: Any, before: float) -> float:
-    """Return the energy growth relative to `before`; NaN if energy is not watched."""
-    unit = max(abs(before), float(simulation.control.clock[0].energy_floor), 1e-300)
-    return growth(before, simulation.energy(), unit)
+    def energy(self) -> float:
+        """Sum kinetic, stored and dissipated energy minus the work; NaN if it is not watched."""
+        simulation, clock = self.simulation, self.simulation.control.clock
+        if not simulation.in_tiles() or not clock[0].watch_energy:
+            return np.nan
+        present = clock.copy()
+        sum_energies(simulation.setup, simulation.mode)
+        energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
+        clock[:] = present
+        return energy
 
+    def growth_was_told(self) -> None:
+        self.told_of_growth = True
 
-def change_of_energy(simulation: Any) -> float | None:
-    """Return the energy change since the first step, in % of the largest; None if unknown."""
-    clock = simulation.control.clock[0]
-    if not clock.watch_energy or clock.looks <= FEW:
-        return None
-    # Since the first balance, not `first_few`, which `forget_growth` changes.
-    return -100 * share_lost(simulation)
+    def loss_was_told(self) -> None:
+        self.told_of_loss = True
 
+    def has_grown(self) -> bool:
+        """Judge, by looks at it, that energy shows a spurious gain."""
+        clock = self.clock
+        return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
-def forget_growth(simulation: Any) -> None:
-    """Measure growth from the present state: a warning has been given."""
-    clock = simulation.control.clock[0]
-    clock.first_few = clock.first_mean = clock.largest_mean
-    clock.windows, clock.grown = 0, 0.0
+    def share_lost(self) -> float:
+        """Fraction of the largest energy so far lost since the first step; negative: a gain."""
+        clock = self.clock
+        mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
+        return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
+
+    def grown_little(self) -> bool:
+        """Return True if the present state is good, judged by its energy and its last step."""
+        clock = self.clock
+        swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
+        if swings or self.has_grown():
+            return False
+        if not clock.watch_energy:
+            return True
+        # The last look, too: noise that grows by half in a hundred steps is already in the state.
+        before = clock.first_mean if clock.looks >= FEW else clock.first_balance
+        return bool(keeps(before, clock.balance, unit_of(clock)))
+
+    def growth_since(self, before: float) -> float:
+        """Return the energy growth relative to `before`; NaN if energy is not watched."""
+        unit = max(abs(before), float(self.clock.energy_floor), 1e-300)
+        return growth(before, self.energy(), unit)
+
+    def change(self) -> float | None:
+        if not self.clock.watch_energy or self.clock.looks <= FEW:
+            return None
+        # Since the first balance, not `first_few`, which `forget_growth` changes.
+        return -100 * self.share_lost()
+
+    def forget_growth(self) -> None:
+        """Measure growth from the present state: a warning has been given."""
+        clock = self.clock
+        clock.first_few = clock.first_mean = clock.largest_mean
+        clock.windows, clock.grown = 0, 0.0
+
+    def without(self, stored: float) -> None:
+        self.clock.stored_before -= stored
+        self.clock.moving_before += stored

@@ -1,9 +1,9 @@
-"""The stable step of bodies in the total frame, by the mass of their nodes and its stiffness.
+"""The stable step of bodies in the total frame, limited by nodes with little mass.
 
-Nodes at an edge that next to no matter reaches may be stiffer, for their mass, than those within a
-body. FLIP averages their motion away. Transfers with moments or gradients of velocity do not: their
-points follow any linear field. The step is stable below 2 / w, with the highest frequency w of the
-nodes (w^2 is an eigenvalue of M^-1 K, with lumped masses); in that frame it is known at set-up.
+Nodes at an edge that hardly any material reaches may be stiffer, for their mass, than those within
+a body. FLIP averages their motion away; transfers with moments or velocity gradients do not, since
+their points follow any linear field. The step is stable below 2 / w, where w^2 is the largest
+eigenvalue of M^-1 K with lumped masses. In the total frame it is known at set-up.
 """
 
 from itertools import product
@@ -34,15 +34,13 @@ STEPS = 24  # of the iteration: within 1 % of the highest frequency
 
 
 class _Line(NamedTuple):
-    """The nodes that points see in one direction."""
-
     first: np.ndarray  # (n,)
     weights: np.ndarray  # (n, m)
     slopes: np.ndarray  # (n, m)
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
-    """Return the stable step over h/c that the nodes of all solids allow; inf if nothing is known.
+    """Return the stable step over h/c that the nodes of all solids allow; inf if unknown.
 
     Rounded down to four digits, so that sums in another order give the same step.
     """
@@ -55,7 +53,7 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
 
 
 def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
-    """Find the highest frequency among the light nodes of one solid, in units of c/h."""
+    """Return 2 / w (c/h) of the light nodes of one solid."""
     method, volume = hub.update.method, solid.volume0
     kin = method.kinematics(hub)
     places = method.places(kin, solid, float)
@@ -106,7 +104,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     root[root == 0] = inf
 
     def stiffness(u: np.ndarray) -> np.ndarray:
-        """Return M^-1/2 K M^-1/2 u of (nodes, d), in units of c^2."""
+        """Return M^-1/2 K M^-1/2 u (nodes, d), in units of c^2."""
         there = (u / root[:, None])[at]
         gradient = np.stack([(there * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
         trace = np.trace(gradient, axis1=1, axis2=2)
@@ -125,7 +123,6 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
 
 
 def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -> _Line:
-    """Find the nodes along one direction; points at the same place in it see the same ones."""
     d = kin.dimension
     own = places[:, direction::d] if places.shape[1] > d else places[:, direction, None]
     _, first, back = np.unique(own, axis=0, return_index=True, return_inverse=True)
@@ -139,7 +136,7 @@ def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Any, kin: Any) -> float:
-    """Return the shear modulus over the P-wave modulus: 1/2 (Poisson's ratio 0) at most."""
+    """Return the shear modulus over the P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
@@ -147,7 +144,7 @@ def _shear_share(law: Any, kin: Any) -> float:
 
 
 def _largest(operator: Any, shape: tuple[int, int]) -> float:
-    """Find the largest eigenvalue of a symmetric operator by the iteration of Lanczos (1950)."""
+    """Return the largest eigenvalue of a symmetric operator by Lanczos iteration (1950)."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []

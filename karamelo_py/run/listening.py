@@ -1,4 +1,4 @@
-"""Events of a run: the loop sends them, and what shows or explains a run listens."""
+"""Events of a run, and the base of what listens to them."""
 
 from typing import Any, NamedTuple
 
@@ -6,10 +6,7 @@ from karamelo_py.script.errors import Place
 
 
 class Trouble(NamedTuple):
-    """Trouble of a run, a fix, the kind for programs (`code`) and the likely cause, if known.
-
-    `place` is the line of the script at fault, if there is one.
-    """
+    """A failure of a run: message, fix, code for programs, likely cause, line of the script."""
 
     message: str
     fix: str
@@ -19,17 +16,17 @@ class Trouble(NamedTuple):
 
 
 def when(simulation: Any, later: int = 0) -> str:
-    """Write the step (or one some steps `later`) and the time of a simulation."""
+    """Format the step (or `later` steps on) and the time."""
     return f"step {simulation.step + later}, t = {simulation.time:.6g}"
 
 
 def where(x: Any) -> str:
-    """Write a position."""
+    """Format a position."""
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
 class Listener:
-    """Hears what happens in a run; a subclass overrides what it cares for."""
+    """Receives the events of a run; subclasses override what they need."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
         """The first step is known, and nothing is compiled yet; `resumed` from a file."""
@@ -41,10 +38,10 @@ class Listener:
         """Some steps were taken, all of them good."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
-        """Explain a `status`, DONE for a gain of energy; a step `too_large` from the start."""
+        """Explain a `status`, DONE for an energy gain; a step `too_large` from the start."""
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
-        """The run is over: it began at `first_step` and has taken `wall` seconds."""
+        """The run is over; it began at `first_step` and took `wall` seconds."""
 
     def signalled(self, number: int) -> None:
-        """A signal has come: the run ends after the present steps."""
+        """A signal arrived: the run ends after the present steps."""

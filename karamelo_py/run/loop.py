@@ -1,4 +1,4 @@
-"""One run: steps in chunks, outputs when they are due, and events for all who listen."""
+"""One run: steps in chunks, outputs when they are due, and events for listeners."""
 
 import signal
 import time
@@ -11,7 +11,7 @@ import numpy as np
 
 from karamelo_py.run.listening import Listener
 from karamelo_py.run.mpi.comm import check_same_run, handled_signals
-from karamelo_py.run.recovery import RollBack, Stopped
+from karamelo_py.run.rollback import RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timings import Timings
 from karamelo_py.scene.hub import Hub
@@ -23,15 +23,15 @@ PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress 
 
 
 class Interrupted(Exception):
-    """The user pressed Ctrl-C, or another signal (its number) came; everything is written."""
+    """The run was ended by a signal, such as Ctrl-C; its outputs are complete."""
 
 
 @dataclass(eq=False)
 class RunLoop:
     """Runs a scene for a number of steps, to a time, or by a condition.
 
-    It ends where the condition holds (`until`), else where it does not. With `halve` it goes back
-    and halves the step where that goes wrong.
+    It ends when the condition holds (`until`) or fails. With `halve`, it returns to the last good
+    state and halves the step after a failure.
     """
 
     hub: Hub
@@ -51,7 +51,7 @@ class RunLoop:
         self.timings = Timings(self.hub)
 
     def tell(self, event: Callable[[Listener], Any]) -> Any:
-        """Send an event to all who listen; return the first answer."""
+        """Send an event to all listeners; return the first answer."""
         answers = [event(listener) for listener in (*self.hub.listeners, self.advice)]
         return next((answer for answer in answers if answer is not None), None)
 
@@ -107,7 +107,6 @@ class RunLoop:
             raise Interrupted(self.interrupted)
 
     def _take_up(self, simulation: Simulation) -> None:
-        """Take the state of a file; note whether a step above the limit has spoilt it."""
         hub, file = self.hub, self.hub.restart.path
         hub.restart.take(hub, self.rollback.point, outputs=True)
         hub.restart = hub.interpreter.replay = None
@@ -134,7 +133,6 @@ class RunLoop:
         length, longest = 1, most if self.condition is None else 1
 
         def between(words: str) -> bool:
-            """Show how far a load step is; tell whether the run is to end before it."""
             self._show_progress(simulation, words)
             return bool(self.signal)
 
@@ -179,7 +177,6 @@ class RunLoop:
         return False
 
     def _agree(self, simulation: Simulation) -> None:
-        """Learn which signal any of the processes has been sent."""
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
@@ -205,7 +202,6 @@ class RunLoop:
         return bool(holds) != self.until
 
     def _show_progress(self, simulation: Simulation, within: str = "", anew: bool = False) -> None:
-        """Show how far the run is, and a step; `anew` where a rate would count compilation."""
         console, fraction = self.hub.console, None
         if self.steps:
             fraction = (simulation.step - self.first_step) / self.steps
@@ -217,7 +213,7 @@ class RunLoop:
         console.progress(simulation.step, simulation.time, fraction, within)
 
     def _note(self, number: int, _: Any = None) -> None:
-        """Note a signal: it ends the run after the present chunk; a second one at once."""
+        """End the run after the present chunk; a second signal ends it at once."""
         if self.signal:
             raise KeyboardInterrupt
         self.signal = number

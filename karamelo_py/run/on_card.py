@@ -1,4 +1,4 @@
-"""Simulation whose steps a GPU takes: arrays go there when they changed, and come back late."""
+"""Simulation on a GPU: arrays are sent when changed, and fetched on access."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from karamelo_py.scene.hub import Hub
 
 
 def alike(hooks: Any, others: Any) -> bool:
-    """Tell whether hooks do the same, by their tables, members and formulas."""
     if type(hooks) is not type(others) or isinstance(hooks, NoHooks):
         return type(hooks) is type(others)
     tables = ("table", "programs", "members", "code", "constants", "x0")
@@ -28,14 +27,15 @@ def alike(hooks: Any, others: Any) -> bool:
 
 
 class SimulationOnCard(Simulation):
-    """Take the steps of a scene on a GPU; all else is done here, on what the steps have left.
+    """Takes the steps of a scene on a GPU; everything else runs on the processor.
 
-    `setup` brings the arrays back where steps have been taken since. What changes them here says so
-    by `changed` or `sort`; they are sent again before the next steps. The order of the points is
-    the GPU's then, and tiles are out of date: users of tiles sort first.
+    `setup` fetches the arrays if steps were taken. Changes on the processor call `changed` or
+    `sort`, and arrays are sent again before the next steps. Points are then in the order of the
+    GPU, and tiles are out of date: users of tiles sort first.
     """
 
     states_every = 1000  # what is kept has to be brought back
+    notes_temperatures = False
     _steps: StepsOnCard | None = None
     _known: Sequence = ()  # the arrays and hooks that these are for
     _ahead = False  # steps on the card are not in the arrays here
@@ -49,7 +49,6 @@ class SimulationOnCard(Simulation):
             previous.leave_card()
 
     def leave_card(self) -> None:
-        """Give the memory of the card back; the arrays are here."""
         self._fetch()
         if self._steps is not None:
             self._steps.images.close()
@@ -57,7 +56,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def setup(self) -> Setup:
-        """Return the arrays, as the last step has left them."""
+        """Arrays after the last step."""
         self._fetch()
         return self._setup
 
@@ -67,7 +66,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
-        """Return the nodes, as the last step has left them: they may be many, and few ask."""
+        """Nodes after the last step; fetched on access only, as they may be many."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False
@@ -83,13 +82,10 @@ class SimulationOnCard(Simulation):
         return self._setup.kin
 
     def _fetch(self) -> None:
-        """Bring the arrays back, unless they are as the last step has left them."""
         if self._ahead:
             self._ahead = False
             self._steps.fetch()
-            # Tiles know nothing of these steps.
-            clock = self.control.clock[0]
-            clock.drift, clock.drift_limit = np.inf, 0.0
+            self.tiles.unsort(self.control, limit=0.0)  # tiles know nothing of these steps
 
     # --- changes here
 
@@ -119,24 +115,13 @@ class SimulationOnCard(Simulation):
         self.sort_if_due()
         super().show_on_nodes()
 
-    def energy(self) -> float:
-        self._sort_for_sums()
-        return super().energy()
-
-    def _begin_to_look(self, level: float, anew: bool) -> None:
-        self._sort_for_sums()
-        super()._begin_to_look(level, anew)
-
     def bring(self) -> None:
         self.sort_if_due()
 
-    def _watch_energy(self, begun_before: int) -> None:
-        super()._watch_energy(begun_before)
-        self.control.clock[0].watch_heat = 0  # threads note no range of temperatures
-
-    def _sort_for_sums(self) -> None:
+    def in_tiles(self) -> bool:
         self.sort_if_due()
         self._sent = False  # the work of forces is taken from the points
+        return super().in_tiles()
 
     # --- steps
 
@@ -151,12 +136,11 @@ class SimulationOnCard(Simulation):
             self._sent = False
 
     def compile(self) -> None:
-        """Have all that threads do compiled now, and room for the arrays on the card."""
+        """Compile the steps and allocate the arrays on the card."""
         self.launches()
 
     def launches(self) -> StepsOnCard:
-        """Give the steps for the arrays and hooks as they are."""
-        steps, hooks, functions = self._steps, self.hooks, self.python.functions
+        steps, hooks, functions = self._steps, self.hooks, self.fixes.lasting.functions
         if steps is not None and functions == steps.functions and alike(hooks, steps.hooks):
             hooks = steps.hooks  # of a run before
         known = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
@@ -192,7 +176,7 @@ class SimulationOnCard(Simulation):
         return status
 
     def _report(self, number: int) -> None:
-        """Let the reports of tiles show the point that went wrong, where others look for it."""
+        """Write the failed point into the reports of tiles, as processors do."""
         for block in self.setup.blocks:
             report = block.tiling.report
             report[:, 2] = 0

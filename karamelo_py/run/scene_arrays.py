@@ -1,4 +1,4 @@
-"""The arrays of a scene: what they show, and states that they can be returned to."""
+"""The arrays of a scene."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.access import NodesByNumber
+from karamelo_py.run.backend import WholeDomain
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint.parts import RollbackPoint
 from karamelo_py.run.lower.build import State, check_scene, lower, thread_count, warms_by_friction
@@ -29,16 +30,15 @@ from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
+from karamelo_py.run.step_size import LastSteps
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.views import set_columns
 
 TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by points that are deleted
 
 
 def scene_key(hub: Hub) -> tuple:
-    """Return what arrays depend on: while it stays the same, so do they."""
     update = hub.update
     return (
         hub.domain,
@@ -65,7 +65,7 @@ def scene_key(hub: Hub) -> tuple:
 
 
 class SceneArrays:
-    """Hold the arrays of a scene, or of the part of a process, and its threads."""
+    """Arrays and threads of a scene, or of the part of one process."""
 
     def __init__(self, hub: Hub, previous: SceneArrays | None = None):
         self.hub = hub
@@ -92,19 +92,11 @@ class SceneArrays:
         self._team = new_team(self.threads)
         self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
         self.tiles.mode = self.mode
-        self.subdomain = Subdomain(self) if comm.size > 1 else None
+        self.domain = Subdomain(self) if comm.size > 1 else WholeDomain(self)
         self.control = self.setup.control
         self.version = 0  # grows when fields change without a step
-        self.measured = False  # whether the rate of the fastest point is up to date
-        self.followed = False  # whether the clock knows the balance of energy up to it
-        self.told_of_growth = False  # since the balance of energy is followed
-        self.told_of_loss = False
         self.rollback: RollbackPoint | None = None  # of the last run
         self.mapped = False  # whether the nodes show a state of this simulation
-        for solid in hub.solids.values():
-            if solid.initial and (state is None or solid.first_id >= state.count):
-                ids = np.arange(solid.first_id, solid.first_id + solid.count)
-                set_columns(self, solid.initial, ids, solid.place)
 
     def fits(self, hub: Hub) -> bool:
         return self.key == scene_key(hub)
@@ -115,7 +107,7 @@ class SceneArrays:
 
     @property
     def now(self) -> int:
-        """Return the number of the present of the two position arrays."""
+        """Index of the present one of the two position arrays."""
         return int(self.control.clock[0].now)
 
     @property
@@ -128,13 +120,11 @@ class SceneArrays:
 
     @property
     def step(self) -> int:
-        """Return the number of steps taken in the whole script."""
         return int(self.control.values[TIMESTEP])
 
     def state(self) -> State:
-        """Return all that a new lowering takes over."""
-        if self.subdomain is not None:
-            self.subdomain.share_memory()
+        """Return what a new lowering takes over."""
+        self.domain.share_memory()
         laws, all_points = {}, self.points.rows()
         for block in self.setup.blocks:
             state = block.points.state
@@ -154,13 +144,11 @@ class SceneArrays:
             self.setup.grids,
             {type(one): one.array for one in self.setup.nodes.fields if fields.is_kept(type(one))},
             self.setup.contact,
-            float(self.control.clock[0].last_dt),
-            float(self.control.clock[0].last_contact_dt),
-            float(self.control.clock[0].path),
+            LastSteps.of(self.control),
         )
 
     def leaving(self) -> np.ndarray:
-        """List the ids (0-based, ascending) of points whose new places lie beyond the edge."""
+        """Return the ids (0-based, ascending) of points whose new positions are outside."""
         s, then = self.setup, 1 - self.now
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
         found = []
@@ -177,66 +165,55 @@ class SceneArrays:
             found.append(points.id[beyond & finite])
         return np.sort(np.concatenate(self.comm.allgather(np.concatenate(found))))
 
-    def remove(self, ids: np.ndarray) -> tuple[float, float]:
-        """Take points (ascending ids) out of the run; the ids of the others stay.
-
-        Returns their mass, and the energy that they take along: the balance counts it as work.
-        """
+    def taken_along(self, ids: np.ndarray) -> tuple[float, float, float]:
+        """Count the energy of points as work; return mass, kinetic and stored energy."""
         group = ParticleGroup(self.hub)
         group.add_numbers(ids)
         mass, kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG)
-        stored, clock = sum(inner), self.control.clock[0]
+        stored = sum(inner)
         if self.comm.leads:
             add_to(self.control.totals, WORK, -(kinetic + stored))
-        # Of a look that is half done.
-        clock.stored_before -= stored
-        clock.moving_before += stored
+        return mass, kinetic, stored
+
+    def drop(self, ids: np.ndarray) -> None:
         self.present[ids] = False
         blocks = tuple(
             some_of(block, np.flatnonzero(self.present[block.points.id]))
             for block in self.setup.blocks
         )
         self.setup = self.setup._replace(blocks=blocks)
-        clock.drift, followed = np.inf, self.followed
+        self.tiles.unsort(self.control)
         self.changed()
-        self.followed = followed
-        # The rate of the last step stays: the same whether or not a run begins here.
-        self.measured = True
-        return mass, kinetic + stored
 
     def changed(self) -> None:
-        """Take note that fields have changed without a step."""
         self.version += 1
-        self.measured = self.followed = False
 
     @property
     def bounces(self) -> int:
         return int(self.points.total("bounces"))
 
     def clear_forces(self) -> None:
-        """Clear the forces of fixes on points, until these say so anew."""
         for block in self.setup.blocks:
             force = field(block.points.fields, Force)
             if force is not None:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort the points by tile; each process hands over those that are in tiles of others."""
-        if self.subdomain is not None:
-            self.setup = self.subdomain.migrate(self.setup)
+        """Sort the points by tile, after handing over those in tiles of other processes."""
+        self.setup = self.domain.migrate(self.setup)
         self.tiles.sort(self.setup)
 
     def sort_if_due(self) -> None:
-        """Sort the points when one may have left its tile's surroundings, or none is sorted yet."""
+        """Sort the points if one may have left the reach of its tile, or none is sorted."""
         clock = self.control.clock[0]
         if clock.drift > clock.drift_limit:
             self.sort()
 
     def bring(self) -> None:
-        """Have all of the state here, points in the order of their tiles: it is."""
+        """Make sure that the whole state is here, and points in the order of their tiles."""
 
     def show_on_nodes(self) -> None:
-        """See that the nodes show the present state when no step has been taken yet."""
+        """Map the present state to the nodes if no step has done so."""
         if self.mapped:
             return
         self.sort_if_due()
@@ -251,8 +228,7 @@ class SceneArrays:
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
         """Copy every array that a step changes, and the published values; see `copied`."""
-        if self.subdomain is not None:
-            self.subdomain.share_kept()
+        self.domain.share_kept()
         return checkpoint.copied(self, before or {})
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:

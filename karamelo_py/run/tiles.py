@@ -1,4 +1,4 @@
-"""The grids cut into tiles: the points of each, the nodes they reach, and the nodes in use."""
+"""Grids cut into tiles: the points of each, the nodes they reach, and the nodes in use."""
 
 from collections.abc import Sequence
 from math import inf
@@ -40,7 +40,7 @@ DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts the points of a setup by tile, and determines the nodes that each tile may reach."""
+    """Sorts the points of a setup by tile, and finds the nodes that each tile may reach."""
 
     threads = 1  # for sums at nodes and for sorting
     mode: Serial | Threaded = Serial()
@@ -103,7 +103,6 @@ class Tiles:
         )
 
     def empty_buffers(self, nodes: kernel_arrays.Nodes, blocks: int) -> kernel_arrays.Buffers:
-        """Make buffers for the contributions of points of this number of blocks to `nodes`."""
         most = blocks * self._most_rows
         rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
         given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
@@ -117,17 +116,24 @@ class Tiles:
         return kernel_arrays.Buffers(of, *self._layout, self.sets - 1)
 
     def empty_nodes(self, s: kernel_arrays.Setup) -> None:
-        """Set the sums of points at the nodes in use to zero."""
+        """Zero the sums of points at the nodes in use."""
         _empty(s, grid_boxes.used(s.spans)[1:])
         if not self.direct:
             for one in grid_boxes.buffers_of(s):
                 for array in grid_boxes.summed(one.nodes):
                     array[: self.rows] = 0
 
-    def sort(self, s: kernel_arrays.Setup) -> None:
-        """Sort all points by tile and find the nodes in use; sums at other nodes become zero.
+    def unsort(self, control: kernel_arrays.Control, *, limit: float | None = None) -> None:
+        """Have the points sorted before the next step; `limit` replaces the drift limit."""
+        clock = control.clock[0]
+        clock.drift = np.inf
+        if limit is not None:
+            clock.drift_limit = limit
 
-        Nodes in use are cleared in the next step, and boxes are zero between two steps.
+    def sort(self, s: kernel_arrays.Setup) -> None:
+        """Sort all points by tile, find the nodes in use, and zero the sums at all others.
+
+        Nodes in use are zeroed in the next step, and boxes are zero between two steps.
         """
         before = grid_boxes.used(s.spans)[1:].copy()
         clock = s.control.clock[0]
@@ -143,7 +149,7 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: kernel_arrays.Setup, block: kernel_arrays.Block, x: np.ndarray) -> float:
-        """Bound the distance of points' contributions from their present positions, in cells."""
+        """Bound the distance in cells from present positions to nodes, until the next sort."""
         far = 0.0
         if len(x) > self.dimension:
             far = sorting.widest(s.kin, s.basis, s.grids, x, block.points.grid)
@@ -154,11 +160,9 @@ class Tiles:
         return beyond if far < cells else cells  # also for NaN
 
     def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
-        """Return the places (w, n) for the weights."""
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
-        """Find the tile (n,) of each point."""
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
         kin, of = planar(s.kin), points.grid
@@ -166,7 +170,6 @@ class Tiles:
         return tile
 
     def _sort_block(self, s: kernel_arrays.Setup, block: kernel_arrays.Block) -> np.ndarray:
-        """Sort the points of a block; return the numbers of their tiles."""
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
@@ -216,7 +219,7 @@ class Tiles:
         return self.rows * sum(array.itemsize * array.shape[1] for array in given)
 
     def lay_out(self, s: kernel_arrays.Setup) -> None:
-        """Lay boxes of all blocks one after another; find the tiles of nodes that they reach."""
+        """Lay out the boxes of all blocks, and find the tiles of nodes that they reach."""
         spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
         s.buffers.count[:] = len(found[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
@@ -237,7 +240,7 @@ class Tiles:
         return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """Find spans and ranges of nodes in tiles that boxes reach; first of each set, and parts.
+        """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
 
         Nodes are in the order of the sets of points that see most of them: the contributions of a
         thread are in its caches, and fetching them from another thread's takes longer than the sum.
@@ -272,7 +275,7 @@ class Tiles:
         return grid_boxes.joined_spans(own), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """Find the first of the tiles of nodes (n,) that belong to one set with each.
+        """Return the first of the tiles of nodes (n,) in the same set as each.
 
         Memory access with gaps of some thousand bytes takes twice as long. So one thread has one
         set, and long tiles join tiles in the same rows of nodes.
@@ -285,7 +288,7 @@ class Tiles:
         return tile - (tile - first) % along
 
     def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
-        """Return for each own tile its set of the points of its block."""
+        """Return the set of each own tile, of the points of its block."""
         found = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count
@@ -323,7 +326,7 @@ class Tiles:
         return boxes, grid_boxes.Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
     def _number(self, s: kernel_arrays.Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
-        """Give each box its rows of the buffers: the number of its node 0, and steps (k, d)."""
+        """Assign buffer rows to boxes: return the row of node 0, and strides (k, d)."""
         steps = grid_boxes.steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
@@ -338,7 +341,6 @@ class Tiles:
         return first, steps
 
     def _tell_buffers(self, s: kernel_arrays.Setup, begins, ends, first, steps) -> None:
-        """Set for the tiles of all blocks the position of their boxes in the buffers."""
         columns = np.zeros((len(first), 5), np.int64)
         columns[:, 0], columns[:, 1], columns[:, 2] = begins, ends, first
         columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
@@ -354,9 +356,9 @@ class Tiles:
         """Note the tiles of nodes in use, and their nodes from `begin` to `end`."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
-        """Make `Buffers.parts` of nodes (k, d) from `begin` to `end` of the grids.
+        """Return `Buffers.parts` of the nodes (k, d) from `begin` to `end` of the grids.
 
-        In boxes their numbers are `first` + sum of `steps` (k, d) times positions.
+        Their rows in boxes are `first` + sum of `steps` (k, d) times indices.
         """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
@@ -370,7 +372,6 @@ class Tiles:
 
 
 def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
-    """Set the sums of points at the nodes of spans (k, 2) to zero."""
     of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
     arrays = [array for nodes in of for array in grid_boxes.summed(nodes)]
     for begin, end in spans.tolist():
@@ -381,9 +382,9 @@ def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
-    `parts` (n, 10) are the parts of all nodes of a tile in use (see `Buffers`). A set gets the
-    tiles whose middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the
-    same number in `beside` (n,) get the set of the first of them.
+    `parts` (n, 10) has all used nodes of each tile (see `Buffers`). A set gets the tiles whose
+    middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same number
+    in `beside` (n,) get the set of the first of them.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -393,14 +394,14 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
 
 
 def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
-    """Name the arrays of a tiling that a sort changes, with the number of rows in use."""
+    """Return names and numbers of rows of the arrays of a tiling that a sort changes."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
     return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Find where sets of tiles with these points (T, 2) begin, nearly equal, and end: (size,)."""
+    """Return where nearly equal sets of tiles with these point ranges (T, 2) begin: (size,)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:
@@ -411,6 +412,6 @@ def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
 
 
 def one_after_another(ranges: np.ndarray) -> np.ndarray:
-    """Return ranges (k, 2) as long as these, each from the end of the one before."""
+    """Shift ranges (k, 2) so that each begins at the end of the one before."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)

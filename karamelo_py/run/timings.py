@@ -15,7 +15,6 @@ ANOTHER_FOLDER = "the environment variable KARAMELO_PY_CACHE names another folde
 
 
 def _clocks() -> np.ndarray:
-    """Read the seconds that have passed, and that all threads have worked."""
     return np.array([time.perf_counter(), time.process_time()])
 
 
@@ -34,21 +33,19 @@ class Timings:
 
     @contextmanager
     def counted(self, name: str) -> Iterator[None]:
-        """Count what is done meanwhile, without compilation."""
         begun = _clocks() - self.on["compilation"]
         yield
         self.on[name] += _clocks() - self.on["compilation"] - begun
 
     @contextmanager
     def telling_of_compilation(self) -> Iterator[None]:
-        """Say so when kernels are compiled, and count the time."""
         self._told = False
         telling = files.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
         with compilation.told_to(self), telling:
             yield
 
     def on_start(self, _: str) -> None:
-        """Note that a kernel is compiled, or another process does, and this one waits for it."""
+        """A kernel is compiled here, or this process waits for another that does."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

@@ -234,7 +234,9 @@ class Hub:
             return current
         self._fits_run = run
         if current is None or not current.fits(self):
-            engine = registry.find("engine", self.settings.engine)
+            name = self.settings.engine
+            implicit = name == "processor" and self.update.scheme.traits.implicit
+            engine = registry.find("engine", "implicit" if implicit else name)
             with attributed(self):
                 self._simulation = engine(self, self._simulation)
         return self._simulation

@@ -5,7 +5,7 @@ with a view of the group at that stage of each step, or a compiled hook made by 
 :func:`point_hook` or :func:`vector_hook`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import wraps
 from typing import Any
 
@@ -24,6 +24,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import Place
+from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import SUFFIXES
 
 __all__ = [
@@ -75,6 +76,14 @@ class Publisher:
         """Called before output."""
 
 
+def _formulas_in(value: Any) -> Iterator[Expression]:
+    if isinstance(value, Expression):
+        yield value
+    elif isinstance(value, (tuple, list)):
+        for item in value:
+            yield from _formulas_in(item)
+
+
 class Fix(Publisher):
     """Base of fixes, which act on a `group` during a run. Class attributes are traits."""
 
@@ -120,6 +129,11 @@ class Fix(Publisher):
         self.hub = hub
         if group is not None:
             self.group = group
+
+    @property
+    def all_formulas(self) -> list[Expression]:
+        """All formulas among its attributes, also in tuples and lists."""
+        return list(_formulas_in(tuple(vars(self).values())))
 
     @property
     def nodes(self) -> np.ndarray:

@@ -525,5 +525,5 @@ def set_columns(
             error.place = error.place or place
             raise
     if view.moved:
-        simulation.control.clock[0].drift = np.inf
+        simulation.tiles.unsort(simulation.control)
     simulation.changed()

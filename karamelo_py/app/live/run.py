@@ -19,9 +19,8 @@ from karamelo_py.app.live.frames import Frame, KeptFrames, plain
 from karamelo_py.app.live.server import Server
 from karamelo_py.kernels.watch import FEW, WITHIN
 from karamelo_py.output.rhythm import Rhythmic
-from karamelo_py.run.energy import share_lost, unknown_work
+from karamelo_py.run.energy import unknown_work
 from karamelo_py.run.listening import Listener
-from karamelo_py.run.timestep import ruling_limit
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
 
@@ -76,10 +75,10 @@ class RunPage(Rhythmic, Listener):
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         clock = simulation.control.clock[0]
         has_gain = clock.watch_energy and clock.looks >= FEW  # mean over these
-        gain = -100 * share_lost(simulation) if has_gain else None
+        gain = -100 * simulation.energy_watch.share_lost() if has_gain else None
         why = unknown_work(hub)
         self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""
-        limit = "load steps" if simulation.implicit else ruling_limit(simulation)
+        limit = "load steps" if simulation.implicit else simulation.steps.ruling_limit
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
         self.frames.add(self._taken())
         self.server.changed()

@@ -180,7 +180,7 @@ def _brakes(transfer, scene):
     lag, simulation = scene.lag, scene.simulation
     if not lag.share > 0:
         return None
-    step = simulation.limit if transfer.traits.per_time else simulation.dt
+    step = simulation.steps.limit if transfer.traits.per_time else simulation.dt
     gone = 1 - exp(-2 * (1 - transfer.alpha) * lag.share * scene.duration / step)
     return {"gone": 100 * gone} if gone > BRAKED else None
 

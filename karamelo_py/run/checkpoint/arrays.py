@@ -1,4 +1,4 @@
-"""The state of a simulation as arrays by name: to return to, to write, to read."""
+"""The state of a simulation as named arrays: to return to, to write, to read."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -19,9 +19,6 @@ from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling
 from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
-# What else a simulation knows of its state.
-SHOWN = ("measured", "mapped", "followed", "told_of_growth", "told_of_loss")
-
 ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 
 # Name and shape of an array, where in it something belongs, and that.
@@ -29,13 +26,12 @@ Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
 
 
 def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield every array that a step changes and the next one needs, as far as it is in use."""
+    """Yield every array, as far as it is in use, that a step changes and the next one needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         for name, rows in in_use(block.tiling):
             yield f"tiling/{k}/{name}", getattr(block.tiling, name)[:rows]
-    if simulation.subdomain is not None:
-        yield "owner", simulation.tiles.owner
+    yield from simulation.domain.state().items()
     yield "clock", s.control.clock
     yield "work", s.control.totals[WORK]
     for name, array in kept_at_nodes(s):
@@ -48,7 +44,7 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Copy the state of a simulation, and published values, into copies of a state that is lost."""
+    """Copy the state and the published values, reusing the arrays of `before`."""
     found = {}
     # One array after another: where points have come or gone none is there twice.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
@@ -62,7 +58,6 @@ def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarr
 
 
 def touched(simulation: Any) -> dict[str, np.ndarray]:
-    """List the nodes in use where contact acted in the last step, and what it remembers of them."""
     spans = simulation.setup.spans
     memory = remembered_at(simulation, used(spans)[1:])
     if not memory:
@@ -78,13 +73,11 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
 def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
     """Yield the content of a restart file for the present state, or for the `kept` one.
 
-    All processes go through this together; the first gets the arrays, with the bits and in the
-    order of one process.
+    Collective; the first process gets the arrays, with the bits and in the order of a serial run.
     """
     if not kept:
         simulation.bring()
-    if not kept and simulation.subdomain is not None:
-        simulation.subdomain.share_kept()
+        simulation.domain.share_kept()
     state = kept or dict(changing(simulation)) | touched(simulation)
     yield from in_file(state) if simulation.comm.size == 1 else _joined(simulation, state)
     if kept:
@@ -114,7 +107,7 @@ def _shown_by_nodes(simulation: Any) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as files hold it, the digits of a sum always the same."""
+    """Yield a state as files hold it; the digits of exact sums are normalised."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -126,13 +119,10 @@ def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
 
 
 def known(simulation: Any) -> dict[str, np.ndarray]:
-    shown = np.array([getattr(simulation, name) for name in SHOWN])
-    return {"present": simulation.present, "shown": shown}
+    return {"present": simulation.present, "shown": np.array(simulation.flags)}
 
 
 class InFile:
-    """An array in a file: read when it is looked at, which a file that is damaged may not allow."""
-
     def __init__(self, data: Any):
         self._data = data
         self.shape, self.dtype, self.size = data.shape, data.dtype, data.size
@@ -151,7 +141,6 @@ class InFile:
 
 @contextmanager
 def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
-    """Open a restart file: its arrays by name, read on access."""
     import h5py
 
     found: dict[str, InFile] = {}
@@ -173,7 +162,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Take for a damaged file what HDF5 cannot read within this; only what reads belongs there."""
+    """Convert errors of HDF5 within the block to an error about a damaged file."""
     try:
         yield
     except OSError as error:
@@ -184,7 +173,6 @@ def reading() -> Iterator[None]:
 
 
 def restore(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Put the arrays of a simulation into a state, as `copied` or a file has it."""
     s = simulation.setup
     # Nodes that were not in use then have to be empty, as they were.
     simulation.tiles.empty_nodes(s)
@@ -214,35 +202,29 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
 
 
 def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
-    """Read the snapshot in a file; each process reads its part."""
     with opened(path, "good") as found:
         check_numbers(simulation, found)
-        if simulation.subdomain is not None:
-            return own_share(simulation, found)
+        if simulation.domain.parted:
+            return dict(simulation.domain.own_part(found))
         # In the order in which copies are made, and written.
         names = [*(name for name, _ in changing(simulation)), "values", *found]
         return {name: found[name][()] for name in dict.fromkeys(names)}
 
 
 def take_stored(simulation: Any, path: Path) -> None:
-    """Load the state of a restart file; each process reads its part."""
     with opened(path) as state, simulation.comm.joint():
         # Nothing of the arrays changes where the file is of another scene.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
         check_numbers(simulation, state)
-        shared = simulation.subdomain is not None
-        restore(simulation, own_share(simulation, state) if shared else state)
+        restore(simulation, simulation.domain.own_part(state))
         simulation.present[:] = _checked(state, "present", simulation.present)
-        for name, of in zip(
-            SHOWN, _checked(state, "shown", np.ones(len(SHOWN), bool)), strict=True
-        ):
-            setattr(simulation, name, bool(of))
+        flags = _checked(state, "shown", np.array(simulation.flags))
+        simulation.flags = tuple(map(bool, flags))
         _take_nodes(simulation, state)
 
 
 def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
-    """Let the nodes in use here show what they did."""
     own = numbers(simulation.setup.spans)
     used = np.zeros(simulation.hub.fields.node_count, np.bool_)
     used[own] = True
@@ -272,12 +254,11 @@ def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def kept_at_nodes(s: Any) -> list[tuple[str, np.ndarray]]:
-    """List the fields of nodes that outlive a step, with their names."""
     return [(name_of(type(one)), one.array) for one in s.nodes.fields if is_kept(type(one))]
 
 
 def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, np.ndarray] | None:
-    """Gather rows of all arrays of nodes, of ascending numbers, zero where not in use; or None."""
+    """Gather rows of all arrays of nodes (ascending numbers), zero if not in use; or None."""
     counted, kinds = simulation.nodes.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
@@ -354,7 +335,6 @@ def check_numbers(simulation: Any, found: Mapping[str, Any]) -> None:
 
 
 def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
-    """Return what contact remembers at the nodes of these spans (k, 2)."""
     return simulation.hub.update.method.remembered(simulation.setup.contact, spans)
 
 
@@ -376,7 +356,6 @@ def _misfit(what: str) -> ScriptError:
 
 
 def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state of which each process has its `own` part, in pieces."""
     s, comm = simulation.setup, simulation.comm
     parts = comm.gather(
         {
@@ -409,7 +388,7 @@ def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
 def points_of_tiles(
     tiling: dict[str, np.ndarray], arrays: list[np.ndarray], first: int, end: int
 ) -> dict[str, Any]:
-    """Own points in tiles with numbers from `first` to before `end`, and how they lie in them."""
+    """Return own points in tiles with numbers in [first, end), and their ranges."""
     own = slice(*np.searchsorted(tiling["number"], (first, end)))
     ranges = tiling["range"][own]
     points = slice(ranges[0, 0], ranges[-1, 1]) if len(ranges) else slice(0, 0)
@@ -422,7 +401,6 @@ def points_of_tiles(
 def _points(
     simulation: Any, k: int, tiling: Tiling, own: dict[str, np.ndarray]
 ) -> Iterator[Stored]:
-    """Yield the points of a block, tile after tile."""
     comm = simulation.comm
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
     total = int(ends[-1]) if len(ends) else 0
@@ -450,19 +428,19 @@ def _points(
 
 
 def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
-    """From where to where what ends there has some `PIECE` rows."""
+    """Cut ranges with these ends into groups of about `PIECE` rows."""
     total = int(ends[-1]) if len(ends) else 0
     cuts = np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right")
     return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
 
 
-def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
-    """Read the state in a file as far as it is of this process, of tiles that are cut for it."""
+def own_share(simulation: Any, state: Mapping, costs: np.ndarray) -> dict[str, np.ndarray]:
+    """Read the own part of the state in a file, after cutting its tiles for the processes."""
     blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
     tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]
     whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]
     before = tiles.owner
-    tiles.share_out(work_of(tiles.loads(whole), simulation.subdomain.load.costs))
+    tiles.share_out(work_of(tiles.loads(whole), costs))
     owner, tiles.owner = tiles.owner, before
     found = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith(EACH_HAS)}
     if not comm.leads:
@@ -478,7 +456,6 @@ def own_share(simulation: Any, state: Mapping) -> dict[str, np.ndarray]:
 
 
 def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
-    """Read some points (ascending) of an array in a file, a limited number at a time."""
     found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
     for begin in range(0, array.shape[-1], PIECE):
         own = slice(*np.searchsorted(points, (begin, begin + PIECE)))

@@ -35,7 +35,7 @@ Key = tuple[str, str, str]  # family, ID and style of a part
 
 
 class PartStates(NamedTuple):
-    """The memories of parts at one state, as JSON knows them, and the values published then."""
+    """The memories of parts at one state, as JSON knows them, and the published values."""
 
     parts: dict[Key, dict[str, Any]]
     arrays: list[np.ndarray]  # by the numbers that they have in it
@@ -43,7 +43,6 @@ class PartStates(NamedTuple):
 
     @classmethod
     def of(cls, hub: Hub, families: tuple[str, ...] = ()) -> PartStates:
-        """Return the present states of all parts, or of some families."""
         arrays: list[np.ndarray] = []
         parts = {
             key: state_of(part, arrays, grows=key[0] in OUTPUTS)
@@ -71,7 +70,7 @@ class PartStates(NamedTuple):
 
 
 def named(part: Any, where: str = "remembers") -> tuple[str, ...]:
-    """List the attributes that a part and its bases name in ``remembers`` or ``carries``."""
+    """Return the attributes that a part and its bases name in ``remembers`` or ``carries``."""
     return _named_by(type(part), where)
 
 
@@ -82,7 +81,6 @@ def _named_by(kind: type, where: str) -> tuple[str, ...]:
 
 
 def parts_of(hub: Hub) -> Iterator[tuple[Key, Any]]:
-    """Yield all parts of a scene that remember something."""
     return ((key, part) for key, part in _all_parts(hub) if named(part))
 
 
@@ -101,7 +99,6 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
 
 
 def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
-    """Return what a part remembers as JSON knows it; arrays are copied and numbered."""
     found: dict[str, Any] = {}
     for name in named(part):
         value = getattr(part, name)
@@ -131,8 +128,6 @@ def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> No
 
 @dataclass
 class Grown:
-    """A list that is only ever added to, and how long it was."""
-
     items: list
     length: int
     arrays: list[np.ndarray]
@@ -211,7 +206,6 @@ def plain(value: Any, arrays: list[np.ndarray]) -> Any:
 
 
 def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
-    """Return the value of which `plain` has given this."""
     if isinstance(kept, (Grown, Unwritable)):
         return kept.value()
     if isinstance(kept, list):
@@ -223,8 +217,6 @@ def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
 
 
 class RollbackPoint:
-    """The last good state of a run, and the states of parts there and at later steps."""
-
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve  # whether the run may go back there
         self.halvings = self.returns = 0  # of the step so far; to this state
@@ -237,7 +229,7 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: Any, *, forget: bool = True) -> None:
-        """Let the present state be the last good one; `forget` what parts remembered at others."""
+        """Make the present state the last good one; `forget` the parts at other states."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -246,21 +238,21 @@ class RollbackPoint:
         self.arrays, self.step, self._parts = arrays, step, {step: parts}
 
     def note(self, *, always: bool) -> None:
-        """Note what parts remember now, `always` or if something has been written of it."""
+        """Note the memory of parts now, `always` or if an output has just been written."""
         step = self.hub.update.step
         outputs = (part for key, part in parts_of(self.hub) if key[0] in OUTPUTS)
         if always or any(part.last_step == step for part in outputs):
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: Any, *, cut: bool = False) -> None:
-        """Go back to that state; with `cut`, outputs are cut there and continue."""
+        """Return to that state; with `cut`, outputs are cut there and continue."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
         if cut:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Take the steps up to `end` once more, parts remembering it; how that ended."""
+        """Repeat the steps up to `end` with the memory of parts; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

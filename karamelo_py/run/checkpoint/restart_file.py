@@ -1,8 +1,8 @@
 """Restart files: the whole scene at one time, in HDF5.
 
-Everything in them follows from what the parts of a scene declare: the arrays from their fields, the
-rest from what they remember (:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not in them:
-the script makes it once more, and a file knows which statements had been carried out.
+Their content follows from declarations: arrays from fields, the rest from what parts remember
+(:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not stored: the script makes it again, and
+a file lists the statements that had been executed.
 """
 
 import json
@@ -43,7 +43,7 @@ PIECE = 1 << 22  # bytes that are looked at together
 
 
 class Restarts(Rhythmic):
-    """Writes a file, again and again; a first ``*`` in its name becomes the step number."""
+    """Writes restart files during a run; a first ``*`` in the name becomes the step number."""
 
     place: Any = None
     style = ""
@@ -65,7 +65,7 @@ def path_of(hub: Hub, file: Path) -> Path:
 
 
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
-    """Write the present state of a scene, `within` a run or between two, and return the name."""
+    """Write the present state of a scene, `within` a run or between two; return the path."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
     groups, point = {"state": stored(simulation)}, simulation.rollback if hub.in_run else None
     if point and point.halve and point.arrays:
@@ -126,9 +126,9 @@ def _arrays_in(root: Any) -> list[Any]:
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
-    """Compare the checksums of the arrays of points and nodes in a file, or of the other ones.
+    """Compare checksums of the arrays of points and nodes (`large`), or of the others.
 
-    Of several processes each looks at some.
+    Each of several processes compares some.
     """
     import h5py
 
@@ -143,7 +143,7 @@ def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> 
 
 
 def _checksum(data: Any, file: BinaryIO) -> int:
-    """Find the checksum of an array, one piece of the file unless somebody packed it."""
+    """Return the checksum of an array: of a piece of the file, unless it is compressed."""
     begin, found, left = data.id.get_offset(), 0, data.id.get_storage_size()
     if begin is None:
         return zlib.crc32(np.ascontiguousarray(data[()]))
@@ -169,7 +169,6 @@ def _put(group: Any, found: Iterator[Stored]) -> None:
 
 
 def is_restart(path: Path) -> bool:
-    """Tell whether a file is a restart file."""
     import h5py
 
     try:
@@ -212,7 +211,7 @@ class Restart:
             raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
 
     def presets(self, given: dict[str, str]) -> dict[str, str]:
-        """Return the variables of the command line that wrote the file; `given` ones are those."""
+        """Return the variables of the command line that wrote the file; `given` must agree."""
         before = self.content["presets"]
         for name, text in given.items():
             if before.get(name) != text:
@@ -226,19 +225,17 @@ class Restart:
         return before
 
     def replay(self) -> Replay:
-        """Return what the script has to be, up to the state of the file."""
         values = {int(k): found for k, found in self.content["values of statements"]}
         record = Record(self.content["statements"], values)
         return Replay(record, self.content["within"], str(self.path))
 
     def is_over(self, hub: Hub) -> bool:
-        """Return True if no later run has followed the state of the file."""
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Put the scene into the state of the file; with `outputs`, these continue in their files.
+        """Restore the state of the file; with `outputs`, these continue in their files.
 
-        Within a run `point` becomes the last good state that the file holds.
+        Within a run, `point` becomes the last good state that the file holds.
         """
         check(hub, self)
         simulation, content = hub.simulation, self.content
@@ -280,7 +277,6 @@ def _latest(path: Path, out: Path | None) -> Path:
 
 
 def _no_file(path: Path, out: Path | None) -> ScriptError:
-    """Return the error for a file that is missing: -out has put its like below, perhaps."""
     below = sorted(path.parent.glob(f"*/{path.name}")) if path.parent.is_dir() else []
     below += sorted(out.glob(path.name)) if out and path.name else []
     return ScriptError(
@@ -295,7 +291,6 @@ def _no_file(path: Path, out: Path | None) -> ScriptError:
 
 
 def described(hub: Hub) -> dict[str, str]:
-    """Describe what has to be the same for a state to fit."""
     update, domain = hub.update, hub.domain
     box = zip(domain.lo.tolist(), domain.hi.tolist(), strict=True)
     words = {
@@ -319,7 +314,6 @@ def described(hub: Hub) -> dict[str, str]:
 
 
 def check(hub: Hub, restart: Restart) -> None:
-    """Refuse a state of another scene, with the first difference."""
     here, there = described(hub), restart.content["scene"]
     for name in dict.fromkeys([*there, *here]):
         mine, theirs = here.get(name), there.get(name)

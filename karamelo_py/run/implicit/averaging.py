@@ -11,14 +11,6 @@ from karamelo_py.kernels.implicit import PARTS
 
 
 class AveragedVolumes:
-    """Find stresses by averaged changes of volume, and what they add to the stiffness.
-
-    Parameters
-    ----------
-    equations
-        For one step, with the points around each node.
-    """
-
     def __init__(self, equations: Any):
         self.equations, self.mode = equations, equations.mode
         kin = equations.s.kin
@@ -34,7 +26,6 @@ class AveragedVolumes:
         )
 
     def _sums(self, name: str) -> np.ndarray:
-        """Sum numbers of points at the nodes (m,)."""
         sums = np.zeros(len(self.equations.nodes))
         for _, _, seen, _, averages in self._parts():
             loops.sum_at_nodes(self.mode, PARTS, seen, getattr(averages, name), sums)
@@ -47,7 +38,7 @@ class AveragedVolumes:
         self.volume[self.volume == 0] = 1.0
 
     def respond(self, dt: float) -> None:
-        """Find the stresses after the increments of the points, and their derivatives."""
+        """Compute the stresses after the increments of the points, and their derivatives."""
         self._grow()
         ratios = self._sums("grown") / self.volume
         for points, laws, seen, response, averages in self._parts():
@@ -57,7 +48,6 @@ class AveragedVolumes:
         self._bring_mean()
 
     def keep_stress(self) -> None:
-        """Find the stresses of the present state."""
         for points, laws, _, response, averages in self._parts():
             loops.keep_averaged_stress(self.equations.s.kin, points, laws, response, averages)
         self._grow()
@@ -81,7 +71,7 @@ class AveragedVolumes:
         return sp.csr_matrix((data, columns, e.d * e.layout.first), (m, m * e.d))
 
     def stiffness(self) -> sp.csr_matrix:
-        """Assemble what points have to do with each other: (m d, m d)."""
+        """Assemble the coupling of points through mean volumes: (m d, m d)."""
         e, m = self.equations, len(self.equations.nodes)
         S = sp.diags(1 / self.volume) @ self._matrix("cofactors")
         data = np.zeros(len(e.pairs[1]))

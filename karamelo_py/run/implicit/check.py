@@ -1,4 +1,4 @@
-"""Refuse scenes that implicit steps cannot do, before the run."""
+"""Refusal of scenes that implicit schemes do not support, before the run."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
 def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
-    """List what cannot be done in a scene, what to write instead, and its place."""
+    """Yield what is not supported, what to write instead, and the line."""
     update = hub.update
     method, transfer = update.method, update.transfer
     name = registry.name_of("transfer", type(transfer))
@@ -121,7 +121,6 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
 
 
 def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
-    """Tell whether the group of a fix has points of rigid solids, and no others."""
     if not isinstance(fix.group, ParticleGroup):
         return False
     soft = (s for s in hub.solids.values() if not can(s.material.law, constrained_velocity))
@@ -129,7 +128,7 @@ def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
 
 
 def _bears_shear(law: Any, kin: Any) -> bool:
-    """Tell whether a law resists a shear that takes any time; in one dimension all do."""
+    """Return True if a law resists slow shear; in one dimension all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
     _, C = on_numbers(stress_and_tangent)(law, kin, initial_state(law, kin, 1.0), rest, LONG)
@@ -144,13 +143,7 @@ def _only_prescribes(fix: Fix) -> bool:
 
 
 def check(hub: Hub) -> None:
-    """Refuse what an implicit scheme cannot do.
-
-    Raises
-    ------
-    ScriptError
-        At the line of the script that asks for it.
-    """
+    """Refuse what an implicit scheme does not support, at its line of the script."""
     update = hub.update
     name = f"scheme {registry.name_of('scheme', type(update.scheme))}"
     if importlib.util.find_spec("scipy") is None:

@@ -15,16 +15,11 @@ from karamelo_py.scene.modify import Fix
 
 
 def conduct(equations: Equations, hooks: Any, fixes: list[Fix], dt: float) -> None:
-    """Let heat flow for a step of `dt`, before the points are strained by that.
+    """Conduct heat for a step of `dt`, before the points are strained; raises `Singular`.
 
-    With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T'. Conduction is
-    linear: one solution is exact. The split into conduction and an adiabatic step is of first order
-    in the step (Armero & Simo 1992). In this order a load step ends in equilibrium.
-
-    Raises
-    ------
-    Singular
-        If the equations have no solution.
+    With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T' (backward Euler).
+    Conduction is linear: one solution is exact. The split into conduction and an adiabatic step is
+    of first order in the step (Armero & Simo 1992). In this order a load step ends in equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)

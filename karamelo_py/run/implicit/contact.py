@@ -1,12 +1,10 @@
 """Contact between solids with separate fields, within Newton's method.
 
-Where two bodies meet at a node, the displacement u of the first as the second sees it may close the
-gap g between them along their common normal N, and not more. What goes further meets a stiff
-spring: the pressing force is p = max(0, k (N u - g)). Along the surface the bodies stick by another
-one, as long as it sustains less than friction, |k s| <= mu p for the slip s of the step; then they
-slide, and the force is mu p against the slip (Coulomb; Wriggers 2006, "Computational Contact
-Mechanics", chapter 10). Both derivatives are exact. Normals and gaps are
-taken from the beginning of the step.
+Where two bodies meet at a node, their relative displacement u may close the gap g along the common
+normal N. Penetration is penalised: p = max(0, k (N u - g)). Tangentially the bodies stick by the
+same spring while |k s| <= mu p for the slip s of the step; then they slide with the force mu p
+(Coulomb; Wriggers 2006, "Computational Contact Mechanics", chapter 10). Derivatives are exact.
+Normals and gaps are those at the beginning of the step.
 """
 
 from typing import Any
@@ -29,25 +27,11 @@ CLOSE = 1e-4  # cells between bodies of which Newton's method first supposes tha
 
 
 class Contact:
-    """Pairs of nodes where bodies meet, and the forces between them. c pairs.
+    """Pairs (c) of nodes where bodies meet, and the forces between them.
 
-    Parameters
-    ----------
-    equations
-        Equations of the step.
-    moduli
-        (g,) Young's moduli of the bodies on each grid, 0 of rigid ones.
-
-    Attributes
-    ----------
-    first, second
-        (c,) numbers of the two nodes of a pair among the unknown ones.
-    normal
-        (c, d) from the first body to the second.
-    close
-        (c,) which pairs touch, as far as is known before the step.
-    push, drag
-        (c,), (c, d) forces across and along the surface, on the second body.
+    `first`, `second` (c,) are unknown nodes, `normal` (c, d) points from the first body to the
+    second, `close` (c,) masks pairs in contact before the step; `push` (c,) and `drag` (c, d) act
+    on the second body. `moduli` (g,) are Young's moduli by grid, 0 of rigid bodies.
     """
 
     def __init__(self, equations: Equations, moduli: np.ndarray):
@@ -92,7 +76,7 @@ class Contact:
         return mass / np.maximum(most[equations.grid], 1e-300)
 
     def _stiffness(self, moduli: np.ndarray) -> np.ndarray:
-        """Find the stiffness (c,) of the springs from the softer one of two bodies."""
+        """Return the stiffness (c,) of the springs, from the softer body of each pair."""
         both = np.stack([moduli[self.a], moduli[self.b]])
         softer = np.where(both > 0, both, np.inf).min(0)
         h = self.s.grids.spacing[self.a]
@@ -102,17 +86,16 @@ class Contact:
         return stiffness
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Tell which pairs (c,) touched at the end of the last step; with -1 those that stuck."""
+        """Return the pairs (c,) in contact at the end of the last step; with -1, that stuck."""
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
         last = sign * last if sign else np.abs(last)
         return (last > 0) & (last >= step)
 
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
-        """Find forces after displacements (m, d) of the nodes, and their derivatives.
+        """Compute forces after displacements (m, d) of the nodes, and their derivatives.
 
-        Where bodies touch, and that they stick, may be `supposed`: before there are displacements
-        nothing but the last step tells.
+        `supposed`: contact and sticking follow from the last step, before there are displacements.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -126,7 +109,7 @@ class Contact:
         self._rub(np.eye(self.d) - NN, supposed)
 
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
-        """Find the drag, and what it adds to the derivatives, by the return map of friction.
+        """Compute the drag and its derivatives by return mapping of friction.
 
         Pairs are tried as sticking; those beyond Coulomb's cone slide on it (Simo & Laursen 1992,
         "An augmented Lagrangian treatment of contact problems involving friction").
@@ -149,15 +132,12 @@ class Contact:
 
     @property
     def on_second(self) -> np.ndarray:
-        """Return the forces (c, d) on the second body of each pair."""
         return self.push[:, None] * self.normal + self.drag
 
     def forces(self) -> np.ndarray:
-        """Give the forces (m, d) on the nodes."""
         return -(self.jump.T @ self.on_second)
 
     def matrix(self) -> sp.bsr_matrix:
-        """Give the derivatives (m d, m d) of the forces, with the sign of a stiffness."""
         c, d = len(self.first), self.d
         row = np.arange(c * d).reshape(c, d)
         i, j = (np.broadcast_to(x, (c, d, d)).ravel() for x in (row[:, :, None], row[:, None, :]))
@@ -165,7 +145,7 @@ class Contact:
         return (self.jumps.T @ C @ self.jumps).tobsr((d, d))
 
     def held(self, motions: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Give how pairs that touch hold rigid `motions` (m, d, k) of some nodes (m,): (r, k)."""
+        """Return the constraints (r, k) of closed pairs on rigid `motions` (m, d, k) of nodes."""
         rows = []
         for nodes in (self.first, self.second):
             chosen = self.close & own[nodes]
@@ -175,17 +155,17 @@ class Contact:
         return np.concatenate(rows)
 
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Take from velocities (m, d) by what bodies approach or part where they are pressed.
+        """Remove from velocities (m, d) the relative normal ones of pressed pairs.
 
-        Momentum is kept: `inverse` (m, d) are one over the masses, 0 where nodes are held.
+        Momentum is conserved: `inverse` (m, d) are inverse masses, 0 where nodes are held.
         """
         return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
 
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Add to accelerations (m, d) what contact does at the beginning of the step.
+        """Add to accelerations (m, d) the effect of contact at the beginning of the step.
 
-        It stops those that approach where they touched, and all of those that stuck; others slide
-        with their velocities `v` (m, d).
+        It stops touching pairs that approach, and all pairs that stuck; others slide with their
+        velocities `v` (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
         touched = touched & (B @ a.ravel() > 0)  # others are left to part
@@ -203,7 +183,7 @@ class Contact:
         return a + inverse * (forces - self.jump.T @ drag)
 
     def _stopping(self, v: np.ndarray, inverse: np.ndarray, rows: sp.csr_matrix) -> np.ndarray:
-        """Find impulses (m, d) that stop what `rows` (r, m d) see of velocities (m, d)."""
+        """Return impulses (m, d) that make `rows` (r, m d) of velocities (m, d) vanish."""
         seen = rows @ v.ravel()
         if not np.any(seen):
             return np.zeros_like(v)
@@ -212,13 +192,13 @@ class Contact:
         return -(rows.T @ np.atleast_1d(spsolve(W.tocsc(), seen))).reshape(v.shape)
 
     def _across(self) -> sp.csr_matrix:
-        """Matrix of relative normal displacements from nodal displacements, (c, m d)."""
+        """Return the matrix (c, m d) of relative normal displacements."""
         c, d = self.normal.shape
         at = np.repeat(np.arange(c), d), np.arange(c * d)
         return (sp.csr_matrix((self.normal.ravel(), at), (c, c * d)) @ self.jumps).tocsr()
 
     def publish(self) -> None:
-        """Publish the forces on bodies, and remember where they touched; friction warms nodes."""
+        """Publish the forces on bodies, remember contacts, and heat nodes by friction."""
         tag, values = self.tag, self.s.control.values
         step = int(values[TIMESTEP]) + 1
         x = np.zeros((len(self.first), 3))
@@ -241,7 +221,6 @@ class Contact:
         self._warm()
 
     def _warm(self) -> None:
-        """Give the nodes the heat of friction, per mass, where there is room for it."""
         heat = field(self.s.nodes.fields, FrictionalHeat)
         if heat is None:
             return
@@ -254,7 +233,6 @@ class Contact:
 
 
 def contact_of(equations: Equations, moduli: np.ndarray) -> Any:
-    """Find where bodies meet; None if they have no separate fields."""
     if not isinstance(equations.s.contact, SeparateFields):
         return None
     return Contact(equations, moduli)

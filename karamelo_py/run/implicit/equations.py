@@ -1,4 +1,4 @@
-"""The equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
+"""Equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
 
 from collections.abc import Iterable
 from functools import cached_property
@@ -28,12 +28,12 @@ FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "di
 
 
 def valid(seen: loops.Seen) -> np.ndarray:
-    """Tell which nodes (n, s) points have something of."""
+    """Mask the entries (n, s) of stencils in use."""
     return np.arange(seen.nodes.shape[1]) < seen.count[:, None]
 
 
 def distinct(numbers: list[np.ndarray]) -> np.ndarray:
-    """List the different numbers in arrays of them, in their order."""
+    """Return the sorted distinct values of integer arrays."""
     numbers = [array for array in numbers if array.size]
     if not numbers:
         return np.zeros(0, np.int64)
@@ -45,46 +45,22 @@ def distinct(numbers: list[np.ndarray]) -> np.ndarray:
 
 
 class Moduli(NamedTuple):
-    """Young's moduli of the bodies at rest."""
-
     mean: float  # by volume; 0 if nothing deforms
     of_grids: np.ndarray  # (g,) the means of each grid, 0 where nothing deforms
     of_laws: list[np.ndarray]  # (2, k) numbers of the laws of each block; their specific volumes
 
     def alike(self) -> bool:
-        """Tell whether all bodies have the same modulus."""
         every = (own[0, own[1] > 0] for own in self.of_laws)
         return len(np.unique(np.concatenate([np.zeros(0), *every]))) <= 1
 
 
 class Equations:
-    """Forces at the nodes that a scene uses in a step, and their derivatives.
+    """Forces at the nodes of a step, and their derivatives.
 
-    Parameters
-    ----------
-    s
-        The arrays of the scene, with the masses of the step at the nodes.
-    mode
-        One thread, or several.
-    known
-        From the step before (`known`), or nothing.
-    stabilised
-        Whether there is a ghost stabilisation.
-
-    Attributes
-    ----------
-    blocks, parts
-        Those points that deform, and what they see.
-    nodes
-        (m,) numbers of the nodes that points give something to.
-    mass
-        (m,) their masses; 0 where there are gradients only.
-    places
-        (m, d) places of these in the grid, in cells.
-    deforming
-        (m,) which of them deforming points give something to.
-    led, velocity_of_rigid
-        (m,) which of them see rigid points, and the velocities (m, d) that they have from these.
+    `nodes` (m,) are in stencils of points: `mass` (m,) is 0 where there are gradients only,
+    `places` (m, d) are grid indices, `deforming` (m,) masks nodes of points that deform (`blocks`,
+    with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid`
+    (m, d). `known` is from the step before, or empty.
     """
 
     def __init__(self, s: Setup, mode: Any, known: dict[str, Any], stabilised: bool):
@@ -111,11 +87,10 @@ class Equations:
         self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
 
     def known(self) -> dict[str, Any]:
-        """Give what follows from the nodes alone, and what it follows from, for steps to come."""
+        """Return what depends on the nodes alone, for later steps with the same nodes."""
         return {name: vars(self)[name] for name in (*FOLLOWED, *FOLLOWING) if name in vars(self)}
 
     def _places(self) -> np.ndarray:
-        """Count the places of the nodes along each direction of their grid."""
         grids = self.s.grids
         self.grid = g = np.searchsorted(grids.first, self.nodes, side="right") - 1
         self.steps = self._steps(g)
@@ -123,7 +98,6 @@ class Equations:
         return np.stack([local // x, local % x // y, local % y], 1)[:, : self.d]
 
     def _steps(self, g: np.ndarray) -> np.ndarray:
-        """Find the steps (n, d) from the number of a node to its neighbours, in grids `g`."""
         x, y = self.s.grids.step_x[g], self.s.grids.step_y[g]
         return np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
 
@@ -145,7 +119,7 @@ class Equations:
         return seen, response
 
     def _led(self, tools: list[tuple[Any, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
-        """Find the nodes (m,) that see rigid points, and the velocities (m, d) these have there."""
+        """Return the nodes (m,) that see rigid points, and their velocities (m, d) from these."""
         mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
         for block, seen in tools:
             loops.scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
@@ -154,7 +128,6 @@ class Equations:
         return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
 
     def _numbered(self, seen: loops.Seen) -> loops.Seen:
-        """Replace numbers of nodes in the grid by numbers among the unknowns."""
         most = int(seen.count.max(initial=1))
         number = self.number_of(seen.nodes[:, :most])
         own = valid(seen)[:, :most] & (number >= 0)
@@ -171,7 +144,7 @@ class Equations:
         return seen
 
     def _find_pairs(self, stabilised: bool) -> None:
-        """Find the pairs of nodes that points see both of, and lay out K, a block for each.
+        """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
 
         Pairs of the ghost stabilisation are included, and each node with itself.
         """
@@ -202,20 +175,20 @@ class Equations:
         )
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
-        """Find the numbers of nodes among the unknown ones; -1 of others."""
+        """Return the indices of nodes among the unknown ones; -1 for others."""
         at = nodes - self.nodes[0]
         inside = (at >= 0) & (at < len(self.numbers))
         return np.where(inside, self.numbers[np.where(inside, at, 0)], -1)
 
     def bodies(self) -> np.ndarray:
-        """Number (m,) the bodies that nodes belong to: pieces that points connect."""
+        """Number (m,) the bodies of the nodes: components that points connect."""
         rows, columns = self.joined
         m = len(self.nodes)
         graph = sp.csr_matrix((np.ones(len(rows), bool), (rows, columns)), (m, m))
         return connected_components(graph, directed=False)[1]
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
-        """Find the nodal forces (m, d) of displacements (m, d); not finite where a point fails."""
+        """Return the nodal forces (m, d) of displacements (m, d); not finite if a point fails."""
         s = self.s
         for seen, response in self.parts:
             loops.strain(self.mode, loops.PARTS, s.kin, seen, u, response)
@@ -228,21 +201,20 @@ class Equations:
         return self._forces()
 
     def _forces(self) -> np.ndarray:
-        """Sum the forces (m, d) of the stresses of the points."""
         f = np.zeros((len(self.nodes), self.d))
         for seen, response in self.parts:
             loops.add_forces(self.mode, loops.PARTS, self.s.kin, seen, response.stress, f)
         return f
 
     def furthest(self) -> float:
-        """Find the largest component of a displacement of a point, at the last response."""
+        """Return the largest displacement component of a point at the last response."""
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, held: np.ndarray) -> float:
-        """Find how many cells a node goes at most to where it may meet what goes elsewhere.
+        """Return the largest move, in cells, of a node towards others that move differently.
 
-        It is next to nodes whose displacements (m, d) are others, by more than bodies rotate or
-        strain in a step, or which nothing saw, and which fixes hold (nodes, d).
+        Those are nodes whose displacements (m, d) differ by more than bodies rotate or strain in a
+        step, or that no point sees and fixes hold (nodes, d).
         """
         cells = u / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > FAR)
@@ -261,7 +233,7 @@ class Equations:
         return most
 
     def present_forces(self) -> np.ndarray:
-        """Find the nodal forces (m, d) of the present stress."""
+        """Return the nodal forces (m, d) of the present stress."""
         if self.averaged is not None:
             self.averaged.keep_stress()
         else:
@@ -270,7 +242,7 @@ class Equations:
         return self._forces()
 
     def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Find what fixes prescribe of `count` components of the nodes, (m, count), and values."""
+        """Return a mask (m, count) of prescribed components, and their values."""
         given, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
         for fix in fixes:  # the last one decides
             own, value = fix.prescribed(self.nodes, self.positions)
@@ -280,14 +252,12 @@ class Equations:
 
     @cached_property
     def positions(self) -> np.ndarray:
-        """Return the positions (m, d) of the nodes."""
         grids, g = self.s.grids, self.grid
         origin = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], 1)[:, : self.d]
         return origin + grids.spacing[g][:, None] * self.places
 
     @cached_property
     def rigid_motions(self) -> np.ndarray:
-        """Return the rigid motions (m, d, k) of the nodes."""
         return rigid_motions(self.positions, isinstance(self.s.kin, Axisymmetric))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:
@@ -328,7 +298,7 @@ class Equations:
             self.whole = (self.K.tocsr() + self.averaged.stiffness()).tobsr((d, d))
 
     def conduction(self) -> sp.csr_matrix:
-        """Assemble the heat that flows out of nodes (m, m) by their temperatures."""
+        """Assemble the conductances (m, m) of the nodes."""
         data = np.zeros(len(self.pairs[1]))
         for block, (seen, _) in zip(self.blocks, self.parts, strict=True):
             conductance = field(block.points.fields, Conductance)
@@ -339,7 +309,7 @@ class Equations:
     # --- ghost stabilisation ----------------------------------------------------------------------
 
     def moduli(self) -> "Moduli":
-        """Estimate Young's modulus of the bodies at rest: 2.6 of the mean shear modulus."""
+        """Estimate Young's moduli at rest: 2.6 times the mean shear modulus."""
         kin = self.s.kin
         places = kin.Tensor.places
         of_grids = np.zeros((2, len(self.s.grids.first)))
@@ -363,10 +333,10 @@ class Equations:
         return Moduli(total / volume if volume else 0.0, of_grids[0] / per, of_laws)
 
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
-        """Make the matrix (m, m) that penalises jumps of the gradient at the border of bodies.
+        """Return the matrix (m, m) that penalises gradient jumps at the border of bodies.
 
-        It is in units of the mean modulus. At a node it is the mean by volume over its points, of
-        a difference the smallest of its nodes.
+        In units of the mean modulus: at a node the volume mean over its points, for a difference
+        the smallest of its nodes.
         """
         lines, size, D = self.differences
         weights = size**self.d
@@ -386,11 +356,11 @@ class Equations:
 
     @cached_property
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-        """Find second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
+        """Second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
-        A linear basis has them across faces between cells, of which one lies at the border
-        (Coombs 2023): second differences of the nodes on both sides. Splines have no such jumps;
-        the differences hold their nodes at the border all the same.
+        A linear basis has them across faces between cells, of which one lies at the border (Coombs
+        2023). Splines have no such jumps; the differences hold their nodes at the border all the
+        same.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)
@@ -418,7 +388,7 @@ class Equations:
         return lines, size, D
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
-        """Number nodes and their neighbours along an axis (rows, 3); -1 where one is not used."""
+        """Return the nodes next to corners along an axis (rows, 3); -1 if not in use."""
         shifts = np.array([-1, 0, 1])
         steps = self._steps(g)
         first = self.s.grids.first[g] + (corner * steps).sum(1)

@@ -1,4 +1,4 @@
-"""Inertia in the balance of an implicit step, and the velocities that follow."""
+"""Inertia in the balance of an implicit step, and the velocities after it."""
 
 from typing import Any
 
@@ -21,44 +21,26 @@ class Rest:
         self.blocks = equations.blocks
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Add inertia to what forces leave (m, d), after displacements (m, d)."""
         return forces
 
     def size(self, u: np.ndarray) -> float:
-        """Give the size of the forces of inertia."""
         return 0.0
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Return no work: the energy of load steps is not watched."""
         return 0.0
 
     def end(self, u: np.ndarray) -> None:
-        """Give the points their velocities after the step."""
         for block in self.blocks:
             block.points.v[:] = 0
 
 
 class Motion:
-    """Inertia by the rules of Newmark, and by generalized-alpha.
+    """Inertia by the Newmark rules and generalized-alpha.
 
-    That has (1 - alpha_m) a' + alpha_m a in balance with (1 - alpha_f) f' + alpha_f f. Points carry
-    by how much a exceeds the acceleration of the forces, and begin with nothing of that. The scheme
-    is stable with what their way to the nodes and back takes of it.
-
-    Parameters
-    ----------
-    equations
-        The equations of the step.
-    scheme
-        A tag :class:`~karamelo_py.schemes.newmark.Newmark`.
-    dt
-        The step.
-    before
-        (m, d) what the forces of the beginning leave: with it the accelerations there.
-    given, prescribed
-        (m, d) which components are held, and the velocities that they get.
-    contact
-        Forces between bodies, or None.
+    With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points carry the
+    difference of a and the acceleration of the forces, initially 0. The scheme is stable with what
+    the transfer to the nodes and back takes of it. `before` (m, d) are residual forces at the
+    beginning; `given` and `prescribed` (m, d) mask held components and give their velocities.
     """
 
     def __init__(
@@ -101,29 +83,28 @@ class Motion:
         return total * self.inverse
 
     def acceleration(self, u: np.ndarray) -> np.ndarray:
-        """Return accelerations (m, d) after displacements (m, d); prescribed ones where held."""
+        """Return accelerations (m, d) after displacements (m, d); prescribed ones if held."""
         free = (u - self.dt * self.v) / (self.beta * self.dt**2) - self.rest * self.a
         return np.where(self.given, (self.prescribed - self.v) / self.dt, free)
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Add inertia to what forces leave (m, d), after displacements (m, d)."""
+        """Add inertia to the residual forces (m, d)."""
         a = self.acceleration(u)
         # Who holds a node does it with the force of the end of the step.
         return forces - self.mass * np.where(self.given, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
-        """Find the forces per mass (m, d) that accelerations at the end ask for there."""
+        """Return the forces per mass (m, d) that balance accelerations at the end."""
         weighted = (1 - self.am) * a + self.am * self.a
         return (weighted - self.af * self.of_forces) / (1 - self.af)
 
     def size(self, u: np.ndarray) -> float:
-        """Give the size of the forces of inertia."""
         return float(np.linalg.norm(self.mass * self.acceleration(u)))
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Find the work of those who hold nodes, by the mean of their forces (m, d) in the step.
+        """Return the work at held nodes, by the mean of their forces (m, d) in the step.
 
-        So that it is what the trapezoidal rule adds to the energy of a linear body.
+        As the trapezoidal rule adds it to the energy of a linear body.
         """
         old, new, given = self.v, self.prescribed, self.given
         after = self.mass * self.acceleration(u) - reaction
@@ -131,7 +112,6 @@ class Motion:
         return float(np.sum((moving - 0.5 * u * (self.before + after))[given]))
 
     def end(self, u: np.ndarray) -> None:
-        """Give the points their velocities after the step."""
         dt, gamma = self.dt, self.gamma
         a = self.acceleration(u)
         free = self.v + dt * ((1 - gamma) * self.a + gamma * a)

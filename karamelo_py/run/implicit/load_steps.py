@@ -1,4 +1,4 @@
-"""Load steps: Newton's method instead of an explicit step."""
+"""Steps of implicit schemes, by Newton's method."""
 
 from math import ceil
 from typing import Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, of_change, of_force
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, Tag, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
@@ -24,6 +24,8 @@ from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFa
 from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import PushingTool, tools_of
 from karamelo_py.run.no_number import no_number
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -32,16 +34,14 @@ LONG = 1.0  # cells
 
 
 class PointsWrong(Exception):
-    """A point has left the domain, or has gone wrong."""
+    """A point has left the domain, or has failed."""
 
 
 class NoEquilibrium(Exception):
-    """A load step has none; parts of it may have been done."""
+    """A load step has no equilibrium; some substeps may have been taken."""
 
 
 class LoadSteps:
-    """Take the load steps of a simulation."""
-
     def __init__(self, simulation: Any):
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
@@ -54,7 +54,7 @@ class LoadSteps:
         self.seconds: dict[str, float] = {}  # in stages of the steps so far
 
     def advance(self, hooks: Any, count: int) -> int:
-        """Take up to `count` load steps; return how they ended, as `run_steps` does."""
+        """Take up to `count` load steps; return the status, as `run_steps` does."""
         control = self.simulation.setup.control
         clock = control.clock[0]
         s, mode = self.simulation.setup, self.simulation.mode
@@ -79,7 +79,7 @@ class LoadSteps:
         return DONE
 
     def held(self) -> np.ndarray:
-        """Find which components (nodes, d) of all nodes fixes hold."""
+        """Return the components (nodes, d) that fixes hold."""
         found = np.zeros(
             (self.simulation.hub.fields.node_count, self.simulation.setup.kin.dimension), bool
         )
@@ -90,7 +90,6 @@ class LoadSteps:
         return found
 
     def _step(self, hooks: Any) -> None:
-        """Take a load step, in parts where it has to be."""
         control = self.simulation.setup.control
         whole, step = float(control.values[DT]), control.values[TIMESTEP]
         end = float(control.values[TIME]) + whole
@@ -134,7 +133,7 @@ class LoadSteps:
         control.values[TIME], control.values[TIMESTEP] = end, step + (self.parts > 0)
 
     def _tell_of_long_way(self, found: Any) -> None:
-        """Tell, once, of points that cross cells within a load step: that costs accuracy."""
+        """Report once that points cross cells within a load step, which costs accuracy."""
         far = found.equations.furthest() / float(np.min(self.simulation.setup.grids.spacing))
         if far <= LONG or self.dynamic or not self.simulation.setup.frame.moves:
             return
@@ -146,7 +145,7 @@ class LoadSteps:
             )
 
     def _check_at_rest(self) -> None:
-        """Refuse initial velocities of points: nothing is done with them without inertia."""
+        """Refuse initial velocities, which mean nothing without inertia."""
         for block in self.simulation.setup.blocks:
             moving = np.flatnonzero(block.points.v.any(0))
             if len(moving) and not can(block.laws, constrained_velocity):
@@ -157,7 +156,6 @@ class LoadSteps:
                 )
 
     def _interrupted(self, correction: int, residual: float) -> bool:
-        """Show how far a step is; tell whether the user wants the run to end before it."""
         simulation = self.simulation
         if simulation.between is None:
             return False
@@ -166,25 +164,16 @@ class LoadSteps:
 
     def _limit_reached(self, reason: Failed) -> float:
         """End the run at the load that was reached; return its time."""
-        control = self.simulation.setup.control
-        time = control.clock[0].end_time = float(control.values[TIME])
+        time = self.simulation.steps.end_here()
         self.simulation.hub.console.say(
             f"limit load: no equilibrium beyond time {time:.6g}, {reason}; the run ends there"
         )
         return time
 
     def _part(self, hooks: Any, dt: float) -> tuple[int, float]:
-        """Take a part of a step: find its equilibrium, and let the points follow.
+        """Take a substep, with the loads at its end; return corrections and residual.
 
-        Loads are taken at its end. Returns the number of corrections, and the residual that is
-        left.
-
-        Raises
-        ------
-        Failed
-            If there is no equilibrium to be found; the points have not moved then.
-        PointsWrong
-            If a point leaves the domain.
+        Raises `Failed` if no equilibrium is found; the points have not moved then.
         """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
@@ -192,7 +181,7 @@ class LoadSteps:
         totals = control.totals.copy()
         heated = isinstance(s.heat, Conducting)
         cold = simulation.snapshot() if heated else None
-        control.values[DT] = control.clock[0].kick = control.clock[0].last_dt = dt
+        simulation.steps.load_step(dt)
         try:
             # Heat flows by these masses, and changes the stress that is summed after it.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
@@ -219,11 +208,10 @@ class LoadSteps:
             control.values[TIME] = time
         found.inertia.end(found.u)
         finish(control)
-        control.clock[0].last_dt = 0.0  # an explicit step begins anew after load steps
+        simulation.steps.anew()
         return found.iterations, found.residual
 
     def _conduct(self, hooks: Any, dt: float) -> None:
-        """Conduct heat before the equilibrium, which uses the temperatures at the end."""
         s, mode = self.simulation.setup, self.simulation.mode
         try:
             conduct(Equations(s, mode, self.known, False), hooks, self.simulation.acting, dt)
@@ -234,28 +222,26 @@ class LoadSteps:
             ) from None
 
     def _forces(self, hooks: Any) -> np.ndarray:
-        """Sum mass, momentum and forces at the nodes; return the forces (nodes, d) there."""
+        """Sum mass, momentum and forces at the nodes; return the forces (nodes, d)."""
         simulation = self.simulation
         s = simulation.setup
         simulation.clear_forces()
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
-        clock = s.control.clock[0]
         # Points with prescribed velocity start one step earlier; here the present value is used.
-        dt, clock.last_dt = float(clock.last_dt), 0.0
-        if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
-            raise PointsWrong
-        clock.last_dt = dt
+        with simulation.steps.altered(last_dt=0.0):
+            if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
+                raise PointsWrong
         force = of_force(s.kin)
         return s.nodes.sums[:, force : force + s.kin.dimension]
 
     def _equilibrium(
         self, dt: float, before: np.ndarray | None, after: np.ndarray
     ) -> "Equilibrium":
-        """Find the displacements at which forces are in balance.
+        """Find the displacements at which forces balance.
 
-        `before` and `after` are the forces at all nodes, by the present stress and by loads of the
-        beginning and of the end; `before` is None where there is no inertia.
+        `before` and `after` are the nodal forces of the present stress and the loads at the
+        beginning and the end; `before` is None without inertia.
         """
         simulation = self.simulation
         s = simulation.setup
@@ -306,7 +292,6 @@ class LoadSteps:
         return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
-        """Find which components of the nodes are held, and the velocities that they get."""
         holding = [f for f in self.simulation.acting if "post_update_grid_state" in f.hooks()]
         given, velocities = equations.prescribed(holding, equations.d)
         self._check_numbers(velocities, "a node gets a velocity that is not a number")
@@ -316,17 +301,16 @@ class LoadSteps:
         return given, velocities
 
     def _check_numbers(self, numbers: Any, message: str) -> None:
-        """Refuse what a fix gets from a formula that gives NaN or infinity."""
         if not np.all(np.isfinite(numbers)):
             hint = "look for a formula that gives NaN, such as a division by zero"
-            found = no_number(self.simulation.hub, self.simulation, message, hint)
+            found = no_number(self.simulation, message, hint)
             raise self._error(found.message, found.fix, found.place)
 
     def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
-        """Let those that hold nodes publish the forces that they do it with; velocities at nodes.
+        """Let fixes publish the reactions at the nodes they hold; set nodal velocities.
 
-        Fixes are shown the velocity that a node would have without them. Rigid solids take the
-        forces that are left.
+        Fixes get the velocity that a node would have without them. Rigid solids take the remaining
+        forces.
         """
         simulation, s = self.simulation, found.equations.s
         d, nodes, update = found.equations.d, found.equations.nodes, s.nodes.update
@@ -337,11 +321,9 @@ class LoadSteps:
         change = of_change(s.kin)
         update[nodes, :d] = v + without
         update[nodes, change : change + d] = without
-        clock = s.control.clock[0]
         work = s.control.totals[WORK].copy()
-        kept, clock.kept = float(clock.kept), 0.0  # reactions have all that velocities change by
-        take_rows(self.scheme.hold, s, simulation.mode, hooks)
-        clock.kept = kept
+        with simulation.steps.altered(kept=0.0):  # reactions have all that velocities change by
+            take_rows(self.scheme.hold, s, simulation.mode, hooks)
         s.control.totals[WORK] = work
         add_to(s.control.totals, WORK, found.inertia.work(found.u, found.reaction))
         carry(s.control.totals[WORK])
@@ -366,10 +348,7 @@ class LoadSteps:
         return f"step {int(values[TIMESTEP]) + 1}, time {float(values[TIME]):.6g}"
 
     def _check_held(self, equations: Equations, given: np.ndarray, contact: Contact | None) -> None:
-        """Refuse bodies that can move as a whole: without inertia nothing says where they are.
-
-        Bodies are nodes that points connect.
-        """
+        """Refuse bodies (nodes that points connect) that can move as a whole."""
         s = equations.s
         bodies = equations.bodies()
         motions = equations.rigid_motions
@@ -397,14 +376,14 @@ class LoadSteps:
         )
 
     def refuse_all_loose(self) -> None:
-        """Refuse, before any step, a scene in which no fix holds a node that points give to."""
+        """Refuse, before any step, a scene in which fixes hold no node near points."""
         s, held = self.simulation.setup, np.any(self.held(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
         if not (self.dynamic or rigid or any(held[a:b].any() for a, b in used(s.spans)[1:])):
             raise self._loose(next(iter(self.simulation.hub.solids)), "is held by nothing")
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
-        """Name the solid of a point that sees some of the chosen nodes (m,)."""
+        """Return the solid of a point that sees some of the chosen nodes (m,)."""
         for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True):
             points = np.flatnonzero(chosen[seen.nodes].any(1))
             if len(points):
@@ -412,14 +391,11 @@ class LoadSteps:
         return ""
 
     def _solid_of(self, point: int) -> str:
-        """Name the solid of the point of a number."""
         firsts = self.simulation.setup.control.firsts
         return list(self.simulation.hub.solids)[np.searchsorted(firsts, point, side="right") - 1]
 
 
 class Equilibrium(NamedTuple):
-    """Displacements (m, d) of the nodes after a part of a step, and the forces that hold them."""
-
     equations: Equations
     inertia: Rest | Motion
     pushing: list[Contact | PushingTool]
@@ -428,3 +404,31 @@ class Equilibrium(NamedTuple):
     reaction: np.ndarray
     iterations: int
     residual: float
+
+
+class ImplicitSimulation(Simulation):
+    """Takes load steps, and implicit steps with inertia, on the processor."""
+
+    repeats_steps = False
+    remedy = "smaller load steps (set_dt), or another tolerance, iterations or solver"
+    implicit = True
+
+    def __init__(self, hub: Hub, previous: Simulation | None = None):
+        super().__init__(hub, previous)
+        self.load_steps = LoadSteps(self)
+
+    @property
+    def failure(self) -> str:  # type: ignore[override]
+        return self.load_steps.failure
+
+    def refuse(self) -> None:
+        self.load_steps.refuse_all_loose()
+
+    def _take(self, hooks: Tag, count: int) -> int:
+        return self.load_steps.advance(hooks, count)
+
+    def _hooks_to_call(self) -> None:
+        return None
+
+    def compile(self) -> None:
+        """Nothing: Newton's method calls kernels one by one."""

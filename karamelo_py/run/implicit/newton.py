@@ -19,7 +19,6 @@ ASTRAY = 1e4  # times as far as points may go: nothing holds them
 
 @contextmanager
 def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the time of the enclosed block to its stage."""
     begun = perf_counter()
     try:
         yield
@@ -28,7 +27,7 @@ def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 class Failed(Exception):
-    """Newton's method finds no equilibrium, for a reason."""
+    """Newton's method finds no equilibrium."""
 
 
 class TooFar(Failed):
@@ -56,32 +55,15 @@ class Wrong(Failed):
 
 
 class Broken(Failed):
-    """The user does not want to wait for the step."""
+    """The user interrupted the step."""
 
 
 class Newton:
     """The balance of forces after displacements, and its solution.
 
-    Parameters
-    ----------
-    scheme
-        A tag with ``tolerance``, ``iterations`` and ``solver``.
-    equations
-        Forces and stiffness.
-    free
-        (m, d) which components are unknown.
-    inertia
-        What moving bodies add.
-    pushing
-        What pushes by where bodies are: contact, tools.
-    external
-        (m, d) forces other than internal forces.
-    dt
-        The step.
-    seconds
-        Takes the time of stages: of stress, assembly with tangents, and solution.
-    held
-        Tells which components (nodes, d) of all nodes fixes hold.
+    `free` (m, d) masks the unknown components, `external` (m, d) are all forces but internal ones,
+    `pushing` are contact and tools. `seconds` takes the time of the stages stress, assembly and
+    solution; `held` returns the components (nodes, d) that fixes hold.
     """
 
     def __init__(
@@ -108,22 +90,17 @@ class Newton:
             self.inner = equations.respond(np.zeros_like(external), dt)
 
     def scale(self, moduli: Moduli, stabilisation: float) -> None:
-        """Stiffness of the bodies, a fraction of which penalises jumps at their border."""
         if stabilisation * moduli.mean:
             self.ghost = stabilisation * moduli.mean * self.equations.ghost(moduli)
 
     def solve(
         self, jump: np.ndarray, interrupted: Callable[[int, float], bool]
     ) -> tuple[np.ndarray, int, float]:
-        """Find displacements (m, d); `jump` (m, d) has the prescribed components.
+        """Return displacements (m, d), the number of corrections and the residual.
 
-        Returns the number of corrections, too, and the residual that is left.
-
-        Raises
-        ------
-        Failed
-            If there are none within the iterations allowed; `Broken` if the user has `interrupted`
-            them, which is asked with the number of corrections and the residual.
+        `jump` (m, d) has the prescribed components. Raises `Failed` if the iterations do not
+        suffice, and `Broken` if the user has `interrupted` them (called with corrections and
+        residual).
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -141,7 +118,7 @@ class Newton:
         raise Failed(f"after {scheme.iterations} corrections {residual:.1e} of the forces are left")
 
     def balance(self, u: np.ndarray) -> np.ndarray:
-        """Find what the forces leave (m, d)."""
+        """Return the residual forces (m, d)."""
         forces = self.external - self.inner
         for one in self.pushing:
             forces += one.forces()
@@ -150,12 +127,11 @@ class Newton:
         return self.inertia.balance(u, forces)
 
     def reaction(self, u: np.ndarray) -> np.ndarray:
-        """Find the forces (m, d) that hold given components."""
         return -self.balance(u)
 
     @property
     def unstable(self) -> bool:
-        """Tell whether the last stiffness is not positive definite, as far as a solver knows."""
+        """True if the last stiffness is not positive definite, as far as a solver knows."""
         return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:
@@ -163,14 +139,14 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _rounding(self, u: np.ndarray) -> float:
-        """Estimate the rounding of forces: from strains to the digits of 1, and from u."""
+        """Estimate the rounding of forces: of strains relative to 1, and of u."""
         far = np.abs(u) + self.spacing
         return ROUNDING * float(np.linalg.norm((self.stiff * far)[self.free]))
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
         """Solve the linear equations for the change of all displacements (m, d).
 
-        The accuracy that retains quadratic convergence (Eisenstat & Walker 1996).
+        With the accuracy that retains quadratic convergence (Eisenstat & Walker 1996).
         """
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):
@@ -199,7 +175,7 @@ class Newton:
         return np.where(free, x, jump)
 
     def _wrong(self, u: np.ndarray) -> Failed:
-        """Tell why forces of stress after displacements (m, d) are no numbers."""
+        """Explain why the forces after displacements (m, d) are not finite."""
         if not np.all(np.isfinite(u)):
             return Failed("displacements are no finite numbers")
         places = self.equations.s.kin.Tensor.places
@@ -216,7 +192,7 @@ class Newton:
         return Failed("forces of stress are no finite numbers")
 
     def _loosest(self, A: sp.bsr_matrix) -> int:
-        """Find the node that moves most in the softest motion, by inverse iteration."""
+        """Return the node that moves most in the softest mode, by inverse iteration."""
         size = np.abs(A.diagonal()) + 1e-12 * np.abs(A.data).max(initial=1e-300)
         B = A + sp.diags(1e-9 * size)
         x = np.where(self.free.ravel(), np.random.default_rng(0).standard_normal(A.shape[0]), 0)
@@ -227,7 +203,6 @@ class Newton:
         return int(np.abs(x).argmax() // self.free.shape[1])
 
     def _respond(self, u: np.ndarray) -> None:
-        """Find the forces of stress after displacements (m, d), if points can follow."""
         equations = self.equations
         with counted(self.seconds, "stress"):
             self.inner = equations.respond(u, self.dt)

@@ -1,4 +1,4 @@
-"""Solvers of the linear equations of an implicit step."""
+"""Linear solvers of implicit steps."""
 
 import warnings
 from collections.abc import Iterator
@@ -21,11 +21,11 @@ class Singular(Exception):
 
 
 class Unconverged(Exception):
-    """Multigrid leaves more than a hundredth of the residual."""
+    """Multigrid leaves more than 1 % of the residual."""
 
 
 def hold(A: sp.bsr_matrix, given: np.ndarray, more: np.ndarray) -> None:
-    """Decouple the given components (m, d) of a matrix; add `more` (m,) to the others."""
+    """Decouple the `given` components (m, d) of a matrix; add `more` (m,) to the others."""
     rows = np.repeat(np.arange(len(given)), np.diff(A.indptr))
     some = np.any(given, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
@@ -35,7 +35,7 @@ def hold(A: sp.bsr_matrix, given: np.ndarray, more: np.ndarray) -> None:
 
 
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Scale rows and columns such that the diagonal is 1, or by given factors (n,)."""
+    """Scale rows and columns such that the diagonal is 1, or by the factors `s` (n,)."""
     if A.format == "bsr":
         A = A.tocsr()
         A.eliminate_zeros()  # of decoupled components, which may be many
@@ -50,7 +50,6 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 
 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
-    """Solve by SuperLU; the factors are `kept`."""
     B, s = scaled(A)
     kept = {} if kept is None else kept
     release(kept)  # before there are others: they take most of the memory
@@ -66,14 +65,13 @@ def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarra
 
 
 def release(kept: dict) -> None:
-    """Release the memory of a solver."""
     for level in getattr(kept.get("multigrid"), "levels", ()):
         vars(level).clear()  # levels know themselves, and would wait to be found
     kept.clear()
 
 
 def changed_sign(factors: Any) -> bool:
-    """Tell whether the determinant of a factorised matrix is negative."""
+    """Return True if the determinant of a factorised matrix is negative."""
     moved = np.empty_like(factors.perm_r)
     moved[factors.perm_c] = factors.perm_r
     n = len(moved)
@@ -85,13 +83,12 @@ def changed_sign(factors: Any) -> bool:
 def amg(
     A: sp.spmatrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
-    """Solve by conjugate gradients (GMRES where A is not symmetric) with algebraic multigrid.
+    """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
-    `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: smoothed
-    aggregation takes them for what hardly meets a resistance (Vanek, Mandel & Brezina 1996).
-    `accuracy` is the remaining residual, relative to b. The coarse equations are `kept` for
-    matrices to come, which differ little, as long as these are solved in a few iterations: to make
-    them takes most of the time.
+    `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: the near null space of
+    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final residual, relative
+    to b. The hierarchy, which takes most of the time, is `kept` for later matrices, which differ
+    little, as long as few iterations suffice.
     """
     import pyamg
 
@@ -126,14 +123,14 @@ def amg(
 
 
 def is_symmetric(A: sp.spmatrix) -> bool:
-    """Tell whether a matrix is symmetric, but for rounding: whether A x = A^T x of a random x."""
+    """Return True if A x = A^T x of a random x, but for rounding."""
     x = np.random.default_rng(0).uniform(0.5, 1.5, A.shape[0])
     return bool(np.linalg.norm(A @ x - A.T @ x) <= 1e-9 * np.linalg.norm(abs(A) @ x))
 
 
 @contextmanager
 def from_one_seed() -> Iterator[None]:
-    """Let random numbers be the same each time: pyamg guesses eigenvectors with some."""
+    """Seed the random numbers by which pyamg guesses eigenvectors."""
     state = np.random.get_state()
     np.random.seed(0)
     try:
@@ -145,7 +142,6 @@ def from_one_seed() -> Iterator[None]:
 def solve(
     name: str, A: sp.spmatrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
-    """Solve with the solver of a `name`: direct, amg or auto; `kept` is its data."""
     in_space = rigid.shape[1] == 6
     large = np.count_nonzero(rigid.any(1)) >= (MANY_IN_SPACE if in_space else MANY)
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
@@ -160,7 +156,7 @@ def solve(
 
 
 def rigid_motions(positions: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """List rigid motions (m, d, k) of nodes at `positions` (m, d); around an axis, along it."""
+    """Return rigid motions (m, d, k) of nodes at `positions` (m, d); axisymmetric: along z."""
     m, d = positions.shape
     x = positions - positions.mean(0)
     motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(d)]

@@ -1,4 +1,4 @@
-"""Forces of tools on points, which change as points move, within Newton's method."""
+"""Forces of tools on points, which depend on positions, within Newton's method."""
 
 from typing import Any
 
@@ -22,8 +22,6 @@ class Displaced:
 
 
 class PushingTool:
-    """The force of a fix on the points of its group, by where they are."""
-
     def __init__(self, fix: Fix, equations: Equations, simulation: Any):
         self.fix, self.d = fix, equations.d
         self.near = NEAR * float(np.min(equations.s.grids.spacing))
@@ -45,20 +43,18 @@ class PushingTool:
         self.known = self.force = self.at(self.way)  # that the forces of the step have already
 
     def at(self, way: np.ndarray) -> np.ndarray:
-        """Find the forces (n, d) on points that are further on by a `way` (n, d)."""
+        """Return the forces (n, d) on points displaced by `way` (n, d)."""
         return self.fix.forces(Displaced(self.view, way))
 
     def respond(self, u: np.ndarray) -> None:
-        """Find the forces after displacements (m, d) of the nodes."""
         self.way = self.gather @ u
         self.force = self.at(self.way)
 
     def forces(self) -> np.ndarray:
-        """Find what the forces at the nodes (m, d) have changed by."""
         return self.gather.T @ (self.force - self.known)
 
     def matrix(self) -> sp.bsr_matrix:
-        """Find how the forces resist displacements (m d, m d), by central differences."""
+        """Return the stiffness (m d, m d) of the forces, by central differences."""
         n = len(self.way)
         slopes = np.empty((n, self.d, self.d))
         for j, step in enumerate(self.near * np.eye(self.d)):
@@ -67,7 +63,7 @@ class PushingTool:
         return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
-        """Publish the force, and leave to the points the mean that has done the work."""
+        """Publish the force, and apply the mean that has done the work to the points."""
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.known) / 2
         self.view.write_back()
@@ -75,6 +71,5 @@ class PushingTool:
 
 
 def tools_of(equations: Equations, simulation: Any) -> list[PushingTool]:
-    """Find the tools of a scene."""
     fixes = simulation.hub.fixes.values()
     return [PushingTool(fix, equations, simulation) for fix in fixes if fix.follows_points]

@@ -1,7 +1,7 @@
 """Lowering: the scene becomes the smallest set of arrays and tags that can run it.
 
-Read once at the start of every run: kinematics, basis, transfer, scheme, laws and fixes decide
-which fields exist (`karamelo-py check` prints them) and, by their types, what is compiled.
+Kinematics, basis, transfer, scheme, laws and fixes decide which fields exist (`karamelo-py check`
+prints them) and, by their types, what is compiled.
 """
 
 import copy
@@ -33,8 +33,9 @@ from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
+from karamelo_py.run.stable_step import sparse
+from karamelo_py.run.step_size import LastSteps, set_up
 from karamelo_py.run.tiles import Tiles
-from karamelo_py.run.timestep import sparse
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -47,7 +48,7 @@ SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
 
 
 class State(NamedTuple):
-    """State of all points after a run, in the order of their ids; arrays (components, N)."""
+    """State of all points after a run, ordered by id; arrays (components, N)."""
 
     count: int  # type: ignore[assignment]  # number of points, N
     present: np.ndarray  # (N,) bool, False for points that were deleted
@@ -58,13 +59,10 @@ class State(NamedTuple):
     grids: NamedTuple
     node_fields: dict[type, np.ndarray]  # the same of the nodes of these grids, (nodes, components)
     contact: NamedTuple  # how solids touch, with what it remembers
-    last_dt: float  # the step that the velocities belong to the middle of, or 0
-    last_contact_dt: float
-    path: float  # how far points have gone
+    last_steps: LastSteps
 
 
 def check_scene(hub: Hub) -> None:
-    """Say what is missing in a scene: without domain, method or solids it cannot run."""
     missing = (
         (hub.domain, "no domain is defined", "dimension(2, xmin, xmax, ymin, ymax, h)"),
         (hub.update.method, "no method is defined", "method(ulmpm, FLIP, linear, 0.99)"),
@@ -105,7 +103,7 @@ def check_scene(hub: Hub) -> None:
 
 
 def thread_count(hub: Hub, points: int) -> int:
-    """Count threads to use: as asked by --threads, else all cores for scenes that are worth it."""
+    """Return the number of threads: --threads, or all cores if the scene is large enough."""
     from numba import config
 
     available = int(config.NUMBA_NUM_THREADS)
@@ -120,32 +118,13 @@ def thread_count(hub: Hub, points: int) -> int:
     return usable if points > SERIAL_UP_TO else 1
 
 
-def stable_conduction(hub: Hub) -> float:
-    """Find the stable step of conduction in undeformed bodies, of the worst.
-
-    h^2 / (4 d) times capacity over conductivity: half of the bound of lumped finite elements, since
-    points are anywhere in a cell.
-    """
-    if not hub.update.thermal:
-        return np.inf
-    limits = [np.inf]
-    per_cell = hub.update.method.basis.traits.nodes_per_cell
-    for solid in hub.solids.values():
-        law = solid.material.law
-        kappa = laws.conductivity(law, 1.0)
-        if kappa > 0:
-            capacity = laws.heat_capacity(law, 1.0) / laws.specific_volume(law)
-            limits.append((solid.h / per_cell) ** 2 / (4 * hub.domain.dimension) * capacity / kappa)
-    return min(limits)
-
-
 def lower(
     hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
-    """Make the arrays of a run from the scene, taking over the state of points that exist.
+    """Make the arrays of a run from the scene, and continue the state of earlier points.
 
-    With `ids`, from and to before, only with those points; tiles of a process of `comm`.
+    With `ids` (first, end), only of those points; with the tiles of a process of `comm`.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -165,15 +144,8 @@ def lower(
         method.resume(contact, previous.contact)
     firsts = [solid.first_id for solid in hub.solids.values()]
     control = arrays.new_control(hub.values.array, firsts, kin.dimension)
-    clock = control.clock[0]
-    if previous is not None:
-        clock.last_dt, clock.path = previous.last_dt, previous.path
-        clock.last_contact_dt = previous.last_contact_dt
-    clock.spacing = min(lattice.h for lattice in lattices)
-    clock.heat_limit = clock.heat_reference = stable_conduction(hub)
-    clock.kept = flip_coefficient(transfer)
-    clock.kept_by_time = clock.kept * transfer.traits.per_time
-    clock.drift = np.inf  # the points are not sorted yet
+    set_up(control, hub, transfer, previous and previous.last_steps)
+    tiles.unsort(control)
     grids = table(lattices, real)
     if hub.update.boundary == "reflect":
         grids = ReflectingGrid(*grids)
@@ -201,14 +173,13 @@ def lower(
 
 
 def node_kinds(hub: Hub, basis: NamedTuple, contact: NamedTuple) -> list[type]:
-    """List the nodal fields other than sums, update and velocity."""
     declared = fields.declared(owners_of_fields(hub, contact), "node_fields")
     kinds = [kind for kind in declared if getattr(kind, "needed", lambda basis: True)(basis)]
     return kinds + [EnergyLoss] * returns_loss(hub) + [FrictionalHeat] * warms_by_friction(hub)
 
 
 def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:
-    """Group solids by their kind of law, in order of use; of `ids` only, from and to before."""
+    """Group solids by their kind of law, in order of use; only points of `ids`."""
     alike: dict[tuple, list] = {}
     for solid in hub.solids.values():
         part = solid if ids is None else part_of(solid, *ids)
@@ -217,10 +188,10 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 
 
 def returns_loss(hub: Hub) -> bool:
-    """Check that kinetic energy that the transfer takes heats points of the scene.
+    """Return True if kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 takes none that does not vanish with the step, unless it stores moments.
-    XPIC has its own way (`kernels.equations.loss.reflect`).
+    FLIP 1 dissipates none that does not vanish with the step, unless it stores moments. XPIC is
+    handled in `kernels.equations.loss.reflect`.
     """
     transfer = hub.update.transfer
     keeps_all = flip_coefficient(transfer) == 1 and not stores_moment(transfer)
@@ -230,7 +201,6 @@ def returns_loss(hub: Hub) -> bool:
 
 
 def warms_by_friction(hub: Hub) -> bool:
-    """Check that friction on the grid heats points of the scene."""
     on_grid = hub.update.method.fields_per_solid
     rubs = any(
         fix.wall_friction is not None or (on_grid and fix.friction) for fix in hub.fixes.values()
@@ -239,7 +209,6 @@ def warms_by_friction(hub: Hub) -> bool:
 
 
 def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) -> arrays.Nodes:
-    """Make fields of `count` nodes, zero."""
     d = kin.dimension
     return arrays.Nodes(
         sums=fields.records(count, arrays.SUMS_WIDTH[d], real),
@@ -250,7 +219,6 @@ def lower_nodes(kinds: Iterable[type], kin: NamedTuple, count: int, real: type) 
 
 
 def resume_nodes(nodes: arrays.Nodes, grids: NamedTuple, previous: State) -> None:
-    """Take over kept fields of the nodes where they were there before, with the same numbers."""
     same = zip(grids, previous.grids, strict=True)
     if all(np.array_equal(now[: len(before)], before) for now, before in same):
         for one in nodes.fields:
@@ -259,7 +227,7 @@ def resume_nodes(nodes: arrays.Nodes, grids: NamedTuple, previous: State) -> Non
 
 
 def part_of(solid: Solid, first: int, end: int) -> Solid:
-    """Make a solid like this one, with its points whose ids are from `first` to before `end`."""
+    """Return a copy of a solid with only the points whose ids are in [first, end)."""
     begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
     other = copy.copy(solid)
     for name, value in vars(solid).items():
@@ -271,7 +239,6 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
 
 
 def point_kinds(hub: Hub) -> tuple[type, ...]:
-    """List the declared fields of points, as far as no array of nodes has to be made for that."""
     return fields.declared(owners_of_fields(hub), "point_fields")
 
 
@@ -289,7 +256,7 @@ def lower_points(
     count = int(ends[-1])
 
     def joined(values: Iterable, dtype: type) -> np.ndarray:
-        """(n,) or (k, n): of the values of each solid, a number or column, or one for each point.
+        """Join a number or column per solid, or a value per point: (n,) or (k, n).
 
         No further array of the length of all points is made.
         """
@@ -326,7 +293,6 @@ def lower_points(
 
 
 def resumed(block: arrays.Block, previous: State) -> arrays.Block:
-    """Return the block with what its points had before, as far as they were there."""
     points = block.points
     old = points.id < previous.count
     ids = points.id[old]

@@ -1,4 +1,4 @@
-"""Scenes on a GPU: the card that takes their steps, what it cannot do, and its memory."""
+"""Scenes on a GPU: choice of the card, refusals, and memory."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ WITHOUT = "leave out --gpu: processors run the same script"
 
 
 def use_card(hub: Hub) -> None:
-    """Let a GPU take the steps of a scene; until the first run a script needs none."""
     settings = hub.settings
     if settings.ranks > 1:
         raise ScriptError(
@@ -33,7 +32,6 @@ def use_card(hub: Hub) -> None:
 
 
 def take_card(hub: Hub) -> None:
-    """Take the GPU of this machine, where a scene is to run on one; there must be one."""
     if isinstance(hub.settings.card, Counted) and not hub.checking:
         with missing_told():
             hub.settings.card = card()
@@ -41,7 +39,6 @@ def take_card(hub: Hub) -> None:
 
 @contextmanager
 def missing_told(hub: Hub | None = None) -> Iterator[None]:
-    """Tell what a GPU has not, meanwhile: itself, packages, memory for the scene in `hub`."""
     try:
         yield
     except NoCard as error:
@@ -57,7 +54,6 @@ def missing_told(hub: Hub | None = None) -> Iterator[None]:
 
 
 def check_room_there(hub: Hub) -> None:
-    """Refuse a scene whose points and nodes alone do not fit into the memory of the GPU."""
     need = least_bytes(hub, PRECISIONS[hub.settings.precision], copied=False)
     if need > hub.settings.card.memory()[0]:
         raise _too_large(hub, need)
@@ -79,15 +75,14 @@ def _too_large(hub: Hub, least: float) -> ScriptError:
 
 
 def memory_there(simulation: Any) -> int:
-    """Count the bytes that a scene takes on a GPU, under ``check``."""
     simulation.launches()
     return simulation.hub.settings.card.taken
 
 
 def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
-    """Say what of a scene no GPU can do: each with its line, and what helps.
+    """Yield an error for everything in a scene that no GPU supports.
 
-    Before there are arrays (`setup`), what depends on them is not looked at.
+    Without `setup`, checks that need arrays are skipped.
     """
     scheme = hub.update.scheme
     if scheme.traits.implicit:
@@ -130,7 +125,6 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
 
 
 def refuse(hub: Hub, setup: Setup | None = None) -> None:
-    """Refuse a scene that no GPU can run."""
     if found := [*refusals(hub, setup)]:
         found[0].others = found[1:]
         raise found[0]

@@ -1,7 +1,6 @@
-"""Parts of plug-ins are tried on some points, in plain Python, before loops are compiled with them.
+"""Trial calls of plug-in parts on some points, in plain Python, before kernels are compiled.
 
-What is missing, of the wrong length, or not a usable number so ends in a message
-about the part, not about a loop.
+A missing function, a wrong length or an unusable number then ends in a message about the part.
 """
 
 from collections.abc import Iterable, Iterator
@@ -36,7 +35,6 @@ NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
 def try_parts(hub: Hub, setup: Setup) -> None:
-    """Try the laws, the basis and the transfer of a scene that plug-ins brought."""
     for solid in hub.solids.values():
         law = law_on(solid.material.law, solid.h, solid.T0)
         try_law(hub, solid.material, setup.kin, law, _one(setup))
@@ -56,7 +54,6 @@ def try_parts(hub: Hub, setup: Setup) -> None:
 
 
 def _samples(setup: Setup, fix: Fix, hook: Any) -> Iterator[tuple]:
-    """Yield what `results` is called with for a node, or for a point of each law in the group."""
     tag, kin = hook.tag(0, ()), setup.kin
     if hook.on_nodes:
         yield WholeNodes(0, planar(kin), None, _one_node(setup), None, 0.0, tag, True), kin, kin, 0
@@ -68,13 +65,11 @@ def _samples(setup: Setup, fix: Fix, hook: Any) -> Iterator[tuple]:
 
 
 def _one_node(setup: Setup) -> Any:
-    """Make a node of mass 1 with what the nodes of a setup have."""
     fields = tuple(type(one)(one.array[:1].copy()) for one in setup.nodes.fields)
     return type(setup.nodes)(*(np.ones_like(a[:1]) for a in setup.nodes[:3]), fields)
 
 
 def _try_hook(setup: Setup, fix: Fix, moment: str, hook: Any) -> None:
-    """Try a function of whole points or nodes."""
     part = PartInUse(f"fix {fix.style}", type(fix), fix.place)
     says = f"{moment}: {hook.function.__name__} has to return "
     values = (1.0,) * len(fix.formulas)
@@ -103,7 +98,6 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: Any) -> None:
 
 
 def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
-    """Find the part of a plug-in that is of one of these classes."""
     return next((part for part in foreign_parts(hub) if part.kind in kinds), None)
 
 
@@ -134,7 +128,7 @@ def _expect(part: PartInUse, function: Any, given: Any, count: int, kind: type =
 
 
 def _numbers(part: PartInUse, what: str, found: Iterable, one: Any) -> None:
-    """Refuse what is no number, not finite, or more precise than the numbers of the run."""
+    """Refuse values that are not finite numbers, or more precise than the run."""
     for number in found:
         if not isinstance(number, (int, float, np.number)):
             raise fault(part.name, f"{what} is {number!r} for some point, no number", part.place)
@@ -147,7 +141,7 @@ def _numbers(part: PartInUse, what: str, found: Iterable, one: Any) -> None:
 
 
 def try_law(hub: Hub, material: Any, kin: Any = None, law: Any = None, one: Any = 1.0) -> None:
-    """Try a law of a plug-in, `law` as a solid has it or in a cell of 1 at room temperature."""
+    """Try a plug-in's law, as a solid has it or in a cell of size 1 at 293 K."""
     kinds = laws.law_kind(material.law)
     if not any(map(is_foreign, kinds)):
         return
@@ -177,7 +171,6 @@ def try_law(hub: Hub, material: Any, kin: Any = None, law: Any = None, one: Any 
 
 
 def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None:
-    """Try what a strength of a plug-in yields at, after so much plastic strain."""
     strength = parameter(law, "strength")
     kind = type(strength)
     if not (is_foreign(kind) and hardening.flow_stress.defined(kind)):
@@ -204,7 +197,7 @@ def _try_basis(hub: Hub, setup: Setup) -> None:
 
 
 def _try_functions(part: PartInUse, setup: Setup, points: Any, p: int) -> None:
-    """Try the functions of a basis at a point: they add up to 1 everywhere, their slopes to 0."""
+    """Check at a point that basis functions sum to 1 and their gradients to 0."""
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])
     at = place_at(basis, kin, points.x[0] if points.home is None else points.home, p)

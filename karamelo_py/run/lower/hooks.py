@@ -1,7 +1,7 @@
-"""Hooks of the fixes of a scene: compiled ones as tables that kernels read, and those in Python."""
+"""Hooks of the fixes: compiled ones as tables for kernels, and those in Python."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,12 @@ from karamelo_py.kernels import arrays, called
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
-from karamelo_py.kernels.hooks import STAGES, CompiledHook
+from karamelo_py.kernels.hooks import POINT_STAGES, STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import unique
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -30,7 +31,7 @@ NO_PROGRAM = (-1, -1, -1, -1)
 def lower_hooks(
     hub: Hub, fixes: list, mode: Any = None, threads: int = 1
 ) -> arrays.Hooks | arrays.NoHooks:
-    """Make the tables of the compiled hooks of fixes, in their order; by one thread, or several."""
+    """Make the tables of the compiled hooks of fixes, in their order."""
     dimension = hub.domain.dimension
     builder = _Builder(hub, sum(s.count for s in hub.solids.values()))
     for fix, name, hook in compiled_hooks(fixes):
@@ -66,7 +67,7 @@ def lower_hooks(
 
 
 def compiled_hooks(fixes: list) -> list[tuple[Any, str, CompiledHook]]:
-    """List the compiled hooks of fixes with their moments, in the order of the tables."""
+    """Return (fix, name of the stage, hook) of compiled hooks, in the order of the tables."""
     return [
         (fix, name, hook)
         for fix in fixes
@@ -76,8 +77,6 @@ def compiled_hooks(fixes: list) -> list[tuple[Any, str, CompiledHook]]:
 
 
 class _Builder:
-    """Collects rows, members and programs."""
-
     def __init__(self, hub: Hub, points: int):
         self.hub = hub
         self.points = points
@@ -129,7 +128,7 @@ class _Builder:
             self.loaded_nodes = fix.group.total()
 
     def shared_nodes(self) -> int:
-        """Count the nodes, where hooks hold some of them in common; else 0."""
+        """Return the number of nodes if several hooks hold the same ones; else 0."""
         fixes = self.holding
         if len(fixes) < 2:
             return 0
@@ -157,38 +156,39 @@ class _Builder:
 
 
 def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
-    """Append a piece, and return where it begins and ends."""
     begin = sum(map(len, pieces))
     pieces.append(piece)
     return begin, begin + len(piece)
 
 
-def sets_initial_state(fix: Fix) -> bool:
-    """Tell whether all a fix does is a hook in Python before the first step."""
-    hooks = fix.hooks()
-    return set(hooks) == {"initial_integrate"} and not isinstance(
-        hooks["initial_integrate"], CompiledHook
-    )
+class ActingFixes:
+    """The fixes of a step; also its tag, if some act from Python between rows of the scheme."""
 
-
-class PythonHooks:
-    """Hooks of a step when some fixes act from Python: theirs, and the compiled ones."""
-
-    def __init__(self, simulation: Any, fixes: list):
+    def __init__(self, simulation: Backend, fixes: list[Fix]):
         self.simulation, self.fixes = simulation, fixes
         self.functions = [hook.function for _, _, hook in compiled_hooks(fixes)]
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
-        self.by_stage: dict[int, list[tuple[Any, Callable]]] = {}
+        self.in_python: dict[int, list[tuple[Fix, Callable]]] = {}  # by stage
         for fix in fixes:
             for name, hook in fix.hooks().items():
                 if not isinstance(hook, CompiledHook):
-                    self.by_stage.setdefault(STAGES[name], []).append((fix, hook))
+                    self.in_python.setdefault(STAGES[name], []).append((fix, hook))
+
+    @property
+    def tag(self) -> "ActingFixes | arrays.Hooks | arrays.NoHooks":
+        """Tag of a step: the compiled hooks, or all if some are in Python."""
+        return self if self.in_python else self.compiled
+
+    @property
+    def staged(self) -> bool:
+        names = (name for fix in self.fixes for name in fix.hooks())
+        return bool(self.in_python) or any(name in POINT_STAGES for name in names)
 
     def called(self) -> called.CalledHooks | None:
-        """Give what compiled steps call them by, where none moves a point or acts elsewhere."""
-        acting = [fix for fix, _ in self.by_stage.get(INITIAL_INTEGRATE, ())]
-        elsewhere = len(self.by_stage) > 1 or not all(fix.point_by_point for fix in acting)
-        if INTERPRETED or not acting or elsewhere or self.simulation.subdomain is not None:
+        """Return hooks that compiled steps call; None if one moves a point or acts elsewhere."""
+        acting = [fix for fix, _ in self.in_python.get(INITIAL_INTEGRATE, ())]
+        elsewhere = len(self.in_python) > 1 or not all(fix.point_by_point for fix in acting)
+        if INTERPRETED or not acting or elsewhere or self.simulation.comm.size > 1:
             return None
 
         def act(stage: int) -> int:
@@ -198,20 +198,20 @@ class PythonHooks:
         return called.CalledHooks(self.compiled, address_of_python(act, called.CALL))
 
     def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
-        """Call what acts from Python on a setup: the own one where that is enough for all."""
-        if stage not in self.by_stage:
+        """Call Python hooks of a stage on a setup: of all processes if they need all points."""
+        if stage not in self.in_python:
             return
-        if all(fix.point_by_point for fix, _ in self.by_stage[stage]):
+        if all(fix.point_by_point for fix, _ in self.in_python[stage]):
             function(self, s, stage, *arguments)
         else:
-            self.simulation.act(lambda whole: function(self, whole, stage, *arguments), s)
+            self.simulation.domain.act(lambda whole: function(self, whole, stage, *arguments), s)
 
 
-def _call(simulation: Any, fix: Fix, hook: Callable, view: Any) -> None:
-    """Call a hook; of one that each process calls for its own, see that all agree.
+def _call(simulation: Backend, fix: Fix, hook: Callable, view: Any) -> None:
+    """Call a hook; if each process calls it for its own points, check that all agree.
 
-    All have to have asked for the same, else one would wait for the others for ever, and to have
-    published the same, else the values would be partial sums.
+    Collective calls must match, else processes deadlock; published values must be equal, else they
+    are partial sums.
     """
     try:
         hook(view)
@@ -222,7 +222,7 @@ def _call(simulation: Any, fix: Fix, hook: Callable, view: Any) -> None:
         raise
 
 
-def _agree(simulation: Any, fix: Fix) -> None:
+def _agree(simulation: Backend, fix: Fix) -> None:
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
     own = {name: values.get(name) for name in names if name in values}
@@ -238,43 +238,43 @@ def _agree(simulation: Any, fix: Fix) -> None:
             )
 
 
-def _on_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
-    for fix, hook in hooks.by_stage[stage]:
+def _on_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
+    for fix, hook in hooks.in_python[stage]:
         view = NodesView(hooks.simulation, s, fix.group, stage, before_update=target == ON_VELOCITY)
         _call(hooks.simulation, fix, hook, view)
 
 
-def _on_heat_nodes(hooks: PythonHooks, s: Setup, stage: int, target: int) -> None:
+def _on_heat_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
     # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
     nodes = s.heat.nodes._replace(fields=s.nodes.fields)
     _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 
 
-def _on_points(hooks: PythonHooks, s: Setup, stage: int, then: int) -> None:
-    for fix, hook in hooks.by_stage[stage]:
+def _on_points(hooks: ActingFixes, s: Setup, stage: int, then: int) -> None:
+    for fix, hook in hooks.in_python[stage]:
         view = view_of(hooks.simulation, fix, then=bool(then))
         _call(hooks.simulation, fix, hook, view)
         if view.moved and stage == INITIAL_INTEGRATE:
             hooks.simulation.sort()
         elif view.moved:
-            s.control.clock[0].drift = np.inf
+            hooks.simulation.tiles.unsort(s.control)
 
 
-@at_nodes.on(PythonHooks)
-def _at_nodes_python_hooks(hooks, stage, target, s):
+@at_nodes.on(ActingFixes)
+def _at_nodes_acting_fixes(hooks, stage, target, s):
     at_nodes(hooks.compiled, stage, target, s)
     hooks.act(_on_nodes, s, stage, target)
 
 
-@add_work.on(PythonHooks)
-def _add_work_python_hooks(hooks, s):
+@add_work.on(ActingFixes)
+def _add_work_acting_fixes(hooks, s):
     add_work(hooks.compiled, s)
 
 
-@at_points.on(PythonHooks)
-def _at_points_python_hooks(hooks, stage, then, s):
-    if stage == INITIAL_INTEGRATE and hooks.simulation.taken_up:
-        hooks.simulation.taken_up = False
+@at_points.on(ActingFixes)
+def _at_points_acting_fixes(hooks, stage, then, s):
+    if stage == INITIAL_INTEGRATE and hooks.simulation.moved_in_step:
+        hooks.simulation.moved_in_step = False
         return
     if stage == INITIAL_INTEGRATE:
         hooks.simulation.clear_forces()
@@ -282,30 +282,52 @@ def _at_points_python_hooks(hooks, stage, then, s):
     hooks.act(_on_points, s, stage, then)
 
 
-@at_heat_nodes.on(PythonHooks)
-def _at_heat_nodes_python_hooks(hooks, stage, target, s):
+@at_heat_nodes.on(ActingFixes)
+def _at_heat_nodes_acting_fixes(hooks, stage, target, s):
     at_heat_nodes(hooks.compiled, stage, target, s)
     hooks.act(_on_heat_nodes, s, stage, target)
 
 
-@at_heated_points.on(PythonHooks)
-def _at_heated_points_python_hooks(hooks, s):
+@at_heated_points.on(ActingFixes)
+def _at_heated_points_acting_fixes(hooks, s):
     at_heated_points(hooks.compiled, s)
     hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
-def view_of(simulation: Any, fix: Fix, *, then: bool) -> PointsView:
-    """Show the points of a fix, or the local ones."""
+def view_of(simulation: Backend, fix: Fix, *, then: bool) -> PointsView:
     if fix.point_by_point:
         pieces = list(simulation.points.rows_of(fix.group))
         return PointsView(simulation, then=then, pieces=pieces)
     return PointsView(simulation, simulation.points.members(fix.group), then=then)
 
 
-def views_of(simulation: Any, fix: Fix) -> Iterator[PointsView]:
-    """Yield the points of a fix before a step, in pieces where it looks at each on its own."""
+def views_of(simulation: Backend, fix: Fix) -> Iterator[PointsView]:
     if not fix.point_by_point:
         yield view_of(simulation, fix, then=False)
         return
     for piece in simulation.points.rows_of(fix.group):
         yield PointsView(simulation, pieces=[piece], in_steps=False)
+
+
+def _sets_initial_state(fix: Fix) -> bool:
+    hook = fix.hooks().get("initial_integrate")
+    return len(fix.hooks()) == 1 and hook is not None and not isinstance(hook, CompiledHook)
+
+
+class FixesOfRun(NamedTuple):
+    """The fixes of a run in the order of each stage, made once at its beginning."""
+
+    once: list[Fix]  # set the initial state, before the first step
+    new: list[Fix]  # act for the first time
+    first: ActingFixes | None  # of the first step, if some act only in it
+    lasting: ActingFixes  # of all later steps
+
+    @classmethod
+    def of(cls, simulation: Backend) -> "FixesOfRun":
+        fixes = sorted(simulation.hub.fixes.values(), key=lambda fix: fix.order)
+        new = [fix for fix in fixes if fix.first_step_only and fix not in simulation.begun]
+        once = [fix for fix in new if _sets_initial_state(fix)]
+        lasting = ActingFixes(simulation, [fix for fix in fixes if not fix.first_step_only])
+        together = [f for f in fixes if not f.first_step_only or (f in new and f not in once)]
+        more = len(together) > len(lasting.fixes)
+        return cls(once, new, ActingFixes(simulation, together) if more else None, lasting)

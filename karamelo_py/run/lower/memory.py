@@ -1,6 +1,6 @@
-"""Memory that a scene, or a process's part of it, takes; too large scenes are refused.
+"""Memory of a scene, or of a process's part of it; scenes that do not fit are refused.
 
-What is compared is the least that a run has to hold: of what would run nothing is refused.
+Only the least that a run needs is compared: nothing that would run is refused.
 """
 
 import gc
@@ -25,15 +25,13 @@ THERE = 1  # bytes of each point of the whole scene, for those that were deleted
 
 
 class MemoryTaken(NamedTuple):
-    """Bytes that a scene takes in steps."""
-
     touched: int
     copied: int  # of the last good state, with places of the present alone
     known: int  # to each process, of the whole scene
 
 
 def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
-    """Count what points in the tiles of `s`, nodes in use, and boxes of this many bytes take."""
+    """Return the memory of the points in the tiles of `s`, nodes in use, and `boxes` bytes."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
@@ -45,7 +43,7 @@ def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
 
 
 def known(hub: Hub) -> int:
-    """Count the bytes of what each process knows of the whole scene, such as solids and groups."""
+    """Return the bytes of data about the whole scene that each process holds: solids, groups."""
     seen = {id(hub)}
     parts = (part for all in (hub.solids, hub.regions, hub.groups) for part in all.values())
     there = THERE * sum(solid.count for solid in hub.solids.values())
@@ -53,7 +51,6 @@ def known(hub: Hub) -> int:
 
 
 def _held(thing: Any, seen: set[int]) -> int:
-    """Count the bytes of the arrays that a thing and its parts hold, each once."""
     if isinstance(thing, np.ndarray) and isinstance(thing.base, np.ndarray):
         thing = thing.base
     if id(thing) in seen:
@@ -67,9 +64,9 @@ def _held(thing: Any, seen: set[int]) -> int:
 
 
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
-    """Count what rows of an array take, from each of ascending spans (k, 2) to before its end.
+    """Return the bytes of array rows in ascending spans (k, 2).
 
-    Of large arrays Linux gives pages of 2 MiB: what lies between the nodes in use is there, too.
+    For large arrays Linux uses pages of 2 MiB, which include what lies between the nodes in use.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row
@@ -79,18 +76,16 @@ def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
 
 
 def nodes_in_use(s: arrays.Setup) -> int:
-    """Count the nodes that points may give to before they are sorted again."""
     return int(np.diff(used(s.spans)[1:]).sum())
 
 
 def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
-    """List the arrays of the nodes, and of those that heat flows through, with their names."""
     parts = ((name.partition("/"), array) for name, array in of_nodes(s))
     return [(name + " (heat)" * (kind == "heat"), array) for (kind, _, name), array in parts]
 
 
 def point_fields(block: Block) -> list[tuple[str, str, int]]:
-    """List name, shape and bytes of each field that a point of this block carries."""
+    """Return name, shape and bytes of each field of a point of this block."""
     found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
     found += [(name, array) for name, array in arrays.arrays_of(block.points) if name != "x"]
     sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
@@ -98,7 +93,6 @@ def point_fields(block: Block) -> list[tuple[str, str, int]]:
 
 
 def bytes_per_point(simulation: Any) -> int:
-    """Sum the bytes of all fields of a point, the mean over the points of all kinds."""
     blocks = simulation.setup.blocks
     own = np.array([len(block.points.id) for block in blocks])
     counts = simulation.comm.allreduce(own).tolist()
@@ -110,7 +104,7 @@ FEW = 100_000  # points; this number fits everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
-    """Refuse a scene that memory does not hold, perhaps with a copy; warn of what is not free."""
+    """Refuse a scene that exceeds memory, with a copy if `copied`; warn if it is not free."""
     comm = hub.settings.comm
     count = sum(solid.count for solid in hub.solids.values())
     if count <= FEW or (there := machine_memory(comm.on_machine)) is None:
@@ -141,7 +135,6 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
-    """Write what would bring the need down to what is `there`."""
     # Bytes go with that power of the number of cells along a side; two digits, rounded up.
     larger = ceil(10 * (need / max(there, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
@@ -153,7 +146,7 @@ def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:
-    """Count the least bytes of points, their copy, and the nodes of the cells that they fill."""
+    """Return the least bytes of points, their copy, and the nodes of the cells they fill."""
     kin = hub.update.method.kinematics(hub)
     kinds = point_kinds(hub)
     points, cells = 0, [0.0]
@@ -176,12 +169,10 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
 
 
 def largest(hub: Hub) -> Solid:
-    """Find the solid with most points."""
     return max(hub.solids.values(), key=lambda solid: solid.count)
 
 
 def no_room(hub: Hub, error: MemoryError) -> ScriptError:
-    """Make the error for a scene whose arrays the system does not give, whoever would use them."""
     nodes = sum(lattice.node_count for lattice in hub.lattices)
     count = sum(solid.count for solid in hub.solids.values())
     of_grid = nodes > count

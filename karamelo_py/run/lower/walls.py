@@ -14,7 +14,6 @@ from karamelo_py.scene.modify import Fix
 
 
 def fixes_of_walls(hub: Hub) -> list[Fix]:
-    """List the fixes whose nodes make walls, where the basis asks for them."""
     method = hub.update.method
     if method is None or not walled.defined(type(method.basis)):
         return []
@@ -22,12 +21,10 @@ def fixes_of_walls(hub: Hub) -> list[Fix]:
 
 
 def key_of_walls(hub: Hub) -> tuple:
-    """Return what walls depend on, besides the grids."""
     return tuple((fix.group, fix.group.parts, fix.held_directions) for fix in fixes_of_walls(hub))
 
 
 def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:
-    """Give the basis the walls inside the grids, where there are some that it asks for."""
     fixes = fixes_of_walls(hub)
     found = []
     for axis in sorted({axis for fix in fixes for axis in fix.held_directions}):
@@ -51,7 +48,7 @@ def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTup
 
 
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield the walls that held nodes make: a direction, and cells (n, d) with these lower faces.
+    """Yield the direction of walls, and the cells (n, d) above them.
 
     A face of a cell is a wall if its nodes are held, but not within a block of held nodes, where
     the next faces on both sides are held, too. At the ends of the grid there are walls anyway.

@@ -38,7 +38,6 @@ PAUSE = 0.005  # seconds between two looks whether the others have come
 def handled_signals(
     handler: Callable[[int, Any], None], numbers: Sequence[int] = ENDING
 ) -> Iterator[None]:
-    """Have signals that end programs call a handler, but for those that are ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -55,7 +54,6 @@ def handled_signals(
 
 
 def launched() -> tuple[int, int]:
-    """Read how many processes a launcher of MPI has started, and which of them this is."""
     for size, rank in LAUNCHED:
         if os.environ.get(size, "").isdigit():
             return int(os.environ[size]), int(os.environ.get(rank, 0))
@@ -63,9 +61,9 @@ def launched() -> tuple[int, int]:
 
 
 class MpiComm(SerialComm):
-    """All processes of a run, in the order of their ranks. The first writes.
+    """All processes of a run, through mpi4py; the first writes.
 
-    `ends` ends all of them because of an error, of which it tells.
+    `ends` reports an error and ends all of them.
     """
 
     parted = False
@@ -95,7 +93,6 @@ class MpiComm(SerialComm):
         near.Free()
 
     def barrier(self) -> None:
-        """Wait for all processes; quit if one of them has failed, which tells of it."""
         if (self.agree(HERE) == FAILED).any():
             self.parted = True
             raise Quit
@@ -157,16 +154,14 @@ class MpiComm(SerialComm):
             act()
 
     def connect(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
-        """Make requests by which arrays go to others (rank, array), again and again, and come."""
+        """Make persistent requests that send and receive arrays: (rank, array)."""
         requests = [self._between.Recv_init(array, rank) for rank, array in taken]
         return requests + [self._between.Send_init(array, rank) for rank, array in given]
 
     def start(self, link: Any) -> None:
-        """Begin to send what is in the arrays, and to fill others."""
         self.mpi.Prequest.Startall(link)
 
     def finish(self, link: Any) -> None:
-        """Wait until all is sent and there."""
         begun = time.perf_counter()
         self.mpi.Request.Waitall(link)
         self.waited += time.perf_counter() - begun
@@ -188,7 +183,7 @@ class MpiComm(SerialComm):
 
 
 def check_same_run(hub: Scene) -> None:
-    """See that all processes are about to do the same run; one tells, the others quit."""
+    """Check that all processes begin the same run; one reports, the others quit."""
     comm = hub.settings.comm
     if comm.size == 1:
         return

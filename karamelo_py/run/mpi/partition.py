@@ -1,7 +1,7 @@
-"""The tiles of a scene shared out among processes: who has which, and what they pass on.
+"""Tiles divided among processes, and what these send each other.
 
-Each process has the points of neighbouring tiles. Nodes that several reach are summed
-by each of them, from the same boxes in the same order.
+Each process has the points of neighbouring tiles. Nodes in reach of several processes are summed by
+each of them, from the same boxes in the same order.
 """
 
 from collections.abc import Sequence
@@ -30,13 +30,13 @@ from karamelo_py.scene.lattice import Lattice
 
 
 def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
-    """Cut tiles into parts: halves across the longest direction, and halves of these.
+    """Divide tiles by recursive bisection across the longest direction; return the part (T,).
 
     After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
-    on multiprocessors", IEEE Transactions on Computers C-36, 570-580. Where the work of a layer of
-    tiles has to be shared, it is cut across the next longest direction. `places` (T, d) are lower
-    corners, `work` (T,) whole numbers; tiles without work fill the parts. The last direction is to
-    be `rows` times as long as the others where it is cut.
+    on multiprocessors", IEEE Transactions on Computers C-36, 570-580. A layer of tiles whose work
+    must be divided is cut across the next longest direction. `places` (T, d) are lower corners,
+    `work` (T,) integers; tiles without work fill the parts. The last direction must be `rows` times
+    as long as the others to be cut.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -69,14 +69,14 @@ FINE = 1000  # parts of the unit of costs, in which work is added up as whole nu
 
 
 class Needs(NamedTuple):
-    """Nodes in use of a process: at each of k places of tiles of nodes, a box of them."""
+    """Nodes in use of a process: boxes of them at k tiles of nodes."""
 
     place: np.ndarray  # (k,) ascending
     lo: np.ndarray  # (k, d)
     hi: np.ndarray  # (k, d)
 
     def among(self, place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Find which of nodes (m, d) at places (m,) have some of these; the first and last such."""
+        """Intersect boxes (m, d) at places (m,) with these; return indices, first, last."""
         at = np.minimum(np.searchsorted(self.place, place), len(self.place) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
         which = np.flatnonzero((self.place[at] == place) & (low <= high).all(axis=1))
@@ -84,8 +84,6 @@ class Needs(NamedTuple):
 
 
 class SharedTiles(Tiles):
-    """Tiles of a process among others."""
-
     def __init__(
         self,
         comm: SerialComm,
@@ -117,12 +115,11 @@ class SharedTiles(Tiles):
         self._from = np.empty(0, np.int64)  # whose the boxes of others are
 
     def share_out(self, work: np.ndarray) -> None:
-        """Cut the tiles into parts of nearly as much work each."""
         if not self.direct:
             self.owner = bisected(self._places, work, self.comm.size, ROWS if self.long else 1)
 
     def balance(self, work: np.ndarray) -> bool:
-        """Cut the tiles anew where that is worth it; `work` (tiles,) is of the own points."""
+        """Divide the tiles anew if that is worth it; `work` (tiles,) is of the own points."""
         before, work = self.owner, self.comm.allreduce(work)
 
         def largest() -> float:
@@ -135,7 +132,7 @@ class SharedTiles(Tiles):
         return self.owner is not before
 
     def loads(self, blocks: Sequence[Block]) -> np.ndarray:
-        """Count points of each sorted block, and nodes that all may reach: (blocks + 1, tiles)."""
+        """Count points of each sorted block, and nodes in reach: (blocks + 1, tiles)."""
         found = np.zeros((len(blocks) + 1, self.count), np.int64)
         for row, block in zip(found, blocks, strict=False):
             tiles, points = occupied(block.tiling)
@@ -144,12 +141,10 @@ class SharedTiles(Tiles):
         return found
 
     def partners(self, going: np.ndarray) -> list[int]:
-        """List others that this process has something for, or they for it; how much, by rank."""
         going[self.comm.rank] = 0
         return np.flatnonzero(going + self.comm.alltoall(going)).tolist()
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
-        """Hand over the points that have gone to the tiles of others."""
         tiles = [self.tiles_of(s, block.points) for block in s.blocks]
         # Of nodes it is known what tiles reached from where their points were.
         loads = self.loads(s.blocks)
@@ -175,7 +170,7 @@ class SharedTiles(Tiles):
         return s._replace(blocks=blocks)
 
     def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
-        """Join the points that stay and those that have come, in the memory of the sort before."""
+        """Join the points that stay and those that arrive, in the memory of the last sort."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
         # Fresh memory for all of them would cost more than all else that a sort does.
         arrays = []
@@ -203,7 +198,7 @@ class SharedTiles(Tiles):
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     def _boxes(self, s: Setup) -> Boxes:
-        """List the own boxes, then other processes' boxes that may contain the same nodes."""
+        """Return the own boxes, then boxes of others that may contain the same nodes."""
         own, me = self.own_boxes(s), self.comm.rank
         self._looks_beyond = getattr(type(s.contact), "looks_beyond", 0) > 0
         of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
@@ -229,7 +224,7 @@ class SharedTiles(Tiles):
         return super()._shares(s)
 
     def _border_first(self, s: Setup) -> None:
-        """Let the tiles that others wait for be visited first."""
+        """Visit the tiles first whose sums other processes wait for."""
         awaited = np.zeros(len(self._of), bool)
         for box, _, _ in self._passed.values():
             awaited[box] = True
@@ -248,16 +243,15 @@ class SharedTiles(Tiles):
                 tiling.share[k * SHARES : (k + 1) * SHARES + 1] = share
 
     def own_boxes(self, s: Setup) -> Boxes:
-        """List the boxes of the own tiles, with their place in the order of one process."""
+        """Return the boxes of the own tiles, with their order in a serial run."""
         order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
         return super()._boxes(s)._replace(order=np.concatenate(order))
 
     def _place(self, tile: np.ndarray) -> np.ndarray:
-        """Number the place of a tile of nodes."""
         return tile % int(self._first_of_nodes[1]) if self.one_place else tile
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """Find what own boxes reach, and what of others' is at nodes in use here, as more boxes."""
+        """Find what own boxes reach, and add the parts of others' boxes at nodes in use here."""
         _, reached = super()._reached(boxes)
         of, place = self._of[reached.box], self._place(reached.tile)
         me = self.comm.rank
@@ -291,7 +285,7 @@ class SharedTiles(Tiles):
         ), found
 
     def _inner_boxes(self, boxes: Boxes) -> dict[int, tuple]:
-        """Cut boxes down to nodes whose neighbours are in them, too, by process."""
+        """Shrink boxes to nodes whose neighbours are in them, too, by process."""
         low = np.where(boxes.lo > 0, boxes.lo + 1, 0)
         end = self._nodes[boxes.grid] - 1
         high = np.where(boxes.hi < end, boxes.hi - 1, end)
@@ -333,7 +327,7 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
-        """List the `nodes` that other processes count: the first process that has them."""
+        """Return the `nodes` that other processes count: the first that has them."""
         count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
         place = nodes % count
         for rank, boxes in sorted(self._inner.items()):
@@ -344,7 +338,7 @@ class SharedTiles(Tiles):
         return nodes
 
     def give(self, s: Setup, number: int, what: int) -> None:
-        """Begin to pass on what the own tiles give to nodes of others, and theirs to own ones."""
+        """Begin to exchange the contributions of tiles to nodes of other processes."""
         link = self._links.get((number, what))
         if link is None:
             of = next(one for one in buffers_of(s) if one.number == number)
@@ -359,7 +353,6 @@ class SharedTiles(Tiles):
         self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
-        """Make room for packed rows of the buffers, and the requests that pass them on."""
         packed, given, taken = [], [], []
         for array in arrays:
             for rank, rows in self.given.items():
@@ -371,12 +364,11 @@ class SharedTiles(Tiles):
 
 
 def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
-    """Sum the integer cost (tiles,) of points and nodes, with counts (k, tiles)."""
+    """Return the integer cost (tiles,) of points and nodes, with counts (k, tiles)."""
     return np.rint(FINE * (costs @ loads)).astype(np.int64)
 
 
 def nodes_of(tiling: Tiling) -> np.ndarray:
-    """Count the nodes that the points of each occupied tile may reach."""
     count = tiling.count[0]
     if tiling.rows.shape[1]:
         return np.maximum(np.diff(tiling.rows[:count]) + 1, 0).sum(axis=(1, 2), dtype=np.int64)
@@ -385,13 +377,11 @@ def nodes_of(tiling: Tiling) -> np.ndarray:
 
 
 def occupied(tiling: Tiling) -> tuple[np.ndarray, np.ndarray]:
-    """List the occupied tiles of a block, and how many points they have."""
     count = tiling.count[0]
     return tiling.number[:count], np.diff(tiling.range[:count], axis=1)[:, 0]
 
 
 def sized(points: Points, count: int) -> Points:
-    """Return arrays for `count` points of this kind; `points` itself if the number is the same."""
     if points.mass.size == count:
         return points
     shapes = [((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
@@ -399,14 +389,14 @@ def sized(points: Points, count: int) -> Points:
 
 
 def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
-    """Find the least and largest nodes of boxes (m, d) at each place (m,)."""
+    """Return the hull of boxes (m, d) at each place (m,)."""
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     return Needs(place[order][starts], *extents(starts, begin[order], end[order]))
 
 
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """List rows of the buffers of all nodes from `lo` to `hi` (k, d), box after box."""
+    """Return the buffer rows of all nodes from `lo` to `hi` (k, d), box after box."""
     shape = hi - lo + 1
     box, left = ragged(np.prod(shape, axis=1))
     inner = steps_of(shape)[box]
@@ -415,7 +405,7 @@ def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) 
 
 
 def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
-    """Pack the points and tiles of `s` in tiles of which `own` says so, by name."""
+    """Pack the points and tiles of `s` in the tiles marked in `own`, by name."""
     found: dict[str, np.ndarray] = {}
     for k, block in enumerate(s.blocks):
         points, tiles = share_of_tiling(k, block.tiling, own)
@@ -427,7 +417,7 @@ def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
 def share_of_tiling(
     k: int, tiling: Tiling, own: np.ndarray
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Find the points in tiles of which `own` says so, and pack these tiles."""
+    """Return the points in the tiles marked in `own`, and these tiles, packed."""
     which = np.flatnonzero(own[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)
@@ -439,23 +429,20 @@ def share_of_tiling(
 
 
 def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
-    """Choose the arrays whose names begin so, and name them without that."""
     return {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
 
 
 def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
-    """Join rows of the tiles of all processes, one process after another."""
     return np.concatenate([part[name][: part["count"][0]] for part in tilings])
 
 
 def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
-    """Find the order of tiles for points ordered by process."""
+    """Return the order by tile of points that are ordered by process."""
     ranges = one_after_another(_joint(tilings, "range"))
     return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
 
 
 def join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
-    """Join the tiles of all processes, in the order of their numbers."""
     order = np.argsort(_joint(tilings, "number"))
     tiling.count[0] = len(order)
     names = [name for name in (*OF_TILES, "report") if name in tilings[0]]

@@ -1,4 +1,4 @@
-"""The plan of several processes, made by one: what they would have, and pass on in a step."""
+"""The division of a scene among processes, predicted by one: memory and messages per step."""
 
 from typing import Any, NamedTuple
 
@@ -12,8 +12,8 @@ from karamelo_py.run.boxes import Boxes, chosen_of, no_nodes
 from karamelo_py.run.lower.memory import memory_of, nodes_in_use
 from karamelo_py.run.mpi.partition import SharedTiles, occupied
 from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable_step import sparse
 from karamelo_py.run.tiles import SHARES
-from karamelo_py.run.timestep import sparse
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
 
@@ -21,8 +21,6 @@ MAY_CHANGE = 1.25  # largest number of points over the mean that is acceptable
 
 
 class ProcessShare(NamedTuple):
-    """Part of one process."""
-
     points: int
     tiles: int  # of points, that are occupied
     nodes: int  # in use
@@ -33,7 +31,7 @@ class ProcessShare(NamedTuple):
 
 
 class _Sums(NamedTuple):
-    """Sweeps nothing, and notes which arrays of the nodes are given to in a step."""
+    """Sweeps nothing, and notes which arrays of the nodes a step sums."""
 
     found: list
 
@@ -51,8 +49,6 @@ def _sum_buffers_sums(mode, quantities, s, due):
 
 
 class _PretendedComm(SerialComm):
-    """One of several processes that are not there."""
-
     def __init__(self, rank: int, size: int, boxes: list[Boxes]):
         self.rank, self.size, self.boxes = rank, size, boxes
 
@@ -61,7 +57,7 @@ class _PretendedComm(SerialComm):
 
 
 def bytes_of_node(simulation: Simulation) -> int:
-    """Count the bytes passed on in a step of each node that tiles of another process reach."""
+    """Return the bytes sent per step for each node in reach of another process."""
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
@@ -74,7 +70,6 @@ def bytes_of_node(simulation: Simulation) -> int:
 
 
 def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
-    """Plan the parts of `ranks` processes in a scene whose points are sorted."""
     s, method = simulation.setup, simulation.hub.update.method
     lattices, one_place = method.lattices(simulation.hub), method.fields_per_solid
     few = simulation.count, sparse(simulation.hub)
@@ -124,7 +119,6 @@ def _part(s: Setup, own: np.ndarray) -> Setup:
 
 
 def report_lines(simulation: Simulation, ranks: int) -> list[str]:
-    """Format, in lines, what each of several processes would have."""
     columns = np.array(plan(simulation, ranks))
     mean = columns[:, 0].mean()
     lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
@@ -143,7 +137,7 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
         lines.append("  so few points are not shared out: the first process has them all")
     elif over > MAY_CHANGE:
         lines.append("  tiles are not cut: fewer processes would wait less for the largest part")
-    acting = (fix for pairs in simulation.python.by_stage.values() for fix, _ in pairs)
+    acting = (fix for pairs in simulation.fixes.lasting.in_python.values() for fix, _ in pairs)
     if fix := next((fix for fix in acting if not fix.point_by_point), None):
         blocks = simulation.setup.blocks
         moved = sum(array.nbytes for block in blocks for _, array in arrays_of(block.points))

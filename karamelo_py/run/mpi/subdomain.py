@@ -1,6 +1,8 @@
-"""One of several processes of a scene: its points, and its measured work."""
+"""The part of a scene on one of several processes, and its measured work."""
 
 import time
+from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -8,19 +10,20 @@ import numpy as np
 from karamelo_py.compiler import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.kernels import ranks
-from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, Setup
+from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, NoHooks, Setup
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
-from karamelo_py.run.boxes import numbers
-from karamelo_py.run.checkpoint.arrays import kept_at_nodes, remembered_at, take_points
+from karamelo_py.run.backend import Backend, WholeDomain
+from karamelo_py.run.checkpoint.arrays import kept_at_nodes, own_share, remembered_at, take_points
 from karamelo_py.run.mpi import partition
+from karamelo_py.run.mpi.whole import Whole
 from karamelo_py.scene.comm import SerialComm
 
 LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
 
 
 class Load:
-    """Time in sweeps over the points of each block, and in all else that is no waiting."""
+    """Time in sweeps over the points of each block, and in everything else but waiting."""
 
     def __init__(self, blocks: int):
         # Of a point of each block in a step, and of a node that the points of a tile may reach.
@@ -30,7 +33,6 @@ class Load:
         self._since: int | None = None
 
     def pause(self) -> None:
-        """Do not count the time until the next sweep."""
         self._since = None
 
     def note(self) -> None:
@@ -44,30 +46,32 @@ class Load:
         self._since = time.perf_counter_ns()
 
     def next_block(self) -> None:
-        """Advance to the next block, cyclically."""
         self.resume((self._at + 1) % self._rest)
 
     def done(self, counts: list[int], steps: int) -> None:
-        """Record a number of steps with these numbers of points and nodes."""
         self._spent[1] += np.array(counts) * steps
 
     def learn(self, comm: SerialComm) -> None:
-        """Find the costs from what all have spent; later times count more."""
+        """Update the costs from the times of all processes; recent times count more."""
         seconds, done = comm.allreduce(self._spent)
         self._spent //= 2
         if (seconds[:-1] > 0).all() and (done > 0).all():
             self.costs = seconds / done
 
 
-class Subdomain:
-    """Balances the part of this process with the other parts, and answers kernels.
+class Subdomain(WholeDomain):
+    """The part of a scene on one of several processes, balanced with the others.
 
     Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
     """
 
-    def __init__(self, simulation: Any):
-        self.simulation, self.comm = simulation, simulation.comm
-        self.tiles: partition.SharedTiles = simulation.tiles
+    parted = True
+
+    def __init__(self, simulation: Backend):
+        super().__init__(simulation)
+        self.comm = simulation.comm
+        assert isinstance(simulation.tiles, partition.SharedTiles)
+        self.tiles = simulation.tiles
         s = simulation.setup
         self.load = Load(len(s.blocks))
         self.control = s.control
@@ -78,13 +82,11 @@ class Subdomain:
         self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
 
     def migrate(self, s: Setup) -> Setup:
-        """Hand over the points that have left the own tiles; they are to be sorted then."""
         self.share_memory()
         self.account()
         return self.tiles.migrate(s, self.learn())
 
     def put(self, shares: list[dict[str, np.ndarray]]) -> None:
-        """Replace the own points and tiles by these parts."""
         simulation, tiles = self.simulation, self.tiles
         s, blocks = simulation.setup, []
         tiles.empty_nodes(s)
@@ -104,19 +106,13 @@ class Subdomain:
         tiles.lay_out(simulation.setup)
 
     def contact_memory(self) -> list[np.ndarray]:
-        """List what contact remembers of every node."""
         return remembered_at(self.simulation, np.array([[0, len(self.tiles.foreign)]]))
 
     def memory(self) -> list[np.ndarray]:
-        """List what is remembered of every node: by contact, and in fields that outlive a step."""
         kept = kept_at_nodes(self.simulation.setup)
         return [*self.contact_memory(), *(array for _, array in kept)]
 
     def share_memory(self) -> None:
-        """Tell all where contact acted in the last step, and kept fields of nodes.
-
-        Other nodes come to be in use.
-        """
         own, step, contact = self.counted(), self.simulation.step, self.contact_memory()
         self.share_kept()
         if contact:
@@ -124,7 +120,6 @@ class Subdomain:
             self._share(own[np.any(touched, axis=0)], contact)
 
     def share_kept(self) -> None:
-        """Tell all the fields of the own nodes that outlive a step."""
         if kept := kept_at_nodes(self.simulation.setup):
             self._share(self.counted(), [array for _, array in kept])
 
@@ -134,24 +129,33 @@ class Subdomain:
                 one[nodes] = found
 
     def counted(self) -> np.ndarray:
-        """Number the nodes in use here that no other process counts."""
-        nodes = numbers(self.simulation.setup.spans)
+        nodes = super().counted()
         return nodes[self.tiles.foreign[nodes] == 0]
 
-    def begin(self, hooks: Any, *, from_python: bool) -> None:
-        """Make ready for steps whose work is measured."""
+    @cached_property
+    def _whole(self) -> Whole:
+        return Whole(self.simulation, self)
+
+    def act(self, function: Callable[[Setup], None], s: Setup) -> None:
+        self._whole.act(function)
+
+    def state(self) -> dict[str, np.ndarray]:
+        return {"owner": self.tiles.owner}
+
+    def own_part(self, state: Mapping[str, Any]) -> Mapping[str, Any]:
+        return own_share(self.simulation, state, self.load.costs)
+
+    def begin(self, hooks: Hooks | NoHooks, *, from_python: bool) -> None:
         self.at_once = from_python or reads_totals(hooks)
         self.rebalance()
         self._counted_at = self.simulation.step
         self.load.pause()
 
     def end(self) -> None:
-        """Account for the last steps, and publish what their fixes have added up."""
         self.account()
         self._publish()
 
     def account(self) -> None:
-        """Take note of the steps so far; what comes before the next is not counted."""
         blocks, step = self.simulation.setup.blocks, self.simulation.step
         counts = [block.points.mass.size for block in blocks]
         counts.append(sum(int(partition.nodes_of(block.tiling).sum()) for block in blocks))
@@ -165,7 +169,7 @@ class Subdomain:
         return self.load.costs
 
     def rebalance(self) -> None:
-        """Hand over tiles as they are where that is due: points may never be sorted again."""
+        """Hand over whole tiles if that is due: points may never be sorted again."""
         simulation, tiles = self.simulation, self.tiles
         s = simulation.setup
         clock = s.control.clock[0]
@@ -219,7 +223,7 @@ class Subdomain:
             self.control.answer[k] = rounded(of_all[k])
 
     def _publish(self) -> None:
-        """Add up the values of the last step over all: their totals are kept until the next."""
+        """Sum the published values of the last step over all processes."""
         rows, values = sorted(self.due), self.control.values
         self.due.clear()
         if rows:
@@ -231,7 +235,6 @@ class Subdomain:
                 values[to : to + 3] = values[of : of + 3]
 
 
-def reads_totals(hooks: Any) -> bool:
-    """Tell whether formulas read within steps what fixes publish."""
+def reads_totals(hooks: Hooks | NoHooks) -> bool:
     code = hooks.code if isinstance(hooks, Hooks) else np.empty((0, 2), np.int64)
     return bool(((code[:, 0] % UNIFORM == GLOBAL) & (code[:, 1] > DT)).any())

@@ -1,4 +1,4 @@
-"""The whole of a scene with several processes, at the first, for functions of all points."""
+"""A whole scene gathered at the first process, for functions of all points."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
+from karamelo_py.run.backend import Backend, WholeDomain
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import lower
@@ -20,14 +21,14 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """Begin the step anew: a fix in Python has moved points, and other processes have them now."""
+    """A fix in Python has moved points to other processes: begin the step anew."""
 
 
 class Whole:
-    """Arrays of a whole scene, gathered from the processes, and handed out again."""
+    """Arrays of a whole scene, gathered from the processes and handed out again."""
 
-    def __init__(self, simulation: Any):
-        self.simulation = simulation
+    def __init__(self, simulation: Backend, subdomain: Any):
+        self.simulation, self.subdomain = simulation, subdomain
         # With arrays of nodes, and next to no points.
         s, self.tiles = lower(simulation.hub, ids=(0, 1), comm=SerialComm())
         control = simulation.control._replace(ranks=s.control.ranks)
@@ -35,10 +36,9 @@ class Whole:
         self.tiles.threads, self.tiles.mode = simulation.threads, simulation.mode
 
     def act(self, function: Callable[[Setup], None]) -> None:
-        """Let the first process call a function of the whole; all take over what it has done.
+        """Call a function of the whole on the first process; all take over its changes.
 
-        Where points were moved the step has to be begun anew (`PointsMoved`). If the function fails
-        the first process tells of it, and the others quit.
+        If points were moved, the step must begin anew (`PointsMoved`).
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
@@ -67,16 +67,15 @@ class Whole:
 
     @contextmanager
     def _in_place(self) -> Iterator[None]:
-        """Make the simulation one of the whole scene, on one process."""
         simulation = self.simulation
-        own = simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain
+        own = simulation.setup, simulation.tiles, simulation.comm, simulation.domain
         simulation.setup, simulation.tiles = self.setup, self.tiles
-        simulation.comm, simulation.subdomain = SerialComm(), None
+        simulation.comm, simulation.domain = SerialComm(), WholeDomain(simulation)
         try:
             yield
         finally:
             self.setup = simulation.setup
-            simulation.setup, simulation.tiles, simulation.comm, simulation.subdomain = own
+            simulation.setup, simulation.tiles, simulation.comm, simulation.domain = own
 
     def gather(self) -> None:
         """Gather the points of all, component by component and tile after tile, and the nodes."""
@@ -103,8 +102,7 @@ class Whole:
             self._join(parts)
 
     def _own(self) -> dict:
-        """Find tiles and nodes that no other process shows, and how many points there are."""
-        simulation, subdomain = self.simulation, self.simulation.subdomain
+        simulation, subdomain = self.simulation, self.subdomain
         s, own = simulation.setup, subdomain.counted()
         return {
             "counts": [block.points.mass.size for block in s.blocks],
@@ -119,7 +117,6 @@ class Whole:
         }
 
     def _join(self, parts: list[dict[str, Any]]) -> None:
-        """Join the tiles and nodes of all processes, and what contact remembers of nodes."""
         whole, tiles = self.setup, self.tiles
         for k, block in enumerate(whole.blocks):
             block.tiling.count[1] = 1 if tiles.direct else SHARES
@@ -129,7 +126,7 @@ class Whole:
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
             array[nodes] = 0  # also those that no box reaches and no process has
-        memory = self.simulation.subdomain.memory()
+        memory = self.subdomain.memory()
         for part in parts:
             for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
                 array[part["nodes"]] = rows
@@ -137,8 +134,7 @@ class Whole:
                 array[part["nodes"]] = rows
 
     def _nodes(self, moved: bool) -> tuple:
-        """Find what all are to know: who has which tile, where points were moved, and of nodes."""
-        subdomain, tiles = self.simulation.subdomain, self.simulation.tiles
+        subdomain, tiles = self.subdomain, self.simulation.tiles
         nodes = numbers(self.setup.spans)
         if not moved:
             return nodes, [array[nodes] for _, array in of_nodes(self.setup)]
@@ -152,15 +148,14 @@ class Whole:
         return [share_of(self.setup, owner == rank) for rank in range(comm.size)]
 
     def _hand_out_tiles(self, owner: np.ndarray, nodes: np.ndarray, memory: list) -> None:
-        """Hand out the tiles of the whole, cut anew."""
-        simulation, subdomain = self.simulation, self.simulation.subdomain
+        simulation, subdomain = self.simulation, self.subdomain
         simulation.tiles.owner = owner
         subdomain.put([simulation.comm.scatter(self._shares())])
         for one, rows in zip(subdomain.memory(), memory, strict=True):
             one[nodes] = rows
 
     def _hand_back(self, nodes: np.ndarray, rows: list) -> None:
-        """Put what the first has changed into the arrays that a step is at work on."""
+        """Copy the changes of the first process into the arrays of the present step."""
         s, found = self.simulation.setup, self.simulation.comm.scatter(self._shares())
         here = np.isin(nodes, numbers(s.spans))
         for (_, array), own in zip(of_nodes(s), rows, strict=True):

@@ -137,7 +137,7 @@ def gradient(
 def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     """Find the fixes that this one overrides, with the data for the warning."""
     fixes = list(simulation.hub.fixes.values())
-    first = [one for one in simulation.beginning if isinstance(one, VelocityOfPoints)]
+    first = [one for one in simulation.fixes.new if isinstance(one, VelocityOfPoints)]
     if not (fix.leads_points or fix in first):
         return
     led = [one for one in fixes[: fixes.index(fix)] if one.leads_points]

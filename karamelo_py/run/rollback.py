@@ -1,4 +1,4 @@
-"""Recovery of a run after a failed step or an energy gain: halve the step, or end the run."""
+"""Return of a run to its last good state: to halve the step, or to end."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -8,7 +8,6 @@ from typing import NoReturn
 
 from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
-from karamelo_py.run import energy
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.listening import Trouble, when
@@ -21,14 +20,11 @@ HALVINGS = 5  # at most, in a run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
 RETURNS = 2  # at most, to one state before an energy gain: two halvings without effect are enough
 LAST_GOOD = "last_good.*.h5"
-SMALLER_STEP = "a smaller time step (set_dt, dt_factor)"
-# Of implicit schemes; more of them is what a run may change.
-OTHER_LOAD_STEPS = "smaller load steps (set_dt), or another tolerance, iterations or solver"
 FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
-    """A run has ended at a fault; all processes know, and its last good state is written."""
+    """A run has failed on all processes, and its last good state is written."""
 
 
 class OthersWait(Exception):
@@ -43,19 +39,19 @@ def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
 
 
 class RollBack:
-    """The last good state of a run, and the return to it, to `halve` the step or to end."""
+    """Stores the last good state of a run, and returns to it."""
 
     def __init__(self, hub: Hub, tell: Callable, *, halve: bool):
         self.hub, self.tell, self.place = hub, tell, hub.place
         self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Simulation, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state, or with the good one of a file, which may be `ruined`.
+        """Begin with the present state, or the state of a file, which may be `ruined`.
 
-        `looks` says that values of parts may be read between any two steps.
+        `looks`: a condition may read values of parts between any two steps.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
-        self.too_large = simulation.too_large
+        self.too_large = simulation.steps.too_large
         # Deleted points would not come back.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
@@ -65,25 +61,25 @@ class RollBack:
 
     def before(self) -> None:
         """Store the present state if it is due and good; else note the memory of parts."""
-        if self.point.step == self.begun_at and self.simulation.too_large:
+        if self.point.step == self.begun_at and self.simulation.steps.too_large:
             return  # only the first state is good, and its rows are not rewound
         step = self.simulation.step
         # When states are stored must not depend on the speed of steps: runs return to them.
-        # Load steps take long: none is repeated.
-        often = self.simulation.implicit or step == self.first_step + 1
-        often |= step % self.simulation.states_every == 0
-        if often and step != self.point.step and energy.grown_little(self.simulation):
+        often = step % self.simulation.states_every == 0 or step == self.first_step + 1
+        often |= not self.simulation.repeats_steps
+        if often and step != self.point.step and self.simulation.energy_watch.grown_little():
             self._keep()
         else:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Judge steps that ended with `status`: continue from there (True), or from here."""
+        """Judge steps that ended with `status`; return False if the run has gone back."""
         simulation, point = self.simulation, self.point
         if status == STOPPED and boundary.delete_leaving(self.hub, simulation, point.arrays):
             self._keep()
             return False
-        grown = status == DONE and not simulation.told_of_growth and energy.has_grown(simulation)
+        watch = simulation.energy_watch
+        grown = status == DONE and not watch.told_of_growth and watch.has_grown()
         halves = point.halve and point.halvings < HALVINGS
         halves = halves and not (status == STOPPED and self._points_only_leave())
         choice = decide(status, grown=grown, halves=halves, returns=point.returns)
@@ -94,7 +90,7 @@ class RollBack:
         return choice == CONTINUE
 
     def act_between_steps(self) -> None:
-        """Call functions that act after the present step; their deletions are permanent."""
+        """Call the fixes that act after the present step; deletions are permanent."""
         step = self.simulation.step
         due = [fix for fix in self.hub.fixes.values() if fix.every and step % fix.every == 0]
         if sum(fix.between_steps() for fix in due):
@@ -105,15 +101,14 @@ class RollBack:
         self.point.returns = 0
 
     def _halve_step(self, status: int) -> None:
-        """Return to the last good state with half the step."""
         simulation, point = self.simulation, self.point
         found = self._explained(status)
         # Rows of log and dumps written since are removed with their states.
         point.return_to(simulation, cut=True)
         while point.halvings < HALVINGS:
             point.halvings += 1
-            simulation.halve_step(point.halvings)
-            if not simulation.above_limit():  # steps above it would fail again
+            simulation.steps.halve(point.halvings)
+            if not simulation.steps.above_limit():  # steps above it would fail again
                 break
         self.hub.warn(
             f"{found.message}. Back to {when(simulation)}, with 1/{2**point.halvings} of the step",
@@ -123,23 +118,25 @@ class RollBack:
         )
         if status == DONE:
             point.returns += 1
-            energy.forget_growth(simulation)
+            simulation.energy_watch.forget_growth()
 
     def _explained(self, status: int, too_large: bool = False) -> Trouble:
-        """Have a listener explain what went wrong."""
         found = self.tell(lambda to: to.wrong(self.simulation, status, too_large))
-        return found or Trouble(f"a step failed ({when(self.simulation)})", SMALLER_STEP, "point")
+        return found or Trouble(
+            f"a step failed ({when(self.simulation)})", self.simulation.remedy, "point"
+        )
 
     def _points_only_leave(self) -> bool:
         """Return True if points leave without an energy gain: no smaller step prevents this."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
-        if not (moves and len(simulation.leaving()) and energy.grown_little(simulation)):
+        watch = simulation.energy_watch
+        if not (moves and len(simulation.leaving()) and watch.grown_little()):
             return False
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
         self.point.return_to(simulation)
-        before = simulation.energy()
+        before = watch.energy()
         self.point.again(simulation.advance, step)
-        kept = energy.growth_since(simulation, before) <= WITHIN and not simulation.above_limit()
+        kept = watch.growth_since(before) <= WITHIN and not simulation.steps.above_limit()
         simulation.advance(1)  # repeats the failure for output
         present.give(self.hub)  # their files are unchanged
         return kept
@@ -147,11 +144,11 @@ class RollBack:
     def _stop(self, status: int) -> NoReturn:
         """Return to the last good state, write it, and raise the error for the user.
 
-        If energy has grown before, that is the last state before the growth; log and dumps end with
-        the last state that has no fault itself. If the step was too large from the start, it is the
-        initial state: no later state is good.
+        If energy has grown, that is the last state before the growth; log and dumps end with the
+        last state without a fault. If the step was too large from the start, only the initial state
+        is good.
         """
-        too_large = self.too_large and self.simulation.too_large
+        too_large = self.too_large and self.simulation.steps.too_large
         found = self._explained(status, too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):
@@ -163,7 +160,7 @@ class RollBack:
         raise error
 
     def _keep_start(self, status: int) -> str:
-        """Write the state that the run began with, end the outputs; return how to resume."""
+        """Write the initial state of the run, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)
@@ -177,10 +174,7 @@ class RollBack:
         return self._resume(path)
 
     def _resume(self, path: Path | None, remark: str = "") -> str:
-        """Write the command that resumes from a file, with outputs where this run has them.
-
-        A shell takes the remark for a comment.
-        """
+        """Return the command that resumes from a file; a shell takes the remark for a comment."""
         if path is None:
             return ""
         names = self.hub.record.script, os.path.relpath(path), os.path.relpath(self.hub.folder)
@@ -189,10 +183,11 @@ class RollBack:
         return f"karamelo-py {script} -restart {file}{out}" + (remark and f"  # {remark}")
 
     def _keep_good(self, status: int, code: str) -> str:
-        """Return to the last good state, write it, end the outputs; return how to resume."""
+        """Write the last good state, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
-        grown, path = not energy.grown_little(simulation), None
+        watch = simulation.energy_watch
+        grown, path = not watch.grown_little(), None
         if grown:
             path = self._write_before_growth(step)
         else:
@@ -201,9 +196,9 @@ class RollBack:
                 # Nodal values depend on the number of steps per call: here always the same.
                 good.again(simulation.advance, step)
         if status not in (GAINED, HEATED) and step > simulation.step:
-            before = simulation.energy()
+            before = watch.energy()
             good.again(simulation.advance, step)
-            if path is None and energy.growth_since(simulation, before) > WITHIN:
+            if path is None and watch.growth_since(before) > WITHIN:
                 # The watch averages over a hundred steps, and has not seen it yet.
                 grown, path = True, self._write_before_growth(step)
                 good.again(simulation.advance, step)
@@ -211,12 +206,11 @@ class RollBack:
         if simulation.step < step:
             present.give(self.hub)  # their files are unchanged, with later rows
         self._end_outputs()
-        change = OTHER_LOAD_STEPS if simulation.implicit else SMALLER_STEP
-        change = "boundary(delete)" if code == "left-domain" else change
+        change = "boundary(delete)" if code == "left-domain" else simulation.remedy
         return self._resume(path, f"{'before energy grew; ' * grown}with {change}")
 
     def _write_before_growth(self, end: int) -> Path | None:
-        """Return to the last state before step `end` without an energy gain, and write it."""
+        """Write the last state before step `end` without an energy gain."""
         simulation, good = self.simulation, self.point
         good.return_to(simulation)
         clock = simulation.control.clock[0]
@@ -224,7 +218,7 @@ class RollBack:
         while clock.watch_energy and simulation.step + LOOK < end:
             look = simulation.step + LOOK - (simulation.step - 1) % LOOK
             healthy = good.again(simulation.advance, look) == DONE
-            if not (healthy and energy.grown_little(simulation)):
+            if not (healthy and simulation.energy_watch.grown_little()):
                 break
             if clock.balance - before < GROWTH * unit_of(clock):
                 good.keep(simulation, forget=False)
@@ -232,7 +226,6 @@ class RollBack:
         return self._write_last_good()
 
     def _write_last_good(self) -> Path | None:
-        """Write the present state to a restart file; existing files of others are not replaced."""
         hub, path = self.hub, restart_file.path_of(self.hub, Path(LAST_GOOD))
         may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
         if not (hub.output.takes_part and may_be):
@@ -251,7 +244,6 @@ class RollBack:
 
     @contextmanager
     def _as_warnings(self) -> Iterator[None]:
-        """Turn errors in writing into warnings: a further error is about to be raised."""
         try:
             yield
         except ScriptError as error:

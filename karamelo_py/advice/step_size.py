@@ -1,0 +1,106 @@
+"""The default step, the stable step, and words that compare a script's step with them."""
+
+from math import inf
+
+from karamelo_py.kernels.clock import STILL, STRIDE
+from karamelo_py.run.simulation import Simulation
+from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
+from karamelo_py.schemes.traits import USUAL
+
+LOST = 2.05  # times the stable step, beyond which every run that was tried failed
+NO_LIMITS = ("set_dt", "end")  # of stability
+
+
+def own_step(simulation: Simulation, *, still: bool = False) -> float:
+    """Return the default step now: at rest, or as if points had moved."""
+    clock, steps = simulation.control.clock[0], simulation.steps
+    courant, share = own_step_of_waves(simulation.hub, still=still)
+    weight = own_weight_of_drift(simulation.hub)
+    rate = clock.rate if weight == clock.weight else steps.rate_with(weight)
+    limit = courant * clock.spacing / rate if rate > 0 else inf
+    step = min(share * limit, USUAL * clock.heat_limit)
+    speed = simulation.fastest() if weight != 1 else 0.0
+    return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
+
+
+def _stable_in_place(simulation: Simulation) -> float:
+    """Return the largest stable step of points at their present positions."""
+    clock = simulation.control.clock[0]
+    courant, _ = own_step_of_waves(simulation.hub, still=clock.path <= STILL)
+    return courant * clock.spacing / clock.rate
+
+
+def blows_up(simulation: Simulation) -> bool:
+    """Return True if the step is so far above the stable one that a run fails."""
+    return simulation.dt > LOST * _stable_in_place(simulation)
+
+
+def what_follows(simulation: Simulation, step: float) -> str:
+    """Describe the known effects of a `step` above the stable one for moving bodies."""
+    stable = _stable_in_place(simulation)
+    if step <= stable:
+        return (
+            " of bodies that move through the grid (spurious energy gain); up to "
+            f"{stable:.4g} is stable at rest"
+        )
+    if step <= LOST * stable:
+        return ": the run may become unstable, depending on where points lie in their cells"
+    return ": the run will most likely become unstable"
+
+
+def own_step_instead_of(simulation: Simulation) -> float | None:
+    """Return the default step; None if the script does not override it."""
+    update = simulation.hub.update
+    if update.dt_factor is None and update.fixed_dt is None:
+        return None
+    return own_step(simulation, still=simulation.control.clock[0].path <= STILL)
+
+
+def words_of_own_step(simulation: Simulation, step: float) -> str:
+    """Describe the default step, see `own_step_instead_of`, and the one that follows it."""
+    after = own_step(simulation, still=False)
+    far = f", {after:.6g} once points have gone a quarter of a cell"
+    return f"{step:.6g}" + (far if after < step else "")
+
+
+def stable_step(simulation: Simulation, limit: float) -> float:
+    """Return the stable step if a script sets the step: `limit`, or the default's."""
+    return max(limit, own_step(simulation) / USUAL)
+
+
+def own_step_instead(simulation: Simulation, command: str = "") -> str:
+    """Return the fix for a step that is too large, by the command that set it."""
+    update = simulation.hub.update
+    if command == "set_dt" or (not command and update.fixed_dt is not None):
+        return f"set_dt({own_step(simulation):.3g}) or less, or remove set_dt"
+    share = own_step(simulation) / simulation.steps.limit_moving
+    return f"dt_factor({share:.3g}) or less" + ", or remove dt_factor" * bool(update.dt_factor)
+
+
+def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
+    """Name the step set by a script, as a key for messages already given."""
+    return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
+
+
+def words_of_share(simulation: Simulation) -> str:
+    """Describe the fraction of the stable step, and its meaning."""
+    hub, steps = simulation.hub, simulation.steps
+    asked, keeping = hub.update.dt_factor, keeping_share(hub)
+    if hub.update.fixed_dt is not None:
+        share = hub.update.fixed_dt / stable_step(simulation, steps.limit)
+        words = f"{share:.3g} of the stable step"
+    elif asked is None:
+        clock = simulation.control.clock[0]
+        of_heat = steps.ruling_limit == "conduction"
+        words = f"{USUAL if of_heat else float(clock.dt_factor):g} of the stable step, "
+        words += "the program's own"
+        after = clock.dt_factor_moving * clock.courant_moving / (clock.dt_factor * clock.courant)
+        far = f"; {after:.2g} of that once points have gone a quarter of a cell"
+        return words if after == 1 else words + far
+    else:
+        share = asked
+        words = f"{share:g} of the stable step, by dt_factor"
+    # `large_steps` warns of a fraction above 1.
+    if max(keeping, 1e-9) * (1 + 1e-9) < share <= 1 and keeping < USUAL:
+        return words + f": above {keeping:g} a body that drifts gains energy"
+    return words

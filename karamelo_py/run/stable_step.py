@@ -1,0 +1,224 @@
+"""The stable step over h/c, and the default fraction of it."""
+
+from math import inf, sqrt
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import Tag
+from karamelo_py.kernels.laws import law_on
+from karamelo_py.points.kinematics import total
+from karamelo_py.points.laws import (
+    Absent,
+    can,
+    conductivity,
+    constrained_velocity,
+    heat_capacity,
+    initial_state,
+    law_traits,
+    parameter,
+    specific_volume,
+    wave_speed_squared,
+)
+from karamelo_py.points.laws.eos import taken_heat
+from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.points.transfers import flip_coefficient, stores_moment
+from karamelo_py.run.backend import Backend
+from karamelo_py.run.body_motion import motions
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
+from karamelo_py.schemes.traits import USUAL
+
+BOXES = 6.0  # weight of a common drift in the steps of boxes
+LONE = 0.9  # of the stable step of a lone point: an expanded point is stiffer
+DAMPED = 0.5  # minimum, with one point per cell, if a PIC fraction damps
+
+
+def one_a_cell(solid: Solid) -> bool:
+    """Return True if a solid has one point per cell and direction, not two or more."""
+    return 2 * np.max(solid.half_size) > 0.75 * solid.h
+
+
+def sparse(hub: Hub) -> bool:
+    return any(map(one_a_cell, hub.solids.values()))
+
+
+def keeping_share(hub: Hub) -> float:
+    """Return the largest fraction of the stable step with which a drifting body conserves energy.
+
+    With FLIP and similar transfers, gradient jumps add energy to points that cross cells, about as
+    the third power of the step. The fractions are from docs/energy.md: at most 10 % in 50 periods.
+    """
+    update = hub.update
+    alpha = flip_coefficient(update.transfer)
+    if not update.method.frame.moves or not alpha > 0.9:
+        return USUAL
+    basis = update.method.basis.traits
+    kind = basis.nodes_per_cell if basis.gradient_jumps else 0
+    keeping = update.scheme.traits.keeping or ((USUAL, USUAL),) * 3
+    share = keeping[kind][sparse(hub)]
+    if alpha > 0.99:
+        return share
+    return max(share, DAMPED) if sparse(hub) else USUAL
+
+
+def _keeps_velocities(hub: Hub) -> bool:
+    """Return True if FLIP-like points move through the grid, without moments and usl."""
+    update = hub.update
+    return (
+        update.method.frame.moves
+        and flip_coefficient(update.transfer) > 0.9
+        and not stores_moment(hub.update.transfer)
+        and min(update.scheme.traits.courant) >= 1
+    )
+
+
+def _deforming(hub: Hub) -> list[Tag]:
+    laws = [solid.material.whole for solid in hub.solids.values()]
+    return [law for law in laws if not can(law, constrained_velocity)]
+
+
+def _flows(law: Tag) -> bool:
+    """Return True for liquids and soils, which have no stable shape."""
+    strength = parameter(law, "strength", None)
+    return strength is not None and (law_traits(strength).flows or not shear_modulus(strength) > 0)
+
+
+def lone_point(hub: Hub) -> float:
+    """Return the stable step over h/c of an isolated point that stores a moment.
+
+    The stored velocity gradient L responds to its pressure by dL/dt = -p / (rho D): an oscillator
+    of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; if gradients are stored,
+    sums of |grad N|^2 / N replace 1 / D. Points of flowing materials can become isolated; points of
+    a gas then store no moments (`kernels.equations.loss.in_company`).
+    """
+    update = hub.update
+    keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
+    stiff = update.method.basis.traits.lone
+    flowing = any(_flows(law) and not can(law, taken_heat) for law in _deforming(hub))
+    if not (keeps and stiff and flowing):
+        return inf
+    by_gradient = not update.transfer.traits.inverts_spread
+    return LONE * 2 / sqrt(stiff[by_gradient] * hub.domain.dimension)
+
+
+def bears_drift(hub: Hub) -> bool:
+    """Return True if a drifting body is as stable, and conserves energy, as one at rest.
+
+    With cubic splines hardly any energy depends on the position in the cells; usavg adds none with
+    smooth basis functions (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks
+    fracture sooner with these steps.
+    """
+    basis, scheme = hub.update.method.basis.traits, hub.update.scheme
+    laws = _deforming(hub)
+    return (
+        _keeps_velocities(hub)
+        and len(laws) == 1  # one elastic or metallic solid
+        and not _flows(laws[0])
+        and not basis.gradient_jumps
+        and (basis.bears_drift or scheme.traits.bears_drift)
+        and keeping_share(hub) == USUAL
+    )
+
+
+def own_weight_of_drift(hub: Hub) -> float:
+    """Return the weight of the common velocity in the default step.
+
+    1 in the standard rule h/(c + |v|). Drifting boxes (ugimp, cpgimp), two and more per cell, gain
+    more energy at higher speed: at edges of shaken bars and blocks at 0.05 to 0.5 of the wave
+    speed.
+    """
+    if bears_drift(hub):
+        return 0.0
+    basis = hub.update.method.basis.traits
+    boxes = basis.steep_edge and basis.cells > 1
+    fed = boxes and _keeps_velocities(hub) and not hub.update.scheme.traits.bears_drift
+    return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
+
+
+def common_velocity(simulation: Backend, weight: float) -> np.ndarray:
+    """Return the reference velocity (3,) that gives the common drift this weight."""
+    bodies = motions(simulation) if weight != 1 else []
+    common = np.zeros(3)
+    if bodies:
+        mass = total([one.mass for one in bodies])
+        common[: simulation.kin.dimension] = sum(one.mass * one.velocity for one in bodies) / mass
+    return (1 - weight) * common
+
+
+def courant_number(hub: Hub, *, longer: bool) -> float:
+    """Return the stable step over h/c; `longer` for points that stay in their cells.
+
+    In the total frame, nodes of thin and round bodies reduce it for points with moments.
+    """
+    update = hub.update
+    other = update.scheme.traits.implicit or update.method.frame.moves
+    if stores_moment(update.transfer) and not other:
+        return min(_courant_of_scheme(hub, longer=longer), hub.simulation.light_nodes)
+    return _courant_of_scheme(hub, longer=longer)
+
+
+def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
+    scheme, method = hub.update.scheme, hub.update.method
+    two, one = scheme.traits.courant
+    if min(two, one) < 1:
+        # Nodes between the corners of cells raise the highest frequency.
+        nodes = 0.7 if method.basis.traits.nodes_per_cell > 1 else 1
+        return (one if sparse(hub) else two) * nodes
+    if not method.frame.moves:
+        return method.basis.traits.courant_total
+    if not longer:
+        return 1.0
+    basis = method.basis.traits
+    if scheme.traits.strained_before == 1:
+        return min(basis.courant_still, basis.courant_strained_first)
+    return basis.courant_still
+
+
+def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
+    """Return the stable step over h/c, and the default fraction of it.
+
+    `still`: no point has moved as far as `STILL`.
+    """
+    method, share = hub.update.method, keeping_share(hub)
+    # Transfers of moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic ones.
+    still &= method.frame.moves and not stores_moment(hub.update.transfer)
+    if still:
+        # A lone point with a linear basis is stable up to 0.8 h/c in 3D.
+        share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
+    courant = courant_number(hub, longer=still or bears_drift(hub))
+    return min(courant, lone_point(hub)), share
+
+
+def fastest_wave(simulation: Backend) -> float:
+    """Return the fastest wave speed of the undeformed materials, without viscosity."""
+    return max(elastic_speed(simulation, solid)[0] for solid in simulation.hub.solids.values())
+
+
+def elastic_speed(simulation: Backend, solid: Solid) -> tuple[float, bool]:
+    """Return the wave speed of an undeformed solid without viscosity, and if it is viscous."""
+    law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
+    if not isinstance(parameter(law, "viscosity", Absent()), Absent):
+        law, viscous = law._replace(viscosity=Absent()), True
+    if parameter(parameter(law, "strength"), "mu") > 0:
+        law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
+    kin = simulation.kin
+    return sqrt(float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))), viscous
+
+
+def stable_conduction(hub: Hub) -> float:
+    """Return the smallest stable step of conduction in undeformed bodies.
+
+    h^2 / (4 d) capacity / conductivity: half of the bound of lumped finite elements, since points
+    are anywhere in a cell.
+    """
+    if not hub.update.thermal:
+        return inf
+    limits = [inf]
+    per_cell = hub.update.method.basis.traits.nodes_per_cell
+    for solid in hub.solids.values():
+        law = solid.material.law
+        kappa = conductivity(law, 1.0)
+        if kappa > 0:
+            capacity = heat_capacity(law, 1.0) / specific_volume(law)
+            limits.append((solid.h / per_cell) ** 2 / (4 * hub.domain.dimension) * capacity / kappa)
+    return min(limits)

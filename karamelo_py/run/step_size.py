@@ -1,0 +1,267 @@
+"""The size of the steps of a run: chosen once by a policy, followed by the clock of the kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.kernels.arrays import DT, TIME, Control, Tag
+from karamelo_py.kernels.clock import STILL, STRIDE, choose_dt
+from karamelo_py.kernels.step import measure
+from karamelo_py.points.transfers import flip_coefficient
+from karamelo_py.run.backend import Backend
+from karamelo_py.run.no_number import refuse_endless_speeds
+from karamelo_py.run.stable_step import (
+    common_velocity,
+    courant_number,
+    elastic_speed,
+    keeping_share,
+    lone_point,
+    own_step_of_waves,
+    own_weight_of_drift,
+    stable_conduction,
+)
+from karamelo_py.scene.hub import Hub
+from karamelo_py.schemes.traits import USUAL
+from karamelo_py.script.errors import ScriptError
+
+FAR = 1e9  # cells, further than points ever move
+
+
+class LastSteps(NamedTuple):
+    last_dt: float
+    last_contact_dt: float
+    path: float  # of the points, in cells
+
+    @classmethod
+    def of(cls, control: Control) -> LastSteps:
+        return cls(*(float(control.clock[0][name]) for name in cls._fields))
+
+
+class StepPolicy(NamedTuple):
+    """Choice of the steps of a run, made once at its beginning."""
+
+    still: tuple[float, float]  # stable step over h/c, and the fraction of it, at rest
+    moving: tuple[float, float]  # the same once points have moved
+    weight: float  # of the common velocity in the default step
+    fixed_dt: float  # 0: the step follows the fastest point; implicit steps are 1 by default
+    heat_factor: float  # fraction of the limit of conduction
+
+    @classmethod
+    def of(cls, hub: Hub) -> StepPolicy:
+        """Return the choice by scheme, basis, points and the script."""
+        update = hub.update
+        fixed, heat = update.fixed_dt or float(update.scheme.traits.implicit), update.dt_factor
+        if update.dt_factor is None and update.fixed_dt is None:
+            still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
+            return cls(still, moving, own_weight_of_drift(hub), fixed, USUAL)
+        # Steps requested by a script are fractions of h/(c + |v|), at rest as after.
+        asked = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
+        return cls(asked, asked, 1.0, fixed, heat or USUAL)
+
+    def numbers(self, path: float, halvings: int) -> dict[str, float]:
+        """Return fields of the clock after a `path` of the points, in cells."""
+        (courant, share), part = self.still if path <= STILL else self.moving, 1 / 2**halvings
+        return {
+            "courant": courant,
+            "courant_moving": self.moving[0],
+            "fixed_dt": self.fixed_dt * part,
+            "heat_factor": self.heat_factor * part,
+            "dt_factor": share * part,
+            "dt_factor_moving": self.moving[1] * part,
+        }
+
+
+def set_up(control: Control, hub: Hub, transfer: Tag, last: LastSteps | None) -> None:
+    """Set the clock of new arrays, which continues after the `last` steps."""
+    clock = control.clock[0]
+    if last is not None:
+        clock.last_dt, clock.last_contact_dt, clock.path = last
+    clock.spacing = min(lattice.h for lattice in hub.lattices)
+    clock.heat_limit = clock.heat_reference = stable_conduction(hub)
+    clock.kept = flip_coefficient(transfer)
+    clock.kept_by_time = clock.kept * transfer.traits.per_time
+
+
+class StepSize:
+    """Chooses the steps of a simulation; the only Python code that writes them to its clock."""
+
+    policy: StepPolicy
+
+    def __init__(self, simulation: Backend):
+        self.simulation, self.control = simulation, simulation.control
+        self.clock = simulation.control.clock[0]
+        self.measured = False  # clock.rate belongs to the present state
+
+    def begin(self, end_time: float) -> None:
+        """Choose a first step, which initial values may use; the run ends at `end_time`."""
+        self.policy = StepPolicy.of(self.simulation.hub)
+        self._ask(0)
+        self.clock.end_time = end_time
+        self.clock.over_limit = 0
+        self._choose()
+
+    def begun(self) -> None:
+        """Choose the first step again: initial values may have changed the fastest point.
+
+        Raises
+        ------
+        ScriptError
+            If nothing limits the step, or a velocity is not finite.
+        """
+        simulation, clock = self.simulation, self.clock
+        in_hundred_steps = 100 * simulation.fastest() * clock.courant * clock.dt_factor
+        if simulation.step == 0 and in_hundred_steps > STILL * clock.rate:
+            clock.path = np.inf
+            self._ask(0)
+        self._choose()
+        if not np.isfinite(simulation.dt):
+            refuse_endless_speeds(simulation)
+            raise ScriptError(
+                "cannot choose a time step: all material is rigid and at rest",
+                hint="set_dt(...), or a velocity from fix initial_velocity_particles",
+            )
+        # A body at rest without waves has no first limit for comparison.
+        if (
+            clock.first_limit == 0
+            and np.isfinite(self.limit)
+            and not simulation.hub.update.fixed_dt
+        ):
+            clock.first_limit = self.limit
+        self._watch_limit()
+
+    def go_on(self, end_time: float, halvings: int) -> None:
+        clock, self.policy = self.clock, StepPolicy.of(self.simulation.hub)
+        other_end, clock.end_time = clock.end_time != end_time, end_time
+        over_limit = clock.over_limit
+        if self._ask(halvings):
+            self._choose()
+            self._watch_limit()
+        elif other_end:
+            choose_dt(self.control)
+            clock.over_limit = over_limit
+
+    def halve(self, times: int) -> None:
+        self._ask(times)
+        choose_dt(self.control)
+        self._watch_limit()
+
+    def end_here(self) -> float:
+        time = self.clock.end_time = float(self.control.values[TIME])
+        return time
+
+    def load_step(self, dt: float) -> None:
+        self.control.values[DT] = self.clock.kick = self.clock.last_dt = dt
+
+    def anew(self) -> None:
+        self.clock.last_dt = 0.0
+
+    @contextmanager
+    def altered(self, **fields: float) -> Iterator[None]:
+        """Give fields of the clock other values within the block."""
+        before = {name: float(self.clock[name]) for name in fields}
+        for name, value in fields.items():
+            self.clock[name] = value
+        yield
+        for name, value in before.items():
+            self.clock[name] = value
+
+    def _ask(self, halvings: int) -> bool:
+        simulation, clock = self.simulation, self.clock
+        numbers = self.policy.numbers(float(clock.path), halvings)
+        numbers["first_kick"] = 0.5 if simulation.hub.update.half_start else 1.0
+        numbers["stride"] = FAR if simulation.implicit else 1.0
+        before = {name: clock[name] for name in numbers}
+        for name, number in numbers.items():
+            clock[name] = number
+        if self.policy.weight != clock.weight:
+            clock.weight, self.measured = self.policy.weight, False
+        return numbers != before
+
+    def _choose(self) -> None:
+        if not self.measured:
+            # Otherwise the last step has measured: a run in pieces has the steps of a whole one.
+            simulation, clock = self.simulation, self.clock
+            clock.common[:] = common_velocity(simulation, float(clock.weight))
+            self._measure()
+            clock.wave = clock.speed = 0.0
+            if clock.weight != 1:
+                clock.wave = clock.rate - simulation.fastest(clock.common[0])
+                clock.speed = simulation.fastest() / clock.spacing
+            self.measured = True
+        choose_dt(self.control)
+
+    def _measure(self) -> None:
+        measure(self.simulation.setup)
+        self.clock.rate = self.simulation.comm.allreduce_max(np.array([self.clock.rate]))[0]
+
+    def rate_with(self, weight: float) -> float:
+        clock = self.clock
+        common, rate = clock.common.copy(), float(clock.rate)
+        clock.common[:] = common_velocity(self.simulation, weight)
+        self._measure()
+        other = float(clock.rate)
+        clock.common[:], clock.rate = common, rate
+        return other
+
+    @property
+    def limit(self) -> float:
+        """Stable step of the present state."""
+        return float(self.clock.limit)
+
+    @property
+    def limit_moving(self) -> float:
+        """Stable step of points that cross cells, the basis of a script's fractions."""
+        clock = self.clock
+        waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
+        return float(min(waves, clock.heat_limit))
+
+    def above_limit(self) -> bool:
+        explicit = not self.simulation.implicit
+        return explicit and self.control.values[DT] > self.limit * (1 + 1e-12)
+
+    @property
+    def too_large(self) -> bool:
+        """True if the step was above the stability limit from the start of the run."""
+        return not self.clock.watch_limit and not self.simulation.implicit
+
+    def _watch_limit(self) -> None:
+        """Watch the limit, unless the step exceeds it from the start, as the user wants."""
+        self.clock.watch_limit = int(not self.above_limit() and not self.simulation.implicit)
+        self.clock.over_limit = 0
+
+    @property
+    def ruling_limit(self) -> str:
+        """Name of the present limit of the step.
+
+        ``set_dt`` and ``end`` (of the run) are not stability limits. ``conduction`` is the limit of
+        heat, ``viscosity`` of waves slowed by viscosity, ``speed`` of points faster than waves,
+        ``light_nodes`` of usl and of :mod:`karamelo_py.run.light_nodes`, ``lone_points`` of points
+        with moments, and ``waves`` of the rest.
+        """
+        simulation, clock, dt = self.simulation, self.clock, self.control.values[DT]
+        if clock.fixed_dt > 0:
+            return "set_dt"
+        waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
+        of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
+        if clock.weight != 1 and clock.speed * dt * (1 + 1e-9) >= STRIDE:
+            return "speed"
+        if dt < min(of_waves, of_heat) * (1 - 1e-9):
+            return "end"
+        if of_heat < of_waves:
+            return "conduction"
+        speed = simulation.fastest(clock.common[0])
+        if speed > 0.5 * clock.rate:
+            return "speed"
+        undeformed = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
+        without = max(wave for wave, _ in undeformed)
+        slowed = any(viscous for _, viscous in undeformed)
+        if slowed and 0 < without < (clock.rate - speed) / 1.2:
+            return "viscosity"
+        if clock.courant < 1:
+            return "lone_points" if clock.courant == lone_point(simulation.hub) else "light_nodes"
+        return "waves"
