@@ -528,7 +528,7 @@ def test_tutorials_run(path, tmp_path, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     notebook = json.loads(path.read_text("utf-8"))
     cells = ["".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == "code"]
-    assert len(TUTORIALS) >= 4 and len(cells) > 5
+    assert len(TUTORIALS) == 5 and len(cells) > 5
     namespace: dict = {}
     for cell in cells:
         exec(cell, namespace)

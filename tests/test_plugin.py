@@ -816,3 +816,28 @@ def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
     (tmp_path / "in.file").write_text(script.replace("3, 100", "3, 100, 0"), "utf-8")
     done = karamelo_py(site, tmp_path, "in.file")
     assert done.returncode == 1 and said in done.stderr and "in.file:8" in done.stderr
+
+
+def test_rubber_of_a_plug_in_is_that_of_its_formula(tmp_path, site):
+    """A law of F in Python and its energy as a formula: the same stress along three paths."""
+    chains = " + ".join(
+        f"{a}*((I1*J^(-2/3))^{i} - 3^{i})/({b}*25^{i - 1})"
+        for i, (a, b) in enumerate([(1, 2), (1, 20), (11, 1050), (19, 7000), (519, 673750)], 1)
+    )
+    paths = {"pull": "exx=1, syy=0, szz=0", "sheet": "exx=0.6, eyy=0.4, szz=0", "shear": "gxy=0.8"}
+    lines = [
+        "material(own, mpm_examples.rubber.ArrudaBoyce, 1000, 3e5, 25, 1e8)",
+        f"material(energy, hyperelastic, 1000, 3e5*({chains}) + 1e8/2*(J - 1)^2)",
+    ]
+    for name, ends in paths.items():
+        lines += [f"load_path({name}, 20, {ends})"]
+        lines += [f"element({law}_{name}, {law}, {name})" for law in ("own", "energy")]
+    (tmp_path / "in.file").write_text("\n".join(lines) + "\n", "utf-8")
+    done = karamelo_py(site, tmp_path, "in.file")
+    assert done.returncode == 0, done.stderr
+    for name in paths:
+        own, energy = (
+            np.loadtxt(tmp_path / f"element_{law}_{name}.txt", skiprows=1)
+            for law in ("own", "energy")
+        )
+        np.testing.assert_allclose(own, energy, rtol=1e-8, atol=1e-2)

@@ -8,6 +8,7 @@ WORDS = {
     "tutorials/taylor-bar": "Taylor test copper bar impact validation calibration friction",
     "tutorials/failures": "wrong result instability locking noise fracture energy loss learn",
     "tutorials/slope": "retaining wall earth pressure active passive landslide blade restart",
+    "tutorials/own-law": "own material law energy formula rubber Treloar fit calibrate plug-in",
     "choose": "recommendation best method landslide slope impact crash fluid soil metal for",
     "messages/index": "error stop stopped crash ended abort failed reason time step too large",
     "methods": "shape functions kernel particle grid transfer APIC MLS FLIP PIC time step",

@@ -78,7 +78,7 @@ def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
     """Explain a name, or a family and a name; return the exit status."""
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
-            with registry.modules_of(Path.cwd()):
+            with registry.modules_of(Path()):
                 return _explain(family, words[1])
         except ScriptError as error:
             if error.hint or not _about(" ".join(words)):

@@ -206,7 +206,7 @@ class Interpreter:
         depth = len(self.frames)
         done = len(self.record.statements)
         try:
-            with registry.modules_of(self.folder.absolute()):
+            with registry.modules_of(self.folder, Path()):
                 self._execute_recorded(statement)
         except Pause:
             self.record.forget_from(done)

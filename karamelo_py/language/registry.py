@@ -73,13 +73,15 @@ def knows(family: str, name: str) -> bool:
 
 
 @contextmanager
-def modules_of(folder: Path) -> Iterator[None]:
-    """Import modules of this folder before others, within the context."""
-    sys.path.insert(0, str(folder))
+def modules_of(*folders: Path) -> Iterator[None]:
+    """Import modules of these folders before all others, within the context."""
+    paths = [str(folder.absolute()) for folder in folders]
+    sys.path[:0] = paths
     try:
         yield
     finally:
-        sys.path.remove(str(folder))
+        for path in paths:
+            sys.path.remove(path)
 
 
 def _of_module(family: str, name: str) -> EntryPoint | None:

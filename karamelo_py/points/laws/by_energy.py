@@ -435,8 +435,3 @@ def shear_between(law, at):
         ratio = where(alike, limit, tau / where(alike, 1, apart))
         found.append(max(at[i] * at[i], at[j] * at[j]) * ratio)
     return max(*found, 0)
-
-
-@laws.elastic_strain.on(ByEnergy)
-def _elastic_strain_by_energy(law, kin, state):
-    return 0.5 * state.F.right_cauchy_green() - 0.5 * I

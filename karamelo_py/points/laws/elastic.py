@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import det, unit
+from karamelo_py.points.kinematics import I, det, unit
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.parameters import AboveZero, FromZero, lame_parameters, tell_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
@@ -75,3 +75,9 @@ def _advance_of_deformation(law, kin, state, dl, dt):
 @laws.cauchy_stress.on(OfDeformation)
 def _cauchy_stress_of_deformation(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / det(state.F)
+
+
+@laws.elastic_strain.on(OfDeformation)
+def _elastic_strain_of_deformation(law, kin, state):
+    """Green-Lagrange strain (F^T F - I) / 2."""
+    return 0.5 * state.F.right_cauchy_green() - 0.5 * I

@@ -82,8 +82,3 @@ def _energy_density_neo_hookean(law, kin, state):
     ln_J = log(det(state.F))
     excess = tr(state.F.left_cauchy_green()) - 3
     return 0.5 * law.G * excess - law.G * ln_J + 0.5 * law.lam * ln_J * ln_J
-
-
-@laws.elastic_strain.on(NeoHookean)
-def _elastic_strain_neo_hookean(law, kin, state):
-    return 0.5 * state.F.right_cauchy_green() - 0.5 * I

@@ -224,11 +224,6 @@ def stress_of(law, E):
     return E._make([component(i, j) for i, j in E.places])
 
 
-@laws.elastic_strain.on(Directional)
-def _elastic_strain_directional(law, kin, state):
-    return 0.5 * state.F.right_cauchy_green() - 0.5 * I
-
-
 @laws.kirchhoff_stress.on(Directional)
 def _kirchhoff_stress_directional(law, kin, state):
     S = stress_of(law, laws.elastic_strain(law, kin, state))
