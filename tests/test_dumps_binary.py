@@ -12,7 +12,7 @@ import pytest
 from fakes import FakeHub
 from PIL import Image
 
-from karamelo_py.output.vtu import Vtu
+from karamelo_py.output.vtu import Vtu, arrays_of
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.hdf5 import GridHdf5, Hdf5, Hdf5Dump
 from karamelo_py.styles.dumps.vtk import GridVtk, Vtk
@@ -154,6 +154,34 @@ def test_vtk_of_points(hub):
         assert [block.type for block in mesh.cells] == ["vertex"]
         for name in ("id", "type", "vx", "seq"):
             np.testing.assert_array_equal(mesh.point_data[name], hub.fields.points[name])
+
+
+@pytest.mark.parametrize(
+    ("dimension", "names", "arrays"),
+    [
+        (3, "vx vy vz", ["velocity"]),
+        (3, "vx vy", []),
+        (2, "vx vy s11 s22 s12", ["velocity"]),
+        (2, "s11 s22 s33 s12 fx", ["stress"]),
+        (1, "vx s11 s22 s33", ["velocity", "stress"]),
+        (1, "vy", []),
+    ],
+)
+def test_components_that_make_arrays(dimension, names, arrays):
+    assert list(arrays_of(names.split(), dimension)) == arrays
+
+
+def test_vectors_and_tensors_in_vtk(plane):
+    """Next to their columns; a tensor in the order xx, yy, zz, xy, yz, xz."""
+    names = ("vx", "vy", "s11", "s22", "s33", "s12")
+    points = plane.fields.points
+    points |= {name: k + points["x"] for k, name in enumerate(names)}
+    Vtk(plane, 1, "p.*.vtu", *names).write()
+    data = meshio.read(plane.folder / "p.0.vtu").point_data
+    zero = 0 * points["x"]
+    velocity = [*(points[name] for name in names[:2]), zero]
+    np.testing.assert_array_equal(data["velocity"].T, velocity)
+    np.testing.assert_array_equal(data["stress"].T, [*(points[n] for n in names[2:]), zero, zero])
 
 
 @pytest.mark.parametrize("occupied", [False, True])

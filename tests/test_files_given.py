@@ -7,12 +7,14 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from hubs import SmallHub, arguments
 from scenes import block
 
 from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.plot import read_log
 from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.snapshots import read
+from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.hdf5 import _opened_to_append
 
@@ -129,3 +131,63 @@ def test_a_value_below_zero(run_interpreted, value):
     assert out.splitlines()[0].startswith("Y0 = -")
     err = run_interpreted("Y0 = 1\nquit\n", "-var", "Y0", "--quiet", status=1).err
     assert "-var: expected 2 arguments" in err
+
+
+LAMMPS = """ITEM: TIMESTEP
+7
+ITEM: NUMBER OF ATOMS
+2
+ITEM: BOX BOUNDS {tilt}
+0 0.4
+0.1 0.3
+-1 1
+ITEM: ATOMS {columns}
+{rows}
+"""
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows"),
+    [
+        ("id type x y", "1 1 0.1 0.2\n2 1 0.3 0.15"),
+        ("element xs ys zs", "Cu 0.25 0.5 0.5\nCu 0.75 0.25 0.5"),
+        ("id xu yu x y", "1 9 9 0.1 0.2\n2 9 9 0.3 0.15"),
+        ("id xu ysu zs", "1 0.1 0.5 0.5\n2 0.3 0.25 0.5"),
+    ],
+)
+def test_positions_in_dumps_of_lammps(tmp_path, columns, rows):
+    """Plain, scaled by the box, or unwrapped."""
+    path = tmp_path / "d.lammpstrj"
+    path.write_text(LAMMPS.format(tilt="pp pp pp", columns=columns, rows=rows), "utf-8")
+    (found,) = read(path)
+    assert found.step == 7 and found.columns["id"].tolist() == [1, 2]
+    np.testing.assert_allclose([found.columns[a] for a in "xyz"], [[0.1, 0.3], [0.2, 0.15], [0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("tilt", "columns", "says"),
+    [
+        ("xy xz yz pp pp pp", "xs ys", "has no column x in a tilted box"),
+        ("pp pp pp", "vx vy", "has no column x"),
+    ],
+)
+def test_dumps_of_lammps_without_positions(tmp_path, tilt, columns, says):
+    path = tmp_path / "d.lammpstrj"
+    path.write_text(LAMMPS.format(tilt=tilt, columns=columns, rows="1 2\n3 4"), "utf-8")
+    with pytest.raises(ScriptError, match=says):
+        list(read(path))
+
+
+def test_a_dump_begins_a_solid(tmp_path):
+    """Its last snapshot: positions, velocities and volumes, these without the radius."""
+    hub = SmallHub(dimension=2)
+    hub.domain.axisymmetric = True
+    path = tmp_path / "d.lammpstrj"
+    text = LAMMPS.format(tilt="pp pp pp", columns="id type x y vx s11 ep volume", rows="{}")
+    rows = "1 1 0.1 0.2 3 0 1 0.5\n2 1 0.4 0.15 4 0 2 0.6"
+    path.write_text(text.format("1 1 9 9 9 9 9 9\n" * 2)[:-1] + text.format(rows), "utf-8")
+    (argument,) = arguments(path)
+    columns = FileColumns.from_script(hub, argument).columns
+    assert sorted(columns) == ["volume", "vx", "x", "y"]
+    np.testing.assert_allclose(columns["volume"], [5, 1.5])
+    assert columns["vx"].tolist() == [3, 4]

@@ -93,7 +93,7 @@ class InputFile:
 class TableFile(InputFile):
     """Annotation: a file with numbers in columns."""
 
-    endings = ("", ".csv", ".dat", ".tsv", ".txt")
+    endings = ("", ".csv", ".dat", ".tsv", ".txt", ".h5", ".pvd", ".vtu", ".gz", ".lammps")
 
 
 class OutputFile:

@@ -14,6 +14,8 @@ from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.units import LENGTHS, Units
 from karamelo_py.script.errors import ScriptError
 
+TEXTS = ("element", "typelabel")  # columns of LAMMPS that are no numbers
+
 
 class Snapshot(NamedTuple):
     step: int
@@ -32,6 +34,8 @@ def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
         raise ScriptError(f"{path} is {kind}", expected="a file of dump particle, hdf5 or vtk")
     try:
         yield from reader(path, first)
+    except ScriptError:
+        raise
     except Exception as error:  # of many kinds, for damaged files
         reason = error.strerror if isinstance(error, OSError) else None
         raise ScriptError(
@@ -45,7 +49,7 @@ def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
 def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
     opener, units = (gzip.open if path.suffix == ".gz" else open), None
     with opener(path, "rt", encoding="ascii") as file:
-        step, time, count, box = 0, 0.0, 0, np.zeros((3, 2))
+        step, time, count, box, tilted = 0, 0.0, 0, np.zeros((3, 2)), False
         while line := file.readline():
             if not line.startswith("ITEM: "):
                 raise ValueError(line)
@@ -58,11 +62,16 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
                 count = int(file.readline())
             elif item[0] == "BOX":
                 box = np.array([file.readline().split()[:2] for _ in range(3)], float)
+                tilted = "xy" in item
             elif item[0] == "ATOMS" and first > 0:
                 first -= sum(1 for _ in islice(file, count)) == count
             elif item[0] == "ATOMS":
-                table = np.loadtxt(file, max_rows=count, ndmin=2) if count else np.empty((0, 99))
-                columns = dict(zip(item[1:], table.T, strict=count > 0))
+                numbers = [k for k, name in enumerate(item[1:]) if name not in TEXTS]
+                table = np.empty((0, len(numbers)))
+                if count:
+                    table = np.loadtxt(file, max_rows=count, ndmin=2, usecols=numbers)
+                columns = dict(zip((item[1 + k] for k in numbers), table.T, strict=True))
+                _place(path, columns, box, tilted)
                 named = (
                     {name: units.of_column(name) for name in (*columns, "time")} if units else {}
                 )
@@ -72,6 +81,26 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
                 units = Units(*words) if words[0] in LENGTHS else None  # LAMMPS has other names
             else:
                 file.readline()
+
+
+def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: bool) -> None:
+    """Add id, type and x, y, z from LAMMPS's unwrapped (xu) or scaled (xs) columns."""
+    count = len(next(iter(columns.values()), ()))
+    columns.setdefault("id", np.arange(1.0, count + 1))
+    columns.setdefault("type", np.ones(count))
+    for axis, (lo, hi) in zip("xyz", box, strict=True):
+        scaled = columns.get(f"{axis}s", columns.get(f"{axis}su"))
+        if axis not in columns and f"{axis}u" in columns:
+            columns[axis] = columns[f"{axis}u"]
+        elif axis not in columns and scaled is not None and not tilted:
+            columns[axis] = lo + scaled * (hi - lo)
+        elif axis == "z":  # in 2D
+            columns.setdefault(axis, np.zeros(count))
+        elif axis not in columns:
+            raise ScriptError(
+                f"{path} has no column {axis}" + " in a tilted box" * (scaled is not None),
+                expected=f"a dump with {axis}, {axis}u, or {axis}s of a box that is not tilted",
+            )
 
 
 def _hdf5(path: Path, first: int) -> Iterator[Snapshot]:

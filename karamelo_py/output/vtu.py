@@ -8,7 +8,7 @@ import sys
 import tempfile
 import zlib
 from base64 import b64encode
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,6 +20,28 @@ BLOCK = 1 << 15  # bytes compressed together
 COMPRESSION = 4  # a third of the time of level 6, slightly larger files
 IN_MEMORY = 1 << 16  # bytes of an array in memory
 PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in between
+
+
+# Vectors, and symmetric tensors in VTK's order, by columns.
+ARRAYS = {
+    "velocity": "vx vy vz", "force": "fx fy fz",
+    "stress": "s11 s22 s33 s12 s23 s13", "strain": "e11 e22 e33 e12 e23 e13",
+}  # fmt: skip
+
+
+def arrays_of(names: Sequence[str], dimension: int) -> dict[str, list[str]]:
+    """Arrays whose components are all among the columns `names`, or 0 in this dimension."""
+
+    def vanishes(name: str) -> bool:
+        axes = {"xyz123".index(axis) % 3 for axis in name[1:]}
+        return max(axes) >= dimension and (len(axes) > 1 or name[1] in "yz")
+
+    arrays = {array: columns.split() for array, columns in ARRAYS.items()}
+    return {
+        array: columns
+        for array, columns in arrays.items()
+        if columns[0] in names and all(name in names or vanishes(name) for name in columns)
+    }
 
 
 class Column:

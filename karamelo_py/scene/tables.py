@@ -10,13 +10,15 @@ import numpy as np
 from karamelo_py.language.kinds import TableFile
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
+from karamelo_py.output import snapshots
+from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.reading import read_text
 from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Annotation: columns of a file, or of arrays passed to `Simulation`."""
+    """Annotation: columns of a file or dump, or of arrays passed to `Simulation`."""
 
     script_kind = "the name of a file of columns"
 
@@ -32,7 +34,28 @@ class FileColumns:
                 "the table", {str(name): np.asarray(of, float) for name, of in arrays.items()}
             )
         path = TableFile.from_script(hub, argument)
-        return cls(str(path), read_table(path))
+        return cls(str(path), _of_dump(hub, path) if _is_dump(path) else read_table(path))
+
+
+def _is_dump(path: Path) -> bool:
+    with path.open("rb") as file:
+        return path.suffix in (".vtu", ".pvd", ".h5", ".hdf5", ".gz") or file.read(6) == b"ITEM: "
+
+
+def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of the last snapshot that a new solid can have, without zero ones."""
+    *_, last = snapshots.read(path)
+    domain = require_domain(hub)
+    axes = "xyz"[: domain.dimension]
+    columns = {
+        name: values.astype(float)
+        for name, values in last.columns.items()
+        if name in axes or (re.fullmatch(f"v[{axes}]|s[123]{{2}}|T|volume", name) and values.any())
+    }
+    if "volume" in columns:
+        x = np.column_stack([columns[axis] for axis in axes])
+        columns["volume"] = columns["volume"] / domain.depth(x)
+    return columns
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:

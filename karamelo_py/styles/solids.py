@@ -176,8 +176,9 @@ class PointsSolid(Solid):
         Name of a file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z``
         (one per dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains
         the area in the plane xy). Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
-        stresses (``s11`` ..., of materials in rate form). In Python, a dictionary of arrays or a
-        DataFrame.
+        stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump particle, vtk
+        or hdf5, or of LAMMPS), whose last snapshot gives these columns. In Python, a dictionary of
+        arrays or a DataFrame.
     GlueToSolid
         As in solid region.
 
@@ -189,6 +190,9 @@ class PointsSolid(Solid):
     -----
     With a basis that has domains around points, each domain is a square or cube of the volume of
     its point. The cpdi methods refuse this style: their domains tile a body.
+
+    From a dump, other columns (``ep``, ``damage`` ...) are not taken: materials start without a
+    history. ``read_restart`` continues a run with all of it.
 
     See Also
     --------

@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import Every
-from karamelo_py.output.vtu import Vtu
+from karamelo_py.output.vtu import Vtu, arrays_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import boxes
 from karamelo_py.script.errors import ScriptError
@@ -55,11 +55,17 @@ class VtkDump(TableDump):
         path = self.path()
         with whole(path) as file:
             names = [name for name in self.columns if name not in POSITIONS]
-            vtu, kept = Vtu(["id", "type", *names], path.parent), []
+            arrays = arrays_of(names, self.hub.domain.dimension)
+            vtu, kept = Vtu(["id", "type", *names, *arrays], path.parent), []
             for table in self.tables():
                 columns = dict(zip(self.columns, table.columns, strict=True))
                 x = np.column_stack([columns.pop(name) for name in POSITIONS])
-                vtu.add_points(x, [table.ids, table.types, *columns.values()])
+                zero = np.zeros(len(x))
+                vectors = [
+                    np.column_stack([columns.get(name, zero) for name in components])
+                    for components in arrays.values()
+                ]
+                vtu.add_points(x, [table.ids, table.types, *columns.values(), *vectors])
                 self.connect(vtu, table.ids, kept)
             self.complete(vtu, kept)
             vtu.write(file)
@@ -80,7 +86,8 @@ class Vtk(OfPoints, VtkDump):
     """Write the material points as a series of VTU files, which ParaView opens.
 
     A file of the same name with the ending ``.pvd`` lists all snapshots with their times: open that
-    one.
+    one. All components of velocity, force, stress or strain are also written as one array, for
+    ParaView's filters Glyph, Warp By Vector and Tensor Glyph.
 
     Example
     -------
