@@ -1,4 +1,4 @@
-"""Lock on an output folder: two programs never write to it at once."""
+"""Locks on output folders and files: two programs never write to one at once."""
 
 import errno
 import os
@@ -17,15 +17,12 @@ class Claim:
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 
-def claim(folder: Path) -> Claim | None:
-    """Lock a folder; None if another program has locked it.
-
-    File systems without locks, and Windows, grant every folder.
-    """
+def claim(path: Path) -> Claim | None:
+    """Lock a folder or file, if the system can; None if another program has locked it."""
     try:
         import fcntl
 
-        handle = os.open(folder, os.O_RDONLY)
+        handle = os.open(path, os.O_RDONLY)
     except (ImportError, OSError):
         return Claim(os.open(os.devnull, os.O_RDONLY))
     about = os.fstat(handle)

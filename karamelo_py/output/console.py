@@ -22,10 +22,7 @@ LINES = 0.05
 
 
 class Console:
-    """Output to standard output and error, or to `out` and `err`.
-
-    `terminal` is detected by default. `quiet`: only warnings.
-    """
+    """Output to `out` and `err` (standard streams); if `quiet`, only warnings."""
 
     def __init__(
         self,

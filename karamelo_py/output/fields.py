@@ -38,10 +38,7 @@ PIECE = 1 << 17  # points per piece
 
 
 class Fields(PointTable):
-    """All points as a table, pieces of points and nodes, exact sums.
-
-    Reads one `simulation`, or the scene's current arrays.
-    """
+    """Tables, pieces and exact sums of all points, of `simulation` or the current arrays."""
 
     def __init__(self, hub: Scene, simulation: Any = None):
         self.hub = hub
@@ -291,9 +288,7 @@ def _bounces(s: Any, block: Any) -> np.ndarray | None:
 
 
 def _born_with(s: Any, block: Any) -> np.ndarray | None:
-    """Initial internal energy of a gas: stored energy is relative to it, or its changes would be
-    lost to round-off.
-    """
+    """Initial internal energy of a gas; stored energy is relative to it, or would lose digits."""
     law = elastic_law(block.laws)
     if not can(law, taken_heat):
         return None
@@ -313,10 +308,7 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """Annotation: formula of dump particle columns, time and published values.
-
-    Particle groups and solids are columns, too: 1 for their points, else 0.
-    """
+    """Annotation: formula of dump columns, groups and solids (1 or 0), time and values."""
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
     MOST = 6

@@ -67,10 +67,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open `path` at byte `start` (0: a new file).
-
-    On an error the file is cut back to `start`, plus `tail`.
-    """
+    """Open `path` at byte `start` (0: new); an error cuts it back to `start`, plus `tail`."""
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)

@@ -1,6 +1,5 @@
 """The log: a row of numbers per output, in log.mpm (or log.csv) and on the terminal."""
 
-import errno
 import os
 import re
 import weakref
@@ -40,7 +39,7 @@ class Log(Rhythmic):
         self.columns: list[Quantity] = []  # empty: step, dt, time
         self.last_step: int | None = None
         self._file: TextIO | None = None
-        self._claim: Claim | None = None  # on the folder
+        self._claims: list[Claim] = []  # on the folder, and on the file
         self._is_kept = True
         # Headings and numbers of each row, if a program wants them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
@@ -90,7 +89,7 @@ class Log(Rhythmic):
     def close(self) -> None:
         """Close the file; `begin` starts a new one."""
         if self._file is not None:
-            file, self._file, self._claim = self._file, None, None
+            file, self._file, self._claims = self._file, None, []
             with reported(self.path, "the log file "):  # retries a failed line
                 file.close()
 
@@ -124,15 +123,15 @@ class Log(Rhythmic):
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
             self._is_kept = path.is_file()  # False for /dev/null
-            self._claim = claim(self.hub.folder)
-            if self._claim is None or (self._is_kept and not _claimed(self._file)):
-                where = self.hub.folder.resolve() if self._claim is None else path
-                raise ScriptError(
-                    f"another run is writing to {where}",
-                    expected="a separate folder for each run",
-                    hint="-out FOLDER sends all files there",
-                    code="busy",
-                )
+            for claimed in [self.hub.folder.resolve(), *[path] * self._is_kept]:
+                if (lock := claim(claimed)) is None:
+                    raise ScriptError(
+                        f"another run is writing to {claimed}",
+                        expected="a separate folder for each run",
+                        hint="-out FOLDER sends all files there",
+                        code="busy",
+                    )
+                self._claims.append(lock)
             if self._is_kept:
                 self._file.truncate(end)
 
@@ -169,22 +168,6 @@ def _is_log(path: Path) -> bool:
         or all(k in words or number_of(cell) is not None for k, cell in enumerate(row))
         for row in rows
     )
-
-
-def _claimed(file: TextIO) -> bool:
-    """Lock `file` until the program ends; False if another program has locked it.
-
-    Not on Windows, whose locks prevent reading.
-    """
-    try:
-        import fcntl
-
-        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except ImportError:
-        return True
-    except OSError as error:  # granted on file systems without locks
-        return error.errno not in (errno.EACCES, errno.EAGAIN)
-    return True
 
 
 def _row(cells: list[str], widths: list[int]) -> str:

@@ -169,10 +169,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) of those sections across an axis that show the surface.
-
-    Lines in a plane that cuts the surface off are left out.
-    """
+    """Yield lines (m, 3) of sections that show the surface, but not of a plane that cuts it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(*ends, BETWEEN + 2)

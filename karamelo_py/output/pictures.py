@@ -105,10 +105,9 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """Axes, labels and colour bar as a background, with the points of a state on top.
+    """A background of axes, labels and colour bar, with the points of a state on top.
 
-    Matplotlib spends most of its time on axes and ticks. Their pixels are stored until the limits
-    change; a new state costs the points and the title.
+    Matplotlib spends most time on axes: their pixels are stored until the limits change.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
@@ -289,10 +288,7 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Extend limits to contain the finite values.
-
-    Rounded outwards to eighths of a power of two: they change rarely while a field grows.
-    """
+    """Extend limits to the finite values, rounded outwards to change rarely (to 2^k / 8)."""
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:

@@ -14,11 +14,7 @@ from karamelo_py.script.errors import Place
 
 
 class PlottedCurve(Rhythmic):
-    """Curve of `y` against `x`, with a point every `every` steps.
-
-    `side` of the y axis is left or right, its `scale` linear or log, its `label` by default y's
-    name.
-    """
+    """`y` against `x`; `side` left or right, `scale` linear or log, `label` of the y axis."""
 
     remembers = ("points",)
 
@@ -41,10 +37,7 @@ class PlottedCurve(Rhythmic):
 
 
 class Plots(dict[str, PlottedCurve]):
-    """Curves of a scene by ID, and their file; without a file they are only collected.
-
-    Curves over the same quantity have common axes; each further quantity gets axes below.
-    """
+    """Curves by ID, and their file, if any; curves over the same quantity have common axes."""
 
     def __init__(self, hub: Scene):
         super().__init__()

@@ -79,10 +79,7 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """Gather a declared field (n, components); None if the scene does not have it.
-
-        Points whose law does not have it get its initial value.
-        """
+        """Gather a declared field (n, components), with its start where laws lack it; else None."""
         arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
         if all(array is None for _, array in arrays):
             return None
@@ -91,10 +88,7 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Compute (n, *columns) numbers by the kernel ``of(laws)``, or 0 if it is None.
-
-        It is called as ``fill(kin, points, laws, rows)``.
-        """
+        """Numbers (n, *columns) by ``of(laws)(kin, points, laws, rows)``; 0 if it is None."""
         local, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
@@ -107,10 +101,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Some points in order: arrays (copies) and columns.
-
-    Deleted points are zero in arrays; `particle` omits them.
-    """
+    """Some points in order: arrays (copies; 0 for deleted points) and columns."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -273,10 +264,7 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of the positions, if their rate of change is stored.
-
-    Otherwise half a step earlier.
-    """
+    """Velocities (d, n) at the time of positions if rates are stored, else half a step earlier."""
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
         return points.v

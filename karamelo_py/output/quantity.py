@@ -16,9 +16,7 @@ PER_POINT = frozenset(POINT_SEEDS)
 
 
 class Quantity:
-    """A number: ``step``, ``dt``, ``time``; a script variable; a value of a fix or compute (``Ek``,
-    ``v_x``); or an anonymous `formula` (``Ek + Es``).
-    """
+    """A word (``dt``), script variable, published value (``v_x``) or `formula` (``Ek + Es``)."""
 
     script_kind = "a quantity"
 
@@ -90,10 +88,7 @@ class Quantity:
         return number
 
     def _source(self) -> Any:
-        """Formula, value of the variable, or number.
-
-        Looked up each time: the script may redefine a variable between runs.
-        """
+        """Current source: the script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula

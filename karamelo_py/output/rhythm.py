@@ -15,9 +15,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step at or after each multiple of `span`; `passed` counts written
-    multiples.
-    """
+    """Output at the first step from each multiple of `span` on; `passed` counts those written."""
 
     def __init__(self, span: float):
         self.span = span
@@ -83,10 +81,7 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """First step after `step` that may be due.
-
-    Unless `fixed`, the step may grow: half of a longer distance at a time.
-    """
+    """First step that may be due; unless `fixed`, half of a longer way, as steps may grow."""
     if not isinstance(every, ByTime):
         return (step // every + 1) * every
     left = ((every.now(time) + 1) * every.span - time) / dt

@@ -129,10 +129,7 @@ class Output:
                 item.finish()
 
     def abort(self) -> None:
-        """Complete plots, dumps and log of an aborted run, without a further state.
-
-        Errors become warnings.
-        """
+        """Complete plots, dumps and log of an aborted run; errors become warnings."""
         if self.hub.rehearsing:
             return
         try:

@@ -86,10 +86,7 @@ class Column:
 
 
 class Vtu:
-    """Points with columns `names`, and cells between them.
-
-    Temporary files in `folder` need as much room as the file.
-    """
+    """Points with columns `names`, and cells; temporary files in `folder` are as large."""
 
     def __init__(self, names: Iterable[str], folder: Path):
         self.points = Column("Points", folder)

@@ -35,9 +35,8 @@ def check(hub: Scene) -> None:
 
 
 def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
-    """Delete the points that left the domain in a failed step; restore its start.
-
-    The choice depends on the state only, not on threads or on how a run is divided.
+    """Delete points that left the domain in a failed step, by the state alone, and restore its
+    start.
     """
     if hub.update.boundary != "delete":
         return False
@@ -65,9 +64,7 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
 
 
 def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
-    """Delete points (ids, ascending); return their mass and total energy, which the balance counts
-    as negative work.
-    """
+    """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
     simulation = hub.simulation
     if len(ids) == np.count_nonzero(simulation.present):
         raise ScriptError(

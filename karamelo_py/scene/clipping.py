@@ -71,10 +71,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger one in an adjacent box, if any.
-
-    Merged pieces get the fraction 0; whole boxes that receive a piece are added.
-    """
+    """Merge small pieces into the nearest larger one in an adjacent box; their fraction is then 0."""
     small = np.flatnonzero(pieces.share < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -165,8 +162,7 @@ def _measure(
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
 
-    The vector is the difference of the covered areas of opposite faces: its sum over boxes is
-    exact.
+    The vector is the difference of covered areas of opposite faces: its sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
@@ -189,9 +185,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fraction (n,) and centroid (d, n) of the part of a unit cube where a linear function (`mean`
-    at its centre) is positive.
-    """
+    """Fraction (n,) and centroid (d, n) of a unit cube's part with mean + slopes (x - 1/2) > 0."""
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
     share, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
@@ -205,10 +199,8 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_plane` for slopes -`m` < 0 (d, n).
-
-    The part is a simplex at the lowest corner, with simplices at the other corners, outside the
-    cube, alternately subtracted and added.
+    """`_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, less (plus, less ...)
+    the simplices at the other corners, outside the cube.
     """
     d = len(m)
     top = mean + m.sum(axis=0) / 2

@@ -10,10 +10,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class SerialComm:
-    """Communicator of a single process.
-
-    All processes execute the same Python statements; methods are collective.
-    """
+    """Communicator of one process; methods are collective."""
 
     rank, size = 0, 1
     beside = 1  # processes on this one's cores, including it

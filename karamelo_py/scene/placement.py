@@ -37,10 +37,7 @@ class Placement(NamedTuple):
 
 
 class Filled:
-    """Positions (n, d) of the selected points in a box of cells, computed on request.
-
-    Stored as one bit per candidate, or nothing if all or none are selected.
-    """
+    """Selected positions (n, d) in a box of cells, stored as a bit per candidate, or none."""
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
                  places: np.ndarray):  # fmt: skip
@@ -147,10 +144,8 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and sizes (m, d) of points of a unit cell in Karamelo's order; equal sizes are
-    (d,).
-
-    x before y; in 3D the lowest z first.
+    """Positions and sizes (m, d) of points in Karamelo's order (x before y; in 3D the lowest z
+    first).
     """
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
@@ -170,10 +165,8 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill `region` within the domain, in chunks of cells, x outermost, z innermost.
-
-    Raises ScriptError for too many points to be numbered, or for `room`, called if there may be
-    many.
+    """Fill `region` in chunks of cells, x outermost; ScriptError for points beyond numbers or
+    `room`.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -261,9 +254,7 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Lower bound of the number of points, by a sample that grows until it is above or below
-    `most`.
-    """
+    """Lower bound of the number of points, by a sample that grows until it decides on `most`."""
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
     places, inside, whole = 0, 0, math.prod((size / spacing).tolist())

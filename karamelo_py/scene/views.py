@@ -315,10 +315,7 @@ class PointsView(View):
         return numbers
 
     def total(self, terms: Any) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over the group's points, rounded once.
-
-        Collective; the result is the same for any number of processes.
-        """
+        """Sum terms (n,) or (n, k) over the group's points, exactly rounded; collective."""
         if not self._in_steps:
             raise ValueError(
                 "points.total(terms) is known in steps alone; before the first, points come in "
@@ -503,10 +500,7 @@ def set_columns(
     ids: np.ndarray | None = None,
     place: Place | None = None,
 ) -> None:
-    """Set columns of points (ids from 0; default all) between two steps, to numbers or (n,).
-
-    Raises ScriptError for derived columns, wrong shapes and values that are not finite.
-    """
+    """Set columns of points (ids from 0; default all) between steps, to numbers or (n,)."""
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids
     view = PointsView(simulation, ids[present[ids]])

@@ -55,9 +55,7 @@ def begin(gmsh: Any) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[Path]:
-    """Yield a link to a file (or a copy) in an empty folder: Gmsh reads options next to a file,
-    which may run programs.
-    """
+    """Yield a link (or copy) in an empty folder: Gmsh also reads options, which may act."""
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name
         try:

@@ -39,10 +39,7 @@ class Mesh(NamedTuple):
     left_out: dict[str, int]  # counts of elements that are no solids, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of a named set (ScriptError if unknown or empty), or all.
-
-        A node set selects outer faces with all nodes in it.
-        """
+        """Cells of a set of elements, outer faces of a set of nodes, or all."""
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
         else:

@@ -244,10 +244,7 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number the shells (m,) of triangles connected by edges (3 m,).
-
-    Triangles without orientation are connected only by edges of two triangles.
-    """
+    """Shells (m,) of triangles with edges (3 m,), connected there (not `sided`: by two only)."""
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2

@@ -47,10 +47,7 @@ class MeshFile(InputFile):
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
-    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`.
-
-    A `trusted` geometry may run system commands and write files.
-    """
+    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`."""
     status = path.stat()
     if not status.st_size:
         raise ScriptError(
@@ -84,8 +81,7 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
         )
     if not np.isfinite(mesh.points).all():
         raise ScriptError(
-            f"the mesh {path.name} has a node whose position is not a number",
-            argument="file",
+            f"the mesh {path.name} has a node whose position is not a number", argument="file"
         )
     return mesh
 
