@@ -71,7 +71,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger one in an adjacent box; their fraction is then 0."""
+    """Merge small pieces into the nearest larger one in an adjacent box (fraction 0 then)."""
     small = np.flatnonzero(pieces.share < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
