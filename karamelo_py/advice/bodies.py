@@ -9,7 +9,7 @@ import numpy as np
 from karamelo_py.advice.basics import BasicFacts, Body
 from karamelo_py.points.laws import law_kind, law_traits, parameter
 from karamelo_py.points.laws.strengths import shear_modulus
-from karamelo_py.points.noise import borne
+from karamelo_py.points.noise import drift_limits
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
@@ -67,7 +67,7 @@ def drift_of(facts: BasicFacts) -> Noise | None:
     """Estimate the energy gain by drift, also if tolerable."""
     if not (facts.scheme.traits.keeping and facts.moves and facts.kept > 0.9) or _thrown(facts):
         return None
-    limits = borne(facts.basis)
+    limits = drift_limits(facts.basis)
     averages = facts.scheme.traits.bears_drift
     bound = (limits.averaged if averages else limits.drift)[facts.sparse]
     bound /= limits.line if facts.d == 1 else 1
@@ -107,7 +107,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
     turns = facts.moments or (facts.moves and facts.kept > 0.9)
     if not (facts.scheme.traits.keeping and turns and facts.d > 1) or facts.hub.domain.axisymmetric:
         return None
-    limits, dt, most = borne(facts.basis), facts.simulation.dt, None
+    limits, dt, most = drift_limits(facts.basis), facts.simulation.dt, None
     averages = facts.scheme.traits.bears_drift
     bound = (limits.rim_averaged if averages else limits.rim)[facts.sparse]
     for body in vibrating(facts):

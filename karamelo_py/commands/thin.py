@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.laws import is_round, law_parts, law_traits, moves_as_told, parameter
+from karamelo_py.points.laws import is_rigid, is_round, law_parts, law_traits, parameter
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -105,7 +105,7 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
 
 def fit_to_domain(hub: Hub, material: Material) -> None:
     """Make a material thin if the bodies of the scene are."""
-    if hub.domain is None or not hub.domain.thin or moves_as_told(material.whole):
+    if hub.domain is None or not hub.domain.thin or is_rigid(material.whole):
         return
     parts = law_parts(material.whole)
     if any(law_traits(part).flows and not parameter(part, "cohesion") > 0 for part in parts):

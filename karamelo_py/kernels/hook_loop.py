@@ -27,7 +27,7 @@ from karamelo_py.points.basis import placed
 from karamelo_py.points.bodies import face
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, planar
-from karamelo_py.points.laws import moves_as_told
+from karamelo_py.points.laws import is_rigid
 
 # Bare numbers would each be a type.
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
@@ -743,7 +743,7 @@ def _act_on_whole_points(what, task, call, count):
         numbers = kinds.written(tag, what, p, found)
         new = load_vector(kin, points.v, p)
         work = 0.5 * float(points.mass[p]) * dot(new - old, new + old)
-        totals.add_to(control.totals, totals.WORK, 0.0 if moves_as_told(what.laws) else float(work))
+        totals.add_to(control.totals, totals.WORK, 0.0 if is_rigid(what.laws) else float(work))
         if hooks.table[h].slot >= 0:
             for c in range(len(numbers)):
                 totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
@@ -811,7 +811,7 @@ def whole_points(tag, s, block, then, heat):
 
 
 def moving_points(s, block, then):
-    points, rigid = block.points, moves_as_told(block.laws)
+    points, rigid = block.points, is_rigid(block.laws)
     x, y = _positions(s, points, then)
     return MovingPoints(points.id, points.v, points.mass, x, y, corners_that_move(s), rigid)
 

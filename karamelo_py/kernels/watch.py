@@ -29,7 +29,7 @@ from karamelo_py.points.laws import (
     dissipated_energy,
     energy_density,
     heat_capacity,
-    moves_as_told,
+    is_rigid,
     specific_volume,
     temperature,
 )
@@ -115,7 +115,7 @@ def sum_energies(s, mode):
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         points = known_to_laws(block.points)
-        if not moves_as_told(block.laws):
+        if not is_rigid(block.laws):
             _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
@@ -175,7 +175,7 @@ def _sum_drift(s):
     control.totals[own:] = 0
     for block in s.blocks:
         points = block.points
-        if not moves_as_told(block.laws):
+        if not is_rigid(block.laws):
             _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
     take_drift(s)
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from karamelo_py.language.rules import known_failure
 
 
-class Borne(NamedTuple):
+class DriftLimits(NamedTuple):
     """Bounds of cells crossed times c dt/h for conserved energy, two points per cell or one."""
 
     drift: tuple[float, float]  # by the centre of mass in 2D and in 3D, musl and usf
@@ -22,17 +22,17 @@ class Borne(NamedTuple):
     damps: bool = False  # whether a faster drift damps vibrations in 3D
 
 
-JUMPS = Borne((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # bases with jumps of the gradient
-BOXES = Borne((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
-QUADRATIC = Borne((54, 20), 6, (inf, inf), (inf, 25), (inf, inf))
-CUBIC = Borne((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1, damps=True)
+JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # bases with jumps of the gradient
+BOXES = DriftLimits((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
+QUADRATIC = DriftLimits((54, 20), 6, (inf, inf), (inf, 25), (inf, inf))
+CUBIC = DriftLimits((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1, damps=True)
 
 
-def borne(basis: Any) -> Borne:
+def drift_limits(basis: Any) -> DriftLimits:
     """Limits of a basis: its own, or those of similar bases."""
     traits = basis.traits
     usual = BOXES if traits.steep_edge else QUADRATIC
-    return traits.borne or (JUMPS if traits.gradient_jumps else usual)
+    return traits.drift_limits or (JUMPS if traits.gradient_jumps else usual)
 
 
 GROWS = "velocity noise in the null space of the grid grows with each cell"
@@ -40,7 +40,7 @@ TURNS = "rotates by about {angle:.2g} rad, its rim at {speed:.2g} times the wave
 WITH = "with {scene.transfer_name} and the basis {scene.basis_name}"
 
 
-def drifts(transfer: type) -> None:
+def warn_of_drift(transfer: type) -> None:
     known_failure(
         transfer,
         "noise of a drift",
@@ -53,7 +53,7 @@ def drifts(transfer: type) -> None:
     )
 
 
-def turns(transfer: type) -> None:
+def warn_of_rotation(transfer: type) -> None:
     known_failure(
         transfer,
         "noise of a rotation",
@@ -70,7 +70,7 @@ def _drift(transfer: Any, scene: Any) -> dict[str, Any] | None:
     averages = scene.scheme.traits.bears_drift
     gains = "a vibration gains 0.1 to several times its energy"
     cure = "scheme(usavg), with which noise grows ten times less or not at all"
-    if borne(scene.basis).damps and scene.d == 3:
+    if drift_limits(scene.basis).damps and scene.d == 3:
         gains = "vibrations are damped (to 0.85 of their energy in tests)"
         cure = "method tlmpm"
     elif averages:

@@ -25,7 +25,7 @@ from karamelo_py.kernels.totals import WORK
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.kernels.watch import LOOK
 from karamelo_py.points.basis import support
-from karamelo_py.points.laws import moves_as_told
+from karamelo_py.points.laws import is_rigid
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 
 POLL = 64  # steps between two reads of `fate`
@@ -383,7 +383,7 @@ class StepsOnCard:
         copies, solids = self.copies, (len(s.control.values), len(sums))
         found = [*self._clear(0, WORK), *self._clear(*solids)]
         for block in s.blocks:
-            if not moves_as_told(block.laws):
+            if not is_rigid(block.laws):
                 threads = -(-block.points.mass.size // gpu.CHUNK)
                 found.append(self.launch(fixes.add_energies, threads, s, block, copies))
             if field(block.points.fields, WorkOfForces) is not None:

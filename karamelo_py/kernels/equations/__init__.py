@@ -224,7 +224,7 @@ def reads(*names: str) -> Callable:
 
 def is_apart(w):
     """Return True for rigid points with separate sums."""
-    return laws.moves_as_told(w.laws) and field(w.nodes.fields, RigidSums) is not None
+    return laws.is_rigid(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
 @reads("mass")

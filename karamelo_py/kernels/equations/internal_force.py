@@ -41,7 +41,7 @@ def force_of_fixes(pt):
     if not len(force):
         return ()
     # A force on rigid points would act on other points at their nodes.
-    return of_present(pt.p, real(0 if laws.moves_as_told(pt.w.laws) else 1, force[0])) * force
+    return of_present(pt.p, real(0 if laws.is_rigid(pt.w.laws) else 1, force[0])) * force
 
 
 @eq.reads()

@@ -53,7 +53,7 @@ class Move(Task):
         step = kinematics.vector(w.kin, pt.dt * laws.constrained_velocity(law, v, displacing))
         y = x + step
         force = pt.load(Force, old)
-        if len(force) and not laws.moves_as_told(w.laws):
+        if len(force) and not laws.is_rigid(w.laws):
             # With the mean nodal velocity of the step, which includes stress and constraints.
             work = w.kick * dot(force, v_pic - 0.5 * dv)
             increase(pt.of(WorkOfForces), pt.p, (work,))

@@ -14,7 +14,7 @@ from math import inf
 from typing import NamedTuple
 
 from karamelo_py.compiler import point_function
-from karamelo_py.points.noise import Borne
+from karamelo_py.points.noise import DriftLimits
 
 
 class BasisTraits(NamedTuple):
@@ -37,7 +37,9 @@ class BasisTraits(NamedTuple):
     # largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls.
     lone: tuple[float, float] | None = None
     bears_drift: bool = False  # drifting bodies conserve energy with the step of bodies at rest
-    borne: Borne | None = None  # how far they may drift and rotate; None: as for similar functions
+    drift_limits: DriftLimits | None = (
+        None  # how far they may drift and rotate; None: as for similar functions
+    )
     # Stored parts of the domain of a point, in order: ``half_size`` (d numbers), ``half_edges`` (d
     # vectors), ``deformation`` (F in 2D or in 3D), ``corners`` (of the `element` of the basis).
     shape: tuple[str, ...] = ()
@@ -84,7 +86,7 @@ def mapped_again(basis, grid, moment):
     return moment
 
 
-def leave_moment_out(basis, grid, moment):
+def without_moment(basis, grid, moment):
     """No moment the second time: B D^-1 is unbounded where D vanishes.
 
     The velocity that deforms the points omits it; the points retain B.

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import BasisTraits, leave_moment_out, mapped_again
+from karamelo_py.points.basis import BasisTraits, mapped_again, without_moment
 from karamelo_py.points.basis.product import Along, along, register, spacing
 from karamelo_py.points.grid import cells_along, in_cells
 
@@ -59,5 +59,5 @@ def _spacing_bernstein_quadratic(basis):
     return 0.5
 
 
-mapped_again.on(BernsteinQuadratic)(leave_moment_out)
+mapped_again.on(BernsteinQuadratic)(without_moment)
 register(BernsteinQuadratic, 3)

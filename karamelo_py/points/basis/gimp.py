@@ -8,7 +8,7 @@ from karamelo_py.compiler.powers import power
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import basis as bases
 from karamelo_py.points.basis import BasisTraits
-from karamelo_py.points.basis.product import Along, along, node_number, register, wide
+from karamelo_py.points.basis.product import Along, along, node_number, register, warn_of_many_nodes
 from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
@@ -30,8 +30,8 @@ class UGIMP(_Box):
     """Uniform GIMP: each point has a box of constant size (Bardenhagen & Kober 2004).
 
     Weights are the averages of the linear basis over [x - l, x + l] in each direction. l is the
-    initial half size of the point. At large stretch, gaps open between the boxes; cpgimp lets the
-    boxes grow. A wall cuts the box, and the point then acts from the centre of the rest.
+    initial half size of the point. At large stretch gaps open between boxes, unlike with cpgimp. A
+    wall cuts the box; the point then acts from the centre of the rest.
 
     Example
     -------
@@ -97,7 +97,7 @@ class CPGIMPStretch(_Following):
 
 
 class CPGIMPCorners(_Following):
-    """Boxes as wide as the mean distance of their corners, which the grid moves.
+    """Boxes as warn_of_many_nodes as the mean distance of their corners, which the grid moves.
 
     l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c. s_ci = -1 or
     1 is the side of the corner in direction i (after Coombs et al. 2020, "On Lagrangian mechanics
@@ -120,9 +120,8 @@ class CPGIMP(_Box):
     of the right stretch, the default) or ``corners`` (its corners move with the grid). Boxes stay
     aligned with the axes. For large shear, the cpdi methods have parallelograms and quadrilaterals.
 
-    Weights use half sizes between 0.001 and 1 cell. Beyond one cell, points are so far apart that
-    the body fractures numerically anyway. In total Lagrangian methods no box deforms, and cpgimp
-    equals ugimp.
+    Weights use half sizes between 0.001 and 1 cell; beyond, the body fractures numerically. In
+    total Lagrangian methods no box deforms, and cpgimp equals ugimp.
 
     Parameters
     ----------
@@ -221,7 +220,7 @@ def _end(at, first, top):
 
 
 # As for the linear basis, which is the limit of a vanishing box.
-bases.mapped_again.on(CPGIMPDiagonal)(bases.leave_moment_out)
+bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
 # --- boxes ------------------------------------------------------------------------------------
@@ -283,4 +282,4 @@ def _carry_cpgimp_corners(basis, kin, place, corner, displacement):
 register(UGIMP, 3)
 for _basis in (CPGIMPDet, CPGIMPDiagonal, CPGIMPStretch, CPGIMPCorners):
     register(_basis, 4)
-wide(_Box)
+warn_of_many_nodes(_Box)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.basis import BasisTraits, leave_moment_out, mapped_again
+from karamelo_py.points.basis import BasisTraits, mapped_again, without_moment
 from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.transfers import flip_coefficient
@@ -111,5 +111,5 @@ def _along_linear(basis, kin, grid, place, direction):
     return Along(i, r, (1 - r, r), gradients, gradients)
 
 
-mapped_again.on(Linear)(leave_moment_out)
+mapped_again.on(Linear)(without_moment)
 register(Linear, 2)

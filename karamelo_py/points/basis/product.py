@@ -103,11 +103,11 @@ def cell_number(kin, grid, place):
 
 
 def digits(k, base, d):
-    found: list = []
+    lower: list = []
     for _ in range(d - 1):
-        found = [k % base, *found]
+        lower = [k % base, *lower]
         k = k // base
-    return [k, *found]
+    return [k, *lower]
 
 
 def item(values, k):
@@ -115,7 +115,7 @@ def item(values, k):
     return values[k]
 
 
-def each_for_its_own(weights, others):
+def with_each_replaced(weights, others):
     """Products of weights; for each direction, its factor is replaced by the one in `others`."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
@@ -143,7 +143,7 @@ def _entry_product(basis, kin, grid, stencil, k):
     at = places_of(stencil, k)
     weights = weights_of(stencil, at)
     lines = zip(stencil.lines, at, strict=True)
-    slopes = each_for_its_own(weights, [item(line.gradients, n) for line, n in lines])
+    slopes = with_each_replaced(weights, [item(line.gradients, n) for line, n in lines])
     weight = product(weights)
     first = node_number(grid, grid.first, [line.first for line in stencil.lines])
     number = beside(first, node_number(grid, 0, at))
@@ -160,7 +160,7 @@ def _affine_weight_product(basis, kin, grid, stencil, k):
     at = places_of(stencil, k)
     lines = enumerate(zip(stencil.lines, at, strict=True))
     affine = [item(affine_along(basis, grid, line, i), n) for i, (line, n) in lines]
-    return vector(kin, each_for_its_own(weights_of(stencil, at), affine))
+    return vector(kin, with_each_replaced(weights_of(stencil, at), affine))
 
 
 def register(basis: type, width: int) -> None:
@@ -173,7 +173,7 @@ def register(basis: type, width: int) -> None:
     affine_weight.on(basis)(_affine_weight_product)
 
 
-def wide(basis: type) -> None:
+def warn_of_many_nodes(basis: type) -> None:
     suggestion(
         basis,
         when=_seen,

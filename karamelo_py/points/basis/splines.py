@@ -23,12 +23,12 @@ class AtWalls(NamedTuple):
 
 
 @point_function(otherwise=True)
-def walls_beside(basis, kin, grid, place, direction):
+def walls_of_cell(basis, kin, grid, place, direction):
     """(lower face of the point's cell is a wall, upper face is), or ()."""
     return ()
 
 
-def _walls_beside_at_walls(basis, kin, grid, place, direction):
+def _walls_of_cell_at_walls(basis, kin, grid, place, direction):
     wall = basis.faces[product.cell_number(kin, grid, place), direction]
     return (wall == BELOW) | (wall == BETWEEN), wall >= ABOVE
 
@@ -75,7 +75,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     bulk = (nearest >= 1) & (nearest < last)
     cell = min(int(a), last - 1)
     behind = nearest > cell
-    walls = walls_beside(basis, kin, grid, place, direction)
+    walls = walls_of_cell(basis, kin, grid, place, direction)
     if len(walls):
         bulk = where(where(behind, walls[1], walls[0]), False, bulk)
     t = a - nearest
@@ -137,7 +137,7 @@ def of_splines(basis: type, of: type, functions: tuple) -> None:
     def _walled_splines(basis, faces):
         return of(faces)
 
-    walls_beside.on(of)(_walls_beside_at_walls)
+    walls_of_cell.on(of)(_walls_of_cell_at_walls)
     for function in functions:
         function.on(of)(function.find((basis,)))
     product.register(of, basis.line_nodes)
@@ -180,7 +180,7 @@ class CubicSpline(NamedTuple):
         courant_still=1.4,
         courant_strained_first=1.0,
         bears_drift=True,
-        borne=CUBIC,
+        drift_limits=CUBIC,
     )
 
 
@@ -213,7 +213,7 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
     cell = min(cell, last - 1)
     bulk = (cell >= 1) & (cell < last - 1)
     below, above = cell == 0, cell == last - 1
-    walls = walls_beside(basis, kin, grid, place, direction)
+    walls = walls_of_cell(basis, kin, grid, place, direction)
     if len(walls):
         below, above = below | walls[0], above | walls[1]
         bulk = where(below | above, False, bulk)
@@ -235,7 +235,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     if last == 1:
         return between
     t = a - cell
-    n, g, c = beside_wall(grid, where(below, t, 1 - t))
+    n, g, c = next_to_wall(grid, where(below, t, 1 - t))
     n = where(below, n, (n[2], n[1], n[0]))
     g = where(below, g, (-g[2], -g[1], -g[0]))
     c = where(below, c, (-c[2], -c[1], -c[0]))
@@ -248,7 +248,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     return where(below & above, between, line) if inside else line
 
 
-def beside_wall(grid, t):
+def next_to_wall(grid, t):
     """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall, at `t` cells from it.
 
     The ghost node changes D to h^2 t (1 - t + t^2/3), which vanishes at the wall, but t cancels out
@@ -263,7 +263,7 @@ def beside_wall(grid, t):
 
 
 product.register(CubicSpline, 4)
-product.wide(CubicSpline)
+product.warn_of_many_nodes(CubicSpline)
 
 
 class CubicSplineAtWalls(AtWalls):

@@ -53,9 +53,9 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     layers = np.arange(half, 8, 2 * half)
     places = surfaces[:, None] - layers
     seen = np.interp(places, x, weights)
-    known = seen.sum(axis=1) > 0
-    mean = (seen * places).sum(axis=1)[known] / seen.sum(axis=1)[known]
+    near = seen.sum(axis=1) > 0
+    mean = (seen * places).sum(axis=1)[near] / seen.sum(axis=1)[near]
     mean = np.maximum.accumulate(mean)
     # Once a body fills the reach of a node its mean is constant: the first such surface.
     mean, first = np.unique(np.round(mean, 9), return_index=True)
-    return np.interp(means, mean, surfaces[known][first])
+    return np.interp(means, mean, surfaces[near][first])

@@ -427,9 +427,9 @@ class SymmetricTensor(Matrix):
         """
         if self.kin.dimension == 1:
             return self
-        return self.turned_in_plane(dl) if self.kin.dimension == 2 else self.turned_in_space(dl)
+        return self.rotated_in_2d(dl) if self.kin.dimension == 2 else self.rotated_in_3d(dl)
 
-    def turned_in_plane(self, dl):
+    def rotated_in_2d(self, dl):
         turn = dl.generator().at()
         xx, yy, zz, xy = self
         half = 0.25 * (turn[1, 0] - turn[0, 1])
@@ -449,7 +449,7 @@ class SymmetricTensor(Matrix):
         shear = fma(double_sine, apart, double_versine * xy)
         return self._make([xx + change, yy - change, zz, xy + shear])
 
-    def turned_in_space(self, dl):
+    def rotated_in_3d(self, dl):
         # R = I + k (T + T T), T the cross product with the scaled w / 2
         turn, s, axes = dl.generator().at(), self.at(), range(3)
         w = [0.25 * (turn[(i + 2) % 3, (i + 1) % 3] - turn[(i + 1) % 3, (i + 2) % 3]) for i in axes]

@@ -100,14 +100,14 @@ def real_principal(s):
 
 def logarithm_of(s):
     values, directions = real_principal(s)
-    found = tuple([logarithm(x) for x in values])
-    return from_principal(s, found, directions, tuple([1 / x for x in values]))
+    logarithms = tuple([logarithm(x) for x in values])
+    return from_principal(s, logarithms, directions, tuple([1 / x for x in values]))
 
 
 def exponential_of(s):
     values, directions = real_principal(s)
-    found = tuple([exponential(x) for x in values])
-    return from_principal(s, found, directions, found)
+    exponentials = tuple([exponential(x) for x in values])
+    return from_principal(s, exponentials, directions, exponentials)
 
 
 # Jacobi rotations stop when a tensor is diagonal, which its slopes need not be. With S' in the
@@ -148,8 +148,8 @@ def out_of_frame(s, diagonal, shears, directions):
 
     def component(i, j):
         n = directions
-        own = dot(diagonal, [m[i] * m[j] for m in n])
-        return own + dot(shears, [n[a][i] * n[b][j] + n[b][i] * n[a][j] for a, b in PAIRS])
+        normal = dot(diagonal, [m[i] * m[j] for m in n])
+        return normal + dot(shears, [n[a][i] * n[b][j] + n[b][i] * n[a][j] for a, b in PAIRS])
 
     return s._make([component(i, j) for i, j in s.places])
 

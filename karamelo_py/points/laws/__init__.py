@@ -69,31 +69,30 @@ def can(law: NamedTuple, function: Callable) -> bool:
 _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
-def column(part: type, name: str, what: Callable | NamedTuple) -> None:
+def column(part: type, name: str, source: Callable | NamedTuple) -> None:
     """Declare an output column of laws with `part`, the class of a law or of a part.
 
-    `what` is a point function of the whole law (`number`), or a tag of `shown`.
+    `source` is a point function of the whole law (`number`), or a tag of `shown`.
     """
-    _columns.setdefault(part, {})[name] = what if isinstance(what, tuple) else what.tag
+    _columns.setdefault(part, {})[name] = source if isinstance(source, tuple) else source.tag
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
     """Output columns of a law, those of its parts first: name, and tag for `shown`."""
-    own = _columns.get(type(law), {})
     kinds = reversed(law_kind(law)[1:])
-    found = {name: what for kind in kinds for name, what in _columns.get(kind, {}).items()}
-    return {name: of_part(law, what) for name, what in found.items()} | own
+    tags = {name: tag for kind in kinds for name, tag in _columns.get(kind, {}).items()}
+    return {name: of_part(law, tag) for name, tag in tags.items()} | _columns.get(type(law), {})
 
 
 @point_function(otherwise=True)
-def of_part(law, what):
-    """Tag by which `law` shows the column `what` of one of its parts."""
-    return what
+def of_part(law, tag):
+    """Tag by which `law` shows a column of one of its parts, which has `tag`."""
+    return tag
 
 
 @point_function()
-def shown(what, law, kin, state):
-    """Value of a tag for a point in `state`."""
+def shown(tag, law, kin, state):
+    """Value of an output column for a point in `state`."""
 
 
 def number(function: Callable) -> Callable:
@@ -102,14 +101,14 @@ def number(function: Callable) -> Callable:
     The class of the tag is stored in the module of the function: cached kernels import it.
     """
     name = f"{function.__name__}_tag"
-    made = namedtuple(name, (), module=function.__module__)
+    tag_class = namedtuple(name, (), module=function.__module__)
 
-    @shown.on(made)
-    def _shown_column(what, law, kin, state):
+    @shown.on(tag_class)
+    def _shown_column(tag, law, kin, state):
         return function(law, kin, state)
 
-    setattr(sys.modules[function.__module__], name, made)
-    function.tag = made()
+    setattr(sys.modules[function.__module__], name, tag_class)
+    function.tag = tag_class()
     return function
 
 
@@ -198,12 +197,12 @@ def energy_density(law, kin, state):
 
 
 @point_function(otherwise=True)
-def constrained_velocity(law, own, given):
-    """Velocity of a point after a step: `given` by the grid, or `own` for rigid bodies."""
-    return given
+def constrained_velocity(law, v, v_grid):
+    """Velocity of a point after a step: `v_grid` from the grid; rigid bodies retain v."""
+    return v_grid
 
 
-def moves_as_told(law: tuple) -> bool:
+def is_rigid(law: tuple) -> bool:
     return constrained_velocity.defined(type(law))
 
 

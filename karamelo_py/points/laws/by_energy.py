@@ -277,7 +277,7 @@ SCANNED = 0.5, 3.0  # stretches
 
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
     """Path and stretch nearest to rest at which a principal direction loses its stiffness."""
-    found = []
+    unstable = []
     for path, stretches in PATHS.items():
         for end in SCANNED:
             for x in np.geomspace(1, end, 60)[1:]:
@@ -287,9 +287,9 @@ def first_instability(law: NamedTuple) -> tuple[str, float] | None:
                 except (ValueError, ZeroDivisionError, OverflowError):
                     least = -1.0  # the formula has no value
                 if not least > 0:
-                    found.append((abs(np.log(x)), path, float(x)))
+                    unstable.append((abs(np.log(x)), path, float(x)))
                     break
-    return min(found)[1:] if found else None
+    return min(unstable)[1:] if unstable else None
 
 
 # --- of invariants ------------------------------------------------------------------------------
@@ -427,11 +427,11 @@ def shear_between(law, at):
     """Largest rho c^2 of shear waves: l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
     slopes = [evaluated(code, law, at) for code in law.first]
     limits = limits_of(law, at, slopes)
-    found = []
+    squares = []
     for (i, j), limit in zip(PAIRS, limits, strict=True):
         apart = at[i] * at[i] - at[j] * at[j]
         alike = abs(apart) < CLOSE
         tau = at[i] * slopes[i] - at[j] * slopes[j]
         ratio = where(alike, limit, tau / where(alike, 1, apart))
-        found.append(max(at[i] * at[i], at[j] * at[j]) * ratio)
-    return max(*found, 0)
+        squares.append(max(at[i] * at[i], at[j] * at[j]) * ratio)
+    return max(*squares, 0)

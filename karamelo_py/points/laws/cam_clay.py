@@ -59,8 +59,8 @@ class CamClay(NamedTuple):
 
     Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
     q/p. At the critical state this is p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic
-    strain ep, and pc. If fix initial_stress gives a stress outside the surface, pc moves the
-    surface there. p may approach 0, but there is no tension.
+    strain ep, and pc. A stress from fix initial_stress outside the surface raises pc. There is no
+    tension.
 
     At a free surface a load must balance p0, or the first step releases p0. Hold the other sides
     and write ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or

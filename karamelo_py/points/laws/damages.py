@@ -79,9 +79,8 @@ class JohnsonCookDamage(NamedTuple):
     (dump column damage_init). From w = 1, the damage D (dump column damage) grows to 1 as 10 (w -
     1). Nothing fails for t below -3. d1 may be negative. Failure strains are at least 1e-6.
 
-    D reduces the deviatoric stress and tension, not compression: sigma = (1 - D) s - p I, with p
-    times 1 - D in tension. The remaining intact material continues to flow plastically. The lost
-    stored energy counts as dissipated.
+    sigma = (1 - D) s - p I, with p times 1 - D in tension. The intact material continues to flow
+    plastically. The lost stored energy counts as dissipated.
 
     See Also
     --------

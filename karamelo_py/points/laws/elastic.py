@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, unit
 from karamelo_py.points.laws import LawTraits
-from karamelo_py.points.laws.parameters import AboveZero, FromZero, lame_parameters, tell_of_locking
+from karamelo_py.points.laws.parameters import AboveZero, FromZero, lame_parameters, warn_of_locking
 from karamelo_py.points.laws.thermoelastic import expanding
 
 
@@ -32,7 +32,7 @@ class ElasticLaw(NamedTuple):
         return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
 
 
-tell_of_locking(ElasticLaw)
+warn_of_locking(ElasticLaw)
 
 
 class OfDeformation:
@@ -70,6 +70,11 @@ def _jacobian_of_deformation(law, kin, state):
 @laws.advance.on(OfDeformation)
 def _advance_of_deformation(law, kin, state, dl, dt):
     return State(state.F.after(dl))
+
+
+@laws.elastic_strain.on(OfDeformation)
+def _green_lagrange_strain(law, kin, state):
+    return 0.5 * state.F.right_cauchy_green() - 0.5 * I
 
 
 @laws.cauchy_stress.on(OfDeformation)

@@ -69,7 +69,7 @@ class Option:
         optional = {
             kind: named for kind, named in hub.parts.items() if kind not in ("eos", "strength")
         }
-        known = {ID: part for named in optional.values() for ID, part in named.items()}
+        parts = {ID: part for named in optional.values() for ID, part in named.items()}
         several = [kind for kind, named in optional.items() if word in named]
         if len(several) > 1:
             raise ScriptError(
@@ -78,10 +78,10 @@ class Option:
                 expected="an ID that only one of them has",
                 hint=" and ".join(f"{kind}({word}_{kind}, ...)" for kind in several),
             )
-        if word in known:
-            return known[word]
+        if word in parts:
+            return parts[word]
         said = f"unknown {' or '.join(optional)} '{argument.text}'"
-        raise unknown(said, word or "", known, place=argument.place)
+        raise unknown(said, word or "", parts, place=argument.place)
 
 
 # --- the style ----------------------------------------------------------------------------------
@@ -114,11 +114,10 @@ class EosStrength(NamedTuple):
     -----
     sigma = s - p I. The deviatoric stress s rotates with the point (Jaumann rate; Hughes & Winget
     1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992). For small
-    steps both agree, except at large elastic shear. The elastic strain is the strain of s plus
-    ln J / 3. J is the volume over the reference volume; for soils, its elastic part. The strain
-    energy is the energy recovered on unloading, without plastic work, which compute
-    dissipated_energy measures. If fix initial_stress sets a pressure, points get the volume with
-    this pressure.
+    steps both agree, except at large elastic shear. The elastic strain is the strain of s plus ln J
+    / 3, J the volume over the reference volume (for soils, its elastic part). The strain energy
+    excludes plastic work, which compute dissipated_energy measures. A pressure from fix
+    initial_stress changes the volume of points.
 
     See Also
     --------
@@ -304,7 +303,7 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     dl, dt, extra = step
     before, s, m = state
     J = before * det(I + dl)
-    s, strain = carried_along(law, kin, s, dl)
+    s, strain = rotated_with_point(law, kin, s, dl)
     step = StrainStep(s, strain, J, dt, extra)
     s, memory, work = strengths.respond(law.strength, law, kin, step, m)
     work = J * work * integrity_of(law, m.damage)
@@ -323,7 +322,7 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     return State(J, s, now._replace(damage=damage, heat=heat, loss=loss, further=further))
 
 
-def carried_along(law, kin, s, dl):
+def rotated_with_point(law, kin, s, dl):
     """Rotate the deviatoric stress with the point; also return the strain that adds to it."""
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
@@ -365,10 +364,10 @@ def full_pressure(law, j, m):
 def sound(law, j, m):
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
-    return sqrt(K * laws.specific_volume(law.eos) * j - unborne(law, j, m))
+    return sqrt(K * laws.specific_volume(law.eos) * j - sound_lost_to_damage(law, j, m))
 
 
-def unborne(law, j, m):
+def sound_lost_to_damage(law, j, m):
     """Reduction of the squared speed of sound by damage.
 
     A broken point in tension has no waves, however far it has expanded. When it closes again, at
@@ -478,7 +477,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
     volume = laws.specific_volume(law.eos) * J
     shear = 4 / 3 * strengths.shear_modulus(law.strength) * integrity_of(law, m.damage)
-    squared = (modulus + shear) * volume - unborne(law, J, m)
+    squared = (modulus + shear) * volume - sound_lost_to_damage(law, J, m)
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
     if isinstance(law.viscosity, Absent):
         return squared
@@ -516,8 +515,8 @@ def _plastic_strain_eos_strength(law, kin, state):
 
 
 @laws.shown.on(strengths.Remembered)
-def _shown_remembered(what, law, kin, state):
-    return state.m.strength[what.index]
+def _shown_remembered(tag, law, kin, state):
+    return state.m.strength[tag.index]
 
 
 @laws.with_stress.on(EosStrength)

@@ -104,7 +104,7 @@ def _part_after_plastic_rate(part, memory, law, step, memories):
 
 
 @laws.shown.on(Smoothed)
-def _shown_smoothed(what, law, kin, state):
+def _shown_smoothed(tag, law, kin, state):
     return last_memory(state.m.further).rate
 
 

@@ -68,10 +68,10 @@ class HyperelasticFormula(OfInvariants, _Fields):
     -----
     The stress is the exact derivative of the formula: tau = 2 (W_1 + I1 W_2) b - 2 W_2 b^2 + J W_J
     I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. The tangent of load steps and the wave
-    speed are its second derivatives. The energy is that above the state of rest. A formula is
-    refused if the body has stress or no stiffness at rest. A warning names the stretch beyond which
-    the energy is no longer convex along a principal direction, so that the body would localize.
-    Formulas of stretches cost more, because each point needs its principal directions.
+    speed are its second derivatives. The stored energy is 0 at rest. A formula with stress or
+    without stiffness at rest is refused. A warning names the stretch beyond which the energy is not
+    convex along a principal direction, so that the body would localize. Formulas of stretches cost
+    more: each point needs its principal directions.
 
     See Also
     --------

@@ -27,8 +27,8 @@ class LinearElastic(ElasticLaw):
     alpha
         Coefficient of linear expansion.
     rate
-        ``jaumann``: the stress rotates with the point, as it should. ``none``: it does not, as in
-        Karamelo; only to reproduce results of programs that omit the rotation.
+        ``jaumann``: the stress rotates with the point. ``none``: it does not, as in Karamelo; only
+        to reproduce such results.
 
     Example
     -------

@@ -62,8 +62,8 @@ class Orthotropic(NamedTuple):
     The second Piola-Kirchhoff stress is linear in the Green-Lagrange strain, S = C:E, with the
     stiffness C of Lekhnitskii (1963, section 5). The axes belong to the undeformed body and rotate
     with it. In axisymmetry, x, y and z are the directions of the radius, of the axis, and around
-    it. In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0): else the body would also shear
-    out of its plane.
+    it. In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0), or the body would shear out of
+    its plane.
 
     See Also
     --------

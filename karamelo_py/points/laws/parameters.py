@@ -24,7 +24,7 @@ def lame_parameters(E: float, nu: float) -> tuple[float, float]:
     return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
 
-def tell_of_locking(law: type) -> None:
+def warn_of_locking(law: type) -> None:
     """Warn of a nearly incompressible `law`, with fields ``lam`` and ``G``."""
 
     def keeps_volume(law, scene):

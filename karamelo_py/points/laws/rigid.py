@@ -21,16 +21,15 @@ class Rigid(NamedTuple):
 
     Notes
     -----
-    Each point retains the velocity set by fix initial_velocity_particles or fix velocity_particles.
-    Forces, contact and nodal velocities do not change it. There is no stress. The time step is
-    limited only in that a point must stay within a cell.
+    Each point retains the velocity set by fix initial_velocity_particles or fix velocity_particles,
+    whatever forces act. There is no stress. The only limit of the time step is a cell per step.
 
     In ulmpm and ulcpdi, nodes around points of the body have its velocity, whatever its density. In
     ulmpm/contacts, contact does not move it. These methods publish the force on the solid ID as
     ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and the torque about the origin as
     ContactTorque_ID_x and so on.
 
-    Point domains that deform with the grid (CPDI, cpgimp) would not stay rigid, and are refused.
+    Domains that deform with the grid (CPDI, cpgimp) are refused.
 
     See Also
     --------
@@ -57,8 +56,8 @@ def _advance_rigid(law, kin, state, dl, dt):
 
 
 @laws.constrained_velocity.on(Rigid)
-def _constrained_velocity_rigid(law, own, given):
-    return own
+def _constrained_velocity_rigid(law, v, v_grid):
+    return v
 
 
 @laws.jacobian.on(Rigid)

@@ -74,8 +74,7 @@ class PlasticWork(NamedTuple):
     Notes
     -----
     T grows by chi/(rho0 cp) times the plastic work per reference volume. The pressure grows by
-    alpha (T - T0), so a warm body that cannot expand is under pressure. The dump column T shows the
-    temperature.
+    alpha (T - T0). Dump column: T.
 
     See Also
     --------

@@ -158,13 +158,13 @@ def _with_stress_thin(law, kin, state, stress):
 
 
 @laws.shown.on(Within)
-def _shown_within(what, law, kin, state):
-    return laws.shown(what.column, law.law, WHOLE, state.whole)
+def _shown_within(tag, law, kin, state):
+    return laws.shown(tag.column, law.law, WHOLE, state.whole)
 
 
 @laws.of_part.on(Thin)
-def _of_part_thin(law, what):
-    return Within(what)
+def _of_part_thin(law, tag):
+    return Within(tag)
 
 
 @laws.number

@@ -52,7 +52,7 @@ def in_step(transfer, kept):
 
 
 @point_function()
-def lost_shares(transfer, like):
+def lost_fractions(transfer, like):
     """Two fractions of the kinetic energy, removed by mapping to the nodes and back, that are lost.
 
     The rest returns with the data stored by points. Undefined if unknown: the energy is then lost
@@ -175,4 +175,4 @@ known_failure(
     "each revolution: a disk with 4 to 8 cells across the radius breaks within 5 to 7",
     cure=SMOOTH,
 )
-noise.turns(Moment)
+noise.warn_of_rotation(Moment)

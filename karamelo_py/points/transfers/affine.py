@@ -15,7 +15,7 @@ from karamelo_py.points import transfers
 from karamelo_py.points.kinematics import outer, planar, zero
 from karamelo_py.points.laws import jacobian
 from karamelo_py.points.transfers import Moment, TransferTraits
-from karamelo_py.points.transfers.flip import Share, blend, swings, take_nodal_velocity
+from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity, warn_of_vibrations
 
 COMPRESSED = 1e-3  # volume fraction that a point has to lose to move with the grid
 SEPARATE = 0.1  # strength of separation that elastic bodies tolerate
@@ -85,9 +85,9 @@ class ASFLIP(NamedTuple):
 
     Notes
     -----
-    In a solid under tension the points lose their order, although it does not separate. Two elastic
-    rings that collide at 30 m/s rebound at 22.5 m/s with AFLIP. With a FLIP coefficient of 0.97
-    they rebound at 22.2 (beta = 0.1), 18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 m/s (1).
+    In a solid under tension the points lose their order. Two elastic rings that collide at 30 m/s
+    rebound at 22.5 m/s with AFLIP; with ASFLIP and a FLIP coefficient of 0.97 at 22.2 (beta = 0.1),
+    18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 m/s (1).
     """
 
     alpha: Annotated[float, Share]
@@ -150,4 +150,4 @@ for _transfer in (APIC, AFLIP, ASFLIP):
 take_nodal_velocity(APIC)
 blend(AFLIP)
 blend(ASFLIP)
-swings(ASFLIP)
+warn_of_vibrations(ASFLIP)

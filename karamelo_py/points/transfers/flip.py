@@ -8,7 +8,7 @@ from karamelo_py.compiler import real
 from karamelo_py.language.kinds import Constraint
 from karamelo_py.language.rules import gain, known_failure
 from karamelo_py.points import noise
-from karamelo_py.points.transfers import TransferTraits, in_step, lost_shares, updated_velocity
+from karamelo_py.points.transfers import TransferTraits, in_step, lost_fractions, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
@@ -90,11 +90,11 @@ def _in_step_flip_per_time(transfer, kept):
 
 def take_nodal_velocity(transfer: type) -> None:
     """Let points take the nodal velocity after the step, as in PIC."""
-    lost_shares.on(transfer)(_lost_shares_pic)
+    lost_fractions.on(transfer)(_lost_fractions_pic)
     updated_velocity.on(transfer)(_updated_velocity_pic)
 
 
-def _lost_shares_pic(transfer, like):
+def _lost_fractions_pic(transfer, like):
     return 1.0, 1.0
 
 
@@ -104,7 +104,7 @@ def _updated_velocity_pic(transfer, v, v_pic, dv):
 
 def blend(transfer: type) -> None:
     updated_velocity.on(transfer)(_updated_velocity_flip)
-    lost_shares.on(transfer)(_lost_shares_flip)
+    lost_fractions.on(transfer)(_lost_fractions_flip)
 
 
 def _updated_velocity_flip(transfer, v, v_pic, dv):
@@ -112,13 +112,13 @@ def _updated_velocity_flip(transfer, v, v_pic, dv):
     return (1 - alpha) * v_pic + alpha * (v + dv)
 
 
-def _lost_shares_flip(transfer, like):
+def _lost_fractions_flip(transfer, like):
     # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
     alpha = transfer.alpha
     return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)
 
 
-def swings(transfer: type) -> None:
+def warn_of_vibrations(transfer: type) -> None:
     """Warn of large vibrations: only usl, which damps, is safe."""
     known_failure(
         transfer,
@@ -143,7 +143,7 @@ def _turns_away(transfer, scene):
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
-def slows(transfer: type) -> None:
+def warn_of_lost_angular_momentum(transfer: type) -> None:
     """Register the warning for bodies that rotate many times.
 
     Points move with the grid velocity u, and store v: each step changes the angular momentum by the
@@ -185,7 +185,7 @@ def _brakes(transfer, scene):
     return {"gone": 100 * gone} if gone > BRAKED else None
 
 
-def lags(transfer: type) -> None:
+def warn_of_slow_rotation(transfer: type) -> None:
     """Register the warning for free rotations in the total frame.
 
     Points move with the grid velocity, and store another: a square of n cells rotates too slowly by
@@ -220,8 +220,8 @@ take_nodal_velocity(PIC)
 
 for _flip in (FLIP, FLIPPerTime):
     blend(_flip)
-    swings(_flip)
-    slows(_flip)
-    lags(_flip)
-    noise.drifts(_flip)
-    noise.turns(_flip)
+    warn_of_vibrations(_flip)
+    warn_of_lost_angular_momentum(_flip)
+    warn_of_slow_rotation(_flip)
+    noise.warn_of_drift(_flip)
+    noise.warn_of_rotation(_flip)

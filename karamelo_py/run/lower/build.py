@@ -28,7 +28,7 @@ from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.points.transfers import flip_coefficient, lost_shares, stores_moment
+from karamelo_py.points.transfers import flip_coefficient, lost_fractions, stores_moment
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.lower.walls import with_walls
@@ -195,7 +195,7 @@ def returns_loss(hub: Hub) -> bool:
     """
     transfer = hub.update.transfer
     keeps_all = flip_coefficient(transfer) == 1 and not stores_moment(transfer)
-    if not lost_shares.defined(type(transfer)) or keeps_all:
+    if not lost_fractions.defined(type(transfer)) or keeps_all:
         return False
     return any(laws.can(solid.material.law, taken_heat) for solid in hub.solids.values())
 

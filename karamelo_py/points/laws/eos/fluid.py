@@ -48,9 +48,9 @@ class Tait(NamedTuple):
     Notes
     -----
     p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is sqrt(K
-    gamma/rho0) at zero pressure. A smaller K than the real one allows longer time steps: the
-    density stays within 1 % if speeds stay below 10 % of the speed of sound. In splashes, tension
-    makes drops swell and stick together. ``tension=0`` lets them separate.
+    gamma/rho0) at zero pressure. A smaller K than the real one allows longer steps: the density
+    stays within 1 % if speeds stay below 10 % of the speed of sound. In splashes, tension makes
+    drops swell and stick together; use ``tension=0``.
 
     See Also
     --------

@@ -54,12 +54,12 @@ class Shock(NamedTuple):
     -----
     With mu = rho/rho0 - 1, p = rho0 c0^2 mu (1 + mu) / (1 - (S - 1) mu)^2 + Gamma rho0 cv (T - Tr)
     for T above Tr (Meyers 1994, chapter 5). This is the Hugoniot curve, shifted by the heat of
-    plastic work. Materials without a temperature have no such heat. In tension the first part is
-    rho0 c0^2 mu. The curve has a pole at (S - 1) mu = 1. Beyond S (1 - rho0/rho) = 0.9 the pressure
-    follows the tangent.
+    plastic work if the material has a temperature. In tension the first part is rho0 c0^2 mu. The
+    curve has a pole at (S - 1) mu = 1. Beyond S (1 - rho0/rho) = 0.9 the pressure follows the
+    tangent.
 
-    The pressure is never below -tension: the material spalls, its voids open at constant tension,
-    and close before it sustains pressure again. The velocity of a free surface then drops by du = 2
+    The pressure is never below -tension: voids open at constant tension (spall), and close before
+    the material sustains pressure again. The velocity of a free surface then drops by du = 2
     tension/(rho0 c0), in the acoustic approximation (Antoun et al. 2003, Spall Fracture, section
     4.2). The remaining tension slows the spalled layer further; a damage releases it.
 

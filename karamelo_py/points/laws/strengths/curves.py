@@ -28,9 +28,8 @@ class Tabulated(NamedTuple):
     G
         Shear modulus.
     curve
-        Pairs of plastic strain and flow stress, from strain 0. Or the name of a file with a line
-        per point: two numbers separated by blanks or a comma. Lines that begin with # are
-        comments.
+        Pairs of plastic strain and flow stress, from strain 0. Or a file with two numbers per line,
+        separated by blanks or a comma; # begins a comment line.
 
     Example
     -------
@@ -39,8 +38,8 @@ class Tabulated(NamedTuple):
     Notes
     -----
     Beyond the last point the flow stress is constant. It may fall by less than 3 G per unit of
-    plastic strain. With ``strength(steel, tabulated, 80e9, curve.txt)`` the points are read from a
-    file. Each step solves for the plastic strain with the flow stress at its end.
+    plastic strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves
+    for the plastic strain with the flow stress at its end.
 
     See Also
     --------
@@ -163,8 +162,8 @@ class FlowStress(NamedTuple):
     G
         Shear modulus.
     Y
-        The flow stress: a formula of ep, the equivalent plastic strain, epdot, its rate in the
-        step, and T, the temperature. These names have no other meaning here.
+        The flow stress: a formula of the equivalent plastic strain ep, its rate epdot in the step,
+        and the temperature T.
     T
         Temperature, if neither the material nor its solid has one.
 
@@ -177,8 +176,8 @@ class FlowStress(NamedTuple):
     -----
     Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
     with finite-difference slopes. Y may fall with plastic strain, but by less than 3 G per unit. A
-    negative Y counts as 0. A formula is interpreted: it needs no compilation, but ten times the
-    time of a compiled law.
+    negative Y counts as 0. Formulas are interpreted: no compilation, but ten times the time of a
+    compiled law.
 
     See Also
     --------
@@ -243,9 +242,9 @@ def _flow_stress_flow_stress(strength, before, increment, dt):
     near = 1e-6 * (increment + 1e-4)
     # In double precision: the difference of the two is small.
     here = real(before.memory.ep, 1.0) + increment
-    there = max(value(strength, here, increment / dt, T), 0.0)
+    stress = max(value(strength, here, increment / dt, T), 0.0)
     beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)
-    flow = max(real(there, increment), 0)
-    slope = real((beyond - there) / near, increment)
+    flow = max(real(stress, increment), 0)
+    slope = real((beyond - stress) / near, increment)
     # With a slope of -3 G or less there is no solution.
     return flow, max(slope, -2 * strength.G)

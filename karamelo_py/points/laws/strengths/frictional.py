@@ -90,24 +90,24 @@ def respond_by_friction(strength, law, kin, step, memories):
     trial = elastic_trial(strength.G, step.s, step.strain)
     elastic = elastic_part(strength, memory, step.j)
     warm = sum(thermal_pressure(law.temperature, heat))
-    own = pressure(law.eos, elastic, memories.energy, heat) + warm
+    p_point = pressure(law.eos, elastic, memories.energy, heat) + warm
     extra = fbar_fraction(strength, memory) * step.extra
-    if memory.Js > 1 and own + extra > 0:
+    if memory.Js > 1 and p_point + extra > 0:
         # Separation closes before the point sustains pressure.
         closed = ratio_at_pressure(law.eos, -warm - extra, heat)
         memory = memory._replace(Js=max(1, step.j / (memory.Jp * closed)))
         elastic = elastic_part(strength, memory, step.j)
-        own = pressure(law.eos, elastic, memories.energy, heat) + warm
+        p_point = pressure(law.eos, elastic, memories.energy, heat) + warm
     K = bulk_modulus(law.eos, elastic, memories.energy, heat)
     lowest = lowest_pressure(strength, memory.ep)
-    p = own + extra
+    p = p_point + extra
     new, reached = pressure_response(strength, kin, FrictionTrial(trial, p, K), memory.ep)
     plastic = 0.5 / strength.G * (trial - new)
     memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
     work = inner(new, plastic)
     if reached != p:
         # The volume that carries the new pressure is elastic; the rest is plastic.
-        after = ratio_at_pressure(law.eos, own + (reached - p) - warm, heat)
+        after = ratio_at_pressure(law.eos, p_point + (reached - p) - warm, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=step.j / (memory.Jp * after))
         else:

@@ -32,7 +32,7 @@ class LinearHardening(NamedTuple):
     G
         Shear modulus.
     yield_stress
-        Yield stress in uniaxial tension; the yield stress in pure shear is 1/sqrt(3) of it.
+        Yield stress in uniaxial tension, sqrt(3) times that in pure shear.
     H
         Hardening modulus: rise of the yield stress per unit of plastic strain.
 
@@ -43,10 +43,9 @@ class LinearHardening(NamedTuple):
 
     Notes
     -----
-    q = sqrt(3/2 s:s) is the von Mises stress of an elastic step. If it exceeds the yield stress Y,
-    the equivalent plastic strain (dump column ep) grows by (q - Y)/(3 G + H). The deviatoric stress
-    s shrinks to the yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008, section
-    7.3).
+    If the von Mises stress q = sqrt(3/2 s:s) of an elastic step exceeds the yield stress Y, the
+    equivalent plastic strain (dump column ep) grows by (q - Y)/(3 G + H), and s is scaled to the
+    yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008, section 7.3).
 
     See Also
     --------

@@ -25,8 +25,8 @@ class Elastic(NamedTuple):
 
     Notes
     -----
-    The deviatoric stress rotates with the point (Jaumann rate) and grows by 2 G dev(d), d the
-    strain increment.
+    The deviatoric stress rotates with the point (Jaumann rate) and grows by 2 G dev(d) for a strain
+    increment d.
 
     See Also
     --------
@@ -58,9 +58,8 @@ class Viscous(NamedTuple):
 
     Notes
     -----
-    s = 2 mu dev(D), D the strain rate. The stable time step includes the viscosity, which matters
-    unless 4/3 mu/(rho h) is small compared with the speed of sound. Equivalent plastic strain and
-    elastic shear are 0; viscous work counts as dissipated energy.
+    s = 2 mu dev(D), D the strain rate. Viscosity shortens the stable step unless 4/3 mu/(rho h) is
+    small compared with the speed of sound. Viscous work counts as dissipated energy.
 
     See Also
     --------

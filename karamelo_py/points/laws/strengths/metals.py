@@ -53,8 +53,7 @@ class JohnsonCook(NamedTuple):
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
     1983). At and below the reference rate the second factor is 1; without a temperature the third
     factor is 1. Each step solves for the plastic strain with the flow stress at its end and the
-    rate of the step, which has one solution for any step size. The temperature is taken at its
-    beginning.
+    rate of the step: one solution for any step size. The temperature is that at its beginning.
 
     See Also
     --------
@@ -201,8 +200,7 @@ class Swift(NamedTuple):
     B, n
         Hardening.
     C
-        Plastic strain at the end of the plateau. A negative value is a previous plastic strain of
-        the material.
+        Plastic strain at the end of the plateau; negative: a previous plastic strain.
 
     Example
     -------
@@ -282,9 +280,9 @@ class ZerilliArmstrong(NamedTuple):
     Notes
     -----
     Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n (Zerilli & Armstrong
-    1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. At zero rate the thermal part
-    vanishes, so the strength of a body at rest is C0 + C5 ep^n. Each step solves for the plastic
-    strain with the flow stress at its end and the rate of the step.
+    1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. At rest the strength is C0 + C5
+    ep^n. Each step solves for the plastic strain with the flow stress at its end and the rate of
+    the step.
 
     See Also
     --------

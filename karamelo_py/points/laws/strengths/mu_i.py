@@ -43,10 +43,9 @@ class MuI(NamedTuple):
     -----
     sqrt(s:s/2) = mu(I) p in flow, with mu = mu_s + (mu_2 - mu_s)/(I0/I + 1) (Jop, Forterre &
     Pouliquen 2006). I = gamma' d sqrt(rho_s/p), with the plastic shear rate gamma'. Below mu_s p
-    the response is elastic. Steps of any size solve a quadratic equation for the shear stress at
-    their end (Dunatunga & Kamrin 2015). Below the initial density the grains are separated and
-    sustain no stress until the density is restored. Flow conserves the volume. The dump column
-    ``inertial`` is I.
+    the response is elastic. A step of any size solves a quadratic equation for the shear stress at
+    its end (Dunatunga & Kamrin 2015). Below the initial density the grains are separated and
+    sustain no stress. Flow conserves the volume. Dump column ``inertial``: I.
 
     See Also
     --------
