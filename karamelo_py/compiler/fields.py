@@ -45,32 +45,28 @@ LINE = 64  # bytes per cache line
 
 
 def scalar(kin: Any) -> int:
-    """One number."""
     return 1
 
 
 def pair(kin: Any) -> int:
-    """Two numbers."""
     return 2
 
 
 def triple(kin: Any) -> int:
-    """Three numbers."""
     return 3
 
 
 def vector(kin: Any) -> int:
-    """The components of a vector."""
     return kin.dimension
 
 
 def tensor(kin: Any) -> int:
-    """The components of a tensor, including the hoop component."""
+    """Components of a tensor, including the hoop component."""
     return kin.tensor_size
 
 
 def planar(kin: Any) -> int:
-    """The components of a d x d matrix."""
+    """Components of a d x d matrix."""
     return kin.dimension**2
 
 
@@ -80,6 +76,9 @@ class Field(NamedTuple):
     array: Any
 
     shape = scalar
+    kept = True
+    start = 0.0
+    columns = ()
 
 
 class StepField(Field):
@@ -101,12 +100,12 @@ def name_of(kind: type) -> str:
 
 def is_kept(kind: type) -> bool:
     """Tell whether a field outlives a step."""
-    return getattr(kind, "kept", True)
+    return kind.kept
 
 
 def columns_of(kind: type) -> tuple[str, ...]:
     """Names of the components of a field in output, possibly none."""
-    return getattr(kind, "columns", ())
+    return kind.columns
 
 
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
@@ -120,11 +119,11 @@ def rows_of_points(
     """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
     No vector load then crosses a line, and the dozens of rows that a visit traverses in parallel
-    fall into different cache sets for any number of points; contiguous rows would collide for 512
-    or 512 000 points. There are always gaps between rows: arrays without gaps are another type,
-    which would need another compilation.
+    fall into different cache sets for any n; contiguous rows would collide for 512 or 512 000
+    points. Rows always have gaps: arrays without gaps are another type, and would need another
+    compilation.
 
-    `room` (k,) is used if it is long enough: see `length_of_rows`.
+    `room` (k,) is used if it is long enough (`length_of_rows`).
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -150,13 +149,13 @@ def _distance_of_rows(count: int, dtype: type) -> int:
 
 
 def as_rows_of_points(array: np.ndarray) -> np.ndarray:
-    """Convert `array`, perhaps read or received, to `rows_of_points`."""
+    """Convert `array` to `rows_of_points`."""
     array = np.asarray(array)
     if array.ndim == 1 or not array.flags.c_contiguous:
         return array
-    found = rows_of_points(array.shape, array.dtype)
-    found[...] = array
-    return found
+    rows = rows_of_points(array.shape, array.dtype)
+    rows[...] = array
+    return rows
 
 
 def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -168,15 +167,14 @@ def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` points, (components, count), with initial values."""
+    """Make the field of `count` points, (components, count), with initial values."""
     array = rows_of_points((kind.shape(kin), count), real)
     array[:] = _start(kind, kin, real)[:, None]
     return kind(array)
 
 
 def _start(kind: type, kin: Any, real: type) -> np.ndarray:
-    start = getattr(kind, "start", 0.0)
-    return np.array(start(kin) if callable(start) else [start], real)
+    return np.array(kind.start(kin) if callable(kind.start) else [kind.start], real)
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
@@ -187,7 +185,7 @@ def records(count: int, width: int, real: type) -> np.ndarray:
 
 
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """The field of `count` nodes, (count, components), with initial values."""
+    """Make the field of `count` nodes, (count, components), with initial values."""
     width = kind.shape(kin)
     # Three numbers are loaded and stored as four, the width of a register.
     array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
@@ -197,7 +195,7 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def field(fields: tuple, kind: type) -> Any:
-    """The array of the field of this class, or None if the scene does not have it."""
+    """The array of the field of this class, or None."""
     for one in fields:
         if type(one) is kind:
             return one.array
@@ -217,7 +215,7 @@ def load(array, p, like):
 
 
 def store(array, p, values):
-    """Set components 0, 1, ... of point `p` to `values`; nothing without an array."""
+    """Set components 0, 1, ... of point `p` to `values`, unless `array` is None."""
     store_from(array, p, 0, values)
 
 
@@ -230,7 +228,7 @@ def store_from(array, p, first, values):
 
 
 def increase(array, p, values):
-    """Add `values` to components 0, 1, ... of point `p`; nothing without an array."""
+    """Add `values` to components 0, 1, ... of point `p`, unless `array` is None."""
     if array is not None:
         for k, value in enumerate(values):
             array[k, p] += value
@@ -253,16 +251,16 @@ def load_vector(kin, array, p):
 
 
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
-    """(m, 2) int64: the address of each row of some arrays (..., n), and its item size in bytes.
+    """Address and item size in bytes (m, 2), int64, of each row of non-empty arrays (..., n).
 
-    Empty arrays are left out. Addresses are valid while the arrays live and are not resized.
+    Addresses are valid while the arrays live and are not resized.
 
     Raises
     ------
     ValueError
         If items are not contiguous, or not of 4 or 8 bytes.
     """
-    found: list[tuple[int, int]] = []
+    rows: list[tuple[int, int]] = []
     for array in arrays:
         if not array.size:
             continue
@@ -273,8 +271,8 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
         places = [array.ctypes.data]
         for count, stride in zip(array.shape[:-1], array.strides[:-1], strict=True):
             places = [place + k * stride for place in places for k in range(count)]
-        found += [(place, array.itemsize) for place in places]
-    return np.array(found, np.int64).reshape(-1, 2)
+        rows += [(place, array.itemsize) for place in places]
+    return np.array(rows, np.int64).reshape(-1, 2)
 
 
 def _row(address: int, like: Any, count: int) -> np.ndarray:
@@ -288,8 +286,8 @@ def _row(address: int, like: Any, count: int) -> np.ndarray:
 def _row_in_kernels(address, like, count):
     row = types.Array(like, 1, "C")
 
-    def codegen(builder, place, _, size):
-        data = builder.inttoptr(place, llvm.memory_type(like).as_pointer())
+    def codegen(builder, pointer, _, size):
+        data = builder.inttoptr(pointer, llvm.memory_type(like).as_pointer())
         return llvm.make_array(builder, row, data, [size], [I64(like.bitwidth // 8)])
 
     return row(types.int64, like, types.int64), codegen

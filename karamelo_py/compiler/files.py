@@ -1,4 +1,4 @@
-"""Files in the cache folder: only those that this user or the administrator can write are read."""
+"""Files in the cache folder."""
 
 import contextlib
 import contextvars
@@ -15,13 +15,12 @@ from pathlib import Path
 import platformdirs
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-_AS_IT_IS = (  # not a link, without waiting for a pipe
-    getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-)
+# Not a link, without waiting for a pipe; systems have some of these flags.
+_AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
 def folder() -> Path:
-    """Return the cache folder."""
+    """Return the cache folder of kernels."""
     home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
     return Path(home) / "kernels"
 
@@ -34,9 +33,9 @@ def _refuse_of_others(about: os.stat_result) -> None:
             raise PermissionError(errno.EACCES, "other users may write there")
 
 
-def _guard(place: Path) -> None:
+def _guard(directory: Path) -> None:
     """Refuse a folder that others can write to; close this user's folders to others."""
-    for one in (place, place.parent):
+    for one in (directory, directory.parent):
         about = one.stat()
         if about.st_mode & stat.S_ISVTX:  # others may not delete files there
             continue
@@ -49,7 +48,7 @@ def _guard(place: Path) -> None:
 def read(path: Path) -> bytes:
     """Read a file that only this user or the administrator can have written.
 
-    Raises OSError if it belongs to another user, and ValueError if its content is damaged.
+    Raises OSError if another user can write it, and ValueError if its content is damaged.
     """
     with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
         _guard(path.parent)
@@ -78,11 +77,11 @@ def report_error(error: OSError) -> None:
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
     """Report problems with the folder through `tell`, once, within this context."""
-    told: list[str] = []
+    texts: list[str] = []
 
     def tell_once(text: str) -> None:
-        if not told:
-            told.append(text)
+        if not texts:
+            texts.append(text)
             tell(text)
 
     before = _reporter.set(tell_once)

@@ -1,8 +1,7 @@
 """GPU code: functions of one thread, device memory, and launches.
 
-A function ``f(i, ...)`` defines the work of thread `i`. It is traced like a kernel and written as
-PTX, which the driver assembles. :class:`Emulator` runs the same code on the processor, thread
-after thread, for tests without a GPU.
+A function ``f(i, ...)`` defines the work of thread `i`. It is traced like a kernel and compiled to
+PTX. :class:`Emulator` runs the same code on the processor, thread after thread.
 """
 
 import ctypes
@@ -37,7 +36,7 @@ TRIPLE = "nvptx64-nvidia-cuda"
 
 
 class NoCard(Exception):
-    """No GPU can be used; the text says why and what helps."""
+    """No GPU can be used; text and hint are for the user."""
 
     def __init__(self, reason: str, hint: str):
         super().__init__(reason)
@@ -87,10 +86,7 @@ def _raise_to(array, i, value):
 
 @intrinsic
 def aligned_record(array, i, count):
-    """Read the first `count` numbers of record `i`, aligned to 16 bytes.
-
-    Records of less than 16 bytes are aligned to their size.
-    """
+    """Read the first `count` numbers of record `i`, aligned to 16 bytes, or to its size if less."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(array.dtype, count.literal_value)
@@ -99,12 +95,12 @@ def aligned_record(array, i, count):
 
     def codegen(builder, table, i, _):
         kind = ir.VectorType(llvm.register_type(array.dtype), together)
-        place = llvm.item_pointer(builder, array, table, (i, I64(0)))
-        place = builder.bitcast(place, kind.as_pointer())
+        pointer = llvm.item_pointer(builder, array, table, (i, I64(0)))
+        pointer = builder.bitcast(pointer, kind.as_pointer())
         numbers = []
         for k in range(count.literal_value // together):
-            found = builder.load(builder.gep(place, [I64(k)]), align=size * together)
-            numbers += [builder.extract_element(found, I32(lane)) for lane in range(together)]
+            vector = builder.load(builder.gep(pointer, [I64(k)]), align=size * together)
+            numbers += [builder.extract_element(vector, I32(lane)) for lane in range(together)]
         return llvm.make_tuple(builder, result, numbers)
 
     return result(array, types.int64, count), codegen
@@ -119,7 +115,6 @@ def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
 
 
 def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
-    """Write a loop over the work of all threads."""
     entry, builder = _entry(module)
     items = items_at(builder, kinds[1:], entry.args[0])
     with llvm.counted(builder, entry.args[1]) as i:
@@ -128,13 +123,12 @@ def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) ->
 
 
 def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:
-    """Write the entry point of each GPU thread."""
     entry, builder = _entry(module)
     entry.calling_convention = "ptx_kernel"
 
     def special(name: str) -> Any:
-        asked = llvm.external(builder, f"llvm.nvvm.read.ptx.sreg.{name}", I32, [])
-        return builder.zext(builder.call(asked, []), I64)
+        register = llvm.external(builder, f"llvm.nvvm.read.ptx.sreg.{name}", I32, [])
+        return builder.zext(builder.call(register, []), I64)
 
     i = builder.add(builder.mul(special("ctaid.x"), special("ntid.x")), special("tid.x"))
     with builder.if_then(builder.icmp_signed("<", i, entry.args[1])):
@@ -181,7 +175,7 @@ def library() -> bytes:
 def text_of(
     function: Callable, kinds: tuple, on_card: bool, called: dict | None = None
 ) -> tuple[str, str]:
-    """Compile a thread function for its further arguments to module text; return name and text.
+    """Compile a thread function for its further arguments; return name and module text.
 
     `called` as in `values.in_one`.
     """
@@ -216,15 +210,15 @@ def assembled(text: str, processor: str) -> str:
 
 def bandwidth(card: Any, size: int = 1 << 30) -> float:
     """Measure the copy bandwidth of a GPU: bytes read and written per second."""
-    here, there = card.allocate(size), card.allocate(size)
-    fastest = min(card.seconds_of([lambda: card.copy(there, here, size)] * 5))
-    card.free(here)
-    card.free(there)
+    source, target = card.allocate(size), card.allocate(size)
+    fastest = min(card.seconds_of([lambda: card.copy(target, source, size)] * 5))
+    card.free(source)
+    card.free(target)
     return 2 * size / fastest
 
 
 class Code(NamedTuple):
-    """Code of a thread function, like :class:`~karamelo_py.compiler.trace.kernels.Unit`."""
+    """Code of a thread function, like `Unit`."""
 
     name: str
     code: bytes  # empty if it is to be read from the disk
@@ -262,7 +256,6 @@ class _Coded:
         return files.kernel(kinds, None, lambda: self._compiled(function, kinds, called))
 
     def _load(self, code: Code) -> None:
-        """Load code once; the content that a file lacks is read."""
         if code.name not in self._entries:
             content = code.code or cache.code_of(code.file)
             self._entries[code.name] = self.loaded(code._replace(code=content))
@@ -277,7 +270,7 @@ class _Coded:
 
 
 class Emulator(_Coded):
-    """Runs thread functions on the processor, in separate memory."""
+    """Runs thread functions on the processor, in separate memory; documents a device's methods."""
 
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
@@ -295,26 +288,26 @@ class Emulator(_Coded):
         return at
 
     def memory(self) -> tuple[int, int]:
-        """Bytes of free and total memory, larger than any scene."""
+        """Return bytes of free and total memory, larger than any scene."""
         return 1 << 60, 1 << 60
 
     def free(self, address: int) -> None:
-        """Give memory back."""
+        """Free memory."""
         del self._rooms[address]
 
-    def copy_to(self, address: int, there: int, size: int) -> None:
+    def copy_to(self, target: int, source: int, size: int) -> None:
         """Copy from program memory to device memory."""
-        ctypes.memmove(address, there, size)
+        ctypes.memmove(target, source, size)
 
     copy = copy_from = copy_to  # the first argument is the destination
 
     def loaded(self, code: Code) -> Callable:
-        """Make code one that can be launched."""
+        """Load code for launches."""
         (address,) = machine.load(code.code, code.name)
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
-        """Run `count` threads; without compilation, of a Python function."""
+        """Run `count` threads; interpreted, of a Python function."""
         if not INTERPRETED:
             entry(arguments, count)
             return
@@ -335,21 +328,20 @@ class Emulator(_Coded):
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
         """Run launches one after another, and time each."""
-        found = []
+        seconds = []
         for launch in launches:
             begun = perf_counter()
             launch()
-            found.append(perf_counter() - begun)
-        return found
+            seconds.append(perf_counter() - begun)
+        return seconds
 
 
 class Counted(Emulator):
-    """Counts allocated bytes; runs nothing."""
+    """Counts allocated bytes, never freed ones; runs nothing."""
 
     name, taken, copies = "counted", 0, 64
 
     def allocate(self, size: int) -> int:
-        """Count bytes; return an address."""
         self.taken += size
         return 1 << 40
 
@@ -401,19 +393,17 @@ class Card(_Coded):
         self.name = self._do("cuDeviceGetName", 100, device).split(b"\0")[0].decode()
 
     def _do(self, function: str, *arguments: Any) -> Any:
-        error, *found = getattr(self._driver, function)(*arguments)
+        error, *results = getattr(self._driver, function)(*arguments)
         if int(error) != 0:
             name = self._driver.cuGetErrorName(error)[1]
             raise RuntimeError(f"{function}: {name.decode() if name else int(error)}")
-        return found[0] if found else None
+        return results[0] if results else None
 
     def memory(self) -> tuple[int, int]:
-        """Bytes of free and total memory."""
         _, free, whole = self._driver.cuMemGetInfo()
         return int(free), int(whole)
 
     def allocate(self, size: int) -> int:
-        """Allocate memory; return its address."""
         try:
             return int(self._do("cuMemAlloc", max(size, 1)))
         except RuntimeError:
@@ -423,39 +413,34 @@ class Card(_Coded):
             ) from None
 
     def free(self, address: int) -> None:
-        """Free memory."""
         self._do("cuMemFree", address)
 
-    def copy_to(self, address: int, there: int, size: int) -> None:
-        """Copy from program memory to device memory."""
-        self._do("cuMemcpyHtoD", address, there, size)
+    def copy_to(self, target: int, source: int, size: int) -> None:
+        self._do("cuMemcpyHtoD", target, source, size)
 
-    def copy(self, address: int, there: int, size: int) -> None:
+    def copy(self, target: int, source: int, size: int) -> None:
         """Copy within device memory; the first address is the destination."""
-        self._do("cuMemcpyDtoD", address, there, size)
+        self._do("cuMemcpyDtoD", target, source, size)
 
-    def copy_from(self, address: int, there: int, size: int) -> None:
+    def copy_from(self, target: int, source: int, size: int) -> None:
         """Copy from device memory to program memory, the first address."""
-        self._do("cuMemcpyDtoH", address, there, size)
+        self._do("cuMemcpyDtoH", target, source, size)
 
     def made(self, text: str) -> bytes:
-        """Compile module text to PTX."""
         return assembled(text, self.processor).encode() + b"\0"
 
     def loaded(self, code: Code) -> Any:
-        """Make code one that can be launched."""
         room = ctypes.create_string_buffer(code.code)
         module = self._do("cuModuleLoadData", ctypes.addressof(room))
         return self._do("cuModuleGetFunction", module, code.name.encode())
 
     def launch(self, entry: Any, arguments: int, count: int) -> None:
-        """Run `count` threads, in blocks."""
-        given = (arguments, count), (ctypes.c_int64, ctypes.c_int64)
+        values = (arguments, count), (ctypes.c_int64, ctypes.c_int64)
         blocks = -(-count // THREADS)
-        self._do("cuLaunchKernel", entry, blocks, 1, 1, THREADS, 1, 1, 0, self._stream, given, 0)
+        self._do("cuLaunchKernel", entry, blocks, 1, 1, THREADS, 1, 1, 0, self._stream, values, 0)
 
     def together(self, launches: Sequence[Callable]) -> Callable:
-        """Combine several launches to a graph, which the GPU executes by itself."""
+        """Combine several launches to a graph."""
         mode = self._driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_RELAXED
         self._do("cuStreamBeginCapture", self._stream, mode)
         for launch in launches:
@@ -471,11 +456,9 @@ class Card(_Coded):
         return do
 
     def wait(self) -> None:
-        """Wait for all launches."""
         self._do("cuCtxSynchronize")
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
-        """Run launches one after another, and time each."""
         launches = list(launches)
         events = [self._do("cuEventCreate", 0) for _ in range(len(launches) + 1)]
         self._do("cuEventRecord", events[0], self._stream)
@@ -483,14 +466,14 @@ class Card(_Coded):
             launch()
             self._do("cuEventRecord", event, self._stream)
         self.wait()
-        found = [self._do("cuEventElapsedTime", *pair) / 1e3 for pair in pairwise(events)]
+        seconds = [self._do("cuEventElapsedTime", *pair) / 1e3 for pair in pairwise(events)]
         for event in events:
             self._do("cuEventDestroy", event)
-        return found
+        return seconds
 
 
 def card() -> Card | Emulator:
-    """Return the GPU of this machine, or its replacement KARAMELO_PY_GPU=emulated."""
+    """Return the GPU of this machine, or its substitute if KARAMELO_PY_GPU=emulated."""
     return Emulator() if os.environ.get("KARAMELO_PY_GPU") == "emulated" else Card()
 
 
@@ -505,7 +488,7 @@ class _There(NamedTuple):
 
 
 def _extent(array: np.ndarray) -> int:
-    """Bytes from the first item to the end of the last."""
+    """Count bytes from the first item to the end of the last."""
     if not array.size:
         return 0
     steps = zip(array.shape, array.strides, strict=True)
@@ -532,7 +515,7 @@ class Images:
         weakref.finalize(self, _free_all, card, self._rooms).atexit = False
 
     def of(self, thing: Any) -> Any:
-        """Replace the arrays in `thing` (nested tuples of arrays and numbers) by images."""
+        """Replace arrays in nested tuples by images."""
         if isinstance(thing, np.ndarray):
             return self._image(thing)
         if isinstance(thing, tuple):
@@ -541,8 +524,8 @@ class Images:
         return thing
 
     def _image(self, array: np.ndarray) -> np.ndarray:
-        known = self._known.get(id(array))
-        if known is None:
+        image_of = self._known.get(id(array))
+        if image_of is None:
             size, at = _extent(array), array.ctypes.data
             if not size or any(room <= at < room + n for room, n in self._rooms.items()):
                 return array  # already on the device, or empty
@@ -551,8 +534,8 @@ class Images:
             made = np.ndarray(array.shape, array.dtype, memory, 0, array.strides)
             image = made.view(type(array))
             image.flags.writeable = array.flags.writeable
-            known = self._known[id(array)] = _There(address, size, array, image)
-        return known.image
+            image_of = self._known[id(array)] = _There(address, size, array, image)
+        return image_of.image
 
     def _room(self, size: int) -> int:
         address = self.card.allocate(size)
@@ -561,7 +544,7 @@ class Images:
 
     @property
     def size(self) -> int:
-        """Bytes on the card."""
+        """Bytes on the device."""
         return sum(self._rooms.values())
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
@@ -601,14 +584,14 @@ class KernelLaunch:
         called: dict | None = None,
     ):  # fmt: skip
         self.card, self.count, self.name = images.card, count, function.__name__
-        own = images.of(arguments)
+        images_of_arguments = images.of(arguments)
         if INTERPRETED:
-            self.entry, self.at = function, own
+            self.entry, self.at = function, images_of_arguments
             return
-        plan = plan_for(own)
+        plan = plan_for(images_of_arguments)
         self.entry = self.card.compiled(function, plan.types, called)
         self._arguments = images._room(max(plan.text.size, 1))
-        memory, self.at = ArgumentBuffer(own).in_memory(plan, self._arguments)
+        memory, self.at = ArgumentBuffer(images_of_arguments).in_memory(plan, self._arguments)
         images.put_at(self._arguments, memory)
 
     def __call__(self) -> None:

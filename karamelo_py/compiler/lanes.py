@@ -1,11 +1,10 @@
 """Several points at once: lanes of a vector register as a number type of point functions.
 
-A kernel that indexes point arrays (components, points) with a `LaneGroup` instead of a number gets
-`Lanes`: one number for each of 4 or 8 consecutive points. Lanes add, multiply and compare like
-numbers; node numbers in lanes gather from node arrays (nodes, components). Point functions are
-unaware of it; those that a class lists in ``scalarised`` are called lane by lane. Each lane has the
-bits of the same operations on numbers; sums at nodes differ from sums over single points by
-round-off.
+A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
+for each of 4 or 8 consecutive points. Lanes add, multiply and compare like numbers; node numbers in
+lanes gather from node arrays (nodes, components). Point functions are unaware of it; those that a
+class lists in ``scalarised`` are called lane by lane. Each lane has the bits of the same operations
+on numbers; sums at nodes differ from sums over single points by round-off.
 
 The last group of a tile may have fewer points than lanes: missing lanes load the first point, and
 store and contribute nothing. Interpreted kernels process points one by one.
@@ -21,7 +20,7 @@ from numba import types
 
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code import machine
-from karamelo_py.compiler.llvm import I32, I64, Lanes, lane, pack, shuffle, splat
+from karamelo_py.compiler.llvm import I32, I64, Lanes, LaneType, lane, pack, shuffle, splat
 from karamelo_py.compiler.trace.primitives import (
     all_same,
     implements,
@@ -40,17 +39,17 @@ AHEAD = 256  # bytes of point arrays prefetched ahead
 
 @shared
 def largest(a: float) -> float:
-    """Return the maximum over the lanes; for a number, itself."""
+    """Return the maximum over the lanes."""
     return a
 
 
 @implements(largest, Lanes)
 @intrinsic
 def _largest_lane(a):
-    def codegen(builder, given):
-        best = lane(builder, given, 0)
+    def codegen(builder, vector):
+        best = lane(builder, vector, 0)
         for k in range(1, a.width):
-            value = lane(builder, given, k)
+            value = lane(builder, vector, k)
             best = builder.select(builder.fcmp_ordered(">", value, best), value, best)
         return best
 
@@ -66,25 +65,25 @@ def first_false_lane(condition: bool) -> int:
 @implements(first_false_lane, Lanes)
 @intrinsic
 def _first_false(mask):
-    def codegen(builder, given):
-        found = I64(0)
+    def codegen(builder, value):
+        first = I64(0)
         for k in reversed(range(mask.width)):
-            found = builder.select(lane(builder, given, k), found, I64(k))
-        return found
+            first = builder.select(lane(builder, value, k), first, I64(k))
+        return first
 
     return types.int64(mask), codegen
 
 
 @shared
 def first_lane(number: int) -> int:
-    """Return the number in the first lane; for a number, itself."""
+    """Return the number in the first lane."""
     return number
 
 
 @implements(first_lane, Lanes)
 @intrinsic
 def _first(a):
-    return a.scalar(a), lambda builder, given: lane(builder, given, 0)
+    return a.scalar(a), lambda builder, value: lane(builder, value, 0)
 
 
 @shared
@@ -96,18 +95,18 @@ def added(total: float, value: float) -> float:
 @implements(added, Lanes)
 @intrinsic
 def _added_lanes(total, a):
-    def codegen(builder, so_far, given):
+    def codegen(builder, so_far, value):
         for k in range(a.width):
-            so_far = builder.fadd(so_far, lane(builder, given, k))
+            so_far = builder.fadd(so_far, lane(builder, value, k))
         return so_far
 
     return total(total, a), codegen
 
 
 def beside(first: int, steps: int) -> int:
-    """Return `first` + `steps` as a node number: an array index, like `index`.
+    """Return `first` + `steps` as an array index.
 
-    For lanes both parts are stored, so that neighbours of the first nodes are addressed from these.
+    For lanes both parts are stored, so that neighbours are addressed relative to the first nodes.
     """
     return first + steps
 
@@ -132,8 +131,8 @@ def prefetch(array: Any, at: tuple) -> None:
     """Prefetch items that a loop over groups of points will read after this one."""
 
 
-class LaneGroup(types.Type):
-    """The numbers of up to `width` consecutive points."""
+class LaneGroup(LaneType):
+    """Type of the numbers of up to `width` consecutive points."""
 
     def __init__(self, width: int):
         self.width = width
@@ -144,8 +143,8 @@ class LaneGroup(types.Type):
         return ir.LiteralStructType([I64, I64])
 
 
-class Beside(types.Type):
-    """Nodes at a distance from those in lanes, the same in all lanes."""
+class Beside(LaneType):
+    """Type of nodes at a distance from those in lanes, the same in all lanes."""
 
     def __init__(self, nodes: Lanes):
         self.nodes, self.width = nodes, nodes.width
@@ -175,7 +174,7 @@ def lanes_for(bits: int) -> type:
 
 @intrinsic
 def group(tag, first, count):
-    """The `count` points from `first` on, at most as many as the tag's lanes."""
+    """Make a group of the `count` points from `first` on, at most as many as the tag's lanes."""
     made = LaneGroup(tag.instance_class.width)
 
     def codegen(builder, _, *numbers):
@@ -186,16 +185,13 @@ def group(tag, first, count):
 
 @intrinsic
 def spread(tag, value):
-    """The same number in all lanes."""
+    """Return the same number in all lanes."""
     lanes = Lanes(value, tag.instance_class.width)
     return lanes(tag, value), lambda builder, _, number: splat(builder, number, lanes)
 
 
 def room_for(points, numbers):
-    """Temporary array (components, points) for such numbers of this many points.
-
-    It is on the stack of the function.
-    """
+    """Temporary array (components, points) for such numbers, on the stack of the function."""
     return np.zeros((len(numbers), points), np.asarray(numbers[0]).dtype)
 
 
@@ -229,7 +225,7 @@ def _masked(builder: Any, p: Any, width: int) -> Any:
 @intrinsic
 def _present(p):
     mask = Lanes(types.boolean, p.width)
-    return mask(p), lambda builder, given: _masked(builder, given, p.width)
+    return mask(p), lambda builder, value: _masked(builder, value, p.width)
 
 
 @implements(of_present, LaneGroup)
@@ -239,15 +235,15 @@ def _of_present(p, value):
 
 def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> Any:
     """Branch: the value of `first` if the condition holds, else of `second`."""
-    found = []
+    results = []
     with builder.if_else(condition) as branches:
         for branch, write in zip(branches, (first, second), strict=True):
             with branch:
-                found.append((write(), builder.block))
-    if found[0][0] is None:
+                results.append((write(), builder.block))
+    if results[0][0] is None:
         return None
-    chosen = builder.phi(found[0][0].type)
-    for value, block in found:
+    chosen = builder.phi(results[0][0].type)
+    for value, block in results:
         chosen.add_incoming(value, block)
     return chosen
 
@@ -271,9 +267,9 @@ def _all_or_masked(
     return _either(builder, full, lambda: whole(at, size), masked)
 
 
-def _points_at(builder: Any, array: types.Array, value: Any, at: Any, place: Any) -> tuple:
-    """Address of an item whose last index is a group (its first point), and the group."""
-    kinds, values = _indices(builder, at, place)
+def _points_at(builder: Any, array: types.Array, value: Any, at: Any, index: Any) -> tuple:
+    """Return the address of an item whose last index is a group, and the group."""
+    kinds, values = _indices(builder, at, index)
     first = builder.extract_value(values[-1], 0)
     # Points are contiguous in each row, for any distance between rows.
     size = I64(array.dtype.bitwidth // 8)
@@ -296,8 +292,8 @@ def _load_points(array, at):
     lanes = Lanes(array.dtype, lanes_of(at))
     vector = llvm.register_type(lanes)
 
-    def codegen(builder, value, place):
-        pointer, p = _points_at(builder, array, value, at, place)
+    def codegen(builder, value, index):
+        pointer, p = _points_at(builder, array, value, at, index)
 
         def partly(name, here, align, mask):
             """Lanes without a point get the first point's number."""
@@ -319,8 +315,8 @@ def _load_points(array, at):
 def _store_points(array, at, value):
     lanes = Lanes(array.dtype, lanes_of(at))
 
-    def codegen(builder, table, place, number):
-        pointer, p = _points_at(builder, array, table, at, place)
+    def codegen(builder, table, index, number):
+        pointer, p = _points_at(builder, array, table, at, index)
 
         def partly(name, here, align, mask):
             kinds = [number.type, here.type, I32, mask.type]
@@ -347,39 +343,36 @@ def ask(builder: Any, pointer: Any, ahead: Any) -> None:
 @implements(prefetch, LaneGroup)
 @intrinsic
 def _prefetch(array, at):
-    def codegen(builder, value, place):
-        pointer, _ = _points_at(builder, array, value, at, place)
+    def codegen(builder, value, index):
+        pointer, _ = _points_at(builder, array, value, at, index)
         ask(builder, pointer, I32(AHEAD))
 
     return types.void(array, at), codegen
 
 
 def at_lane(builder, kind, array, of, at, k, *rest):
-    """Address of an item of an array whose first index is lane `k` of nodes `at`.
-
-    For a number without lanes it is the same for all.
-    """
+    """Return the address of an item whose first index is lane `k` of nodes `at`, or number `at`."""
     if not lanes_of(of):
         return llvm.item_pointer(builder, kind, array, [at, *rest])
     steps = None
     if isinstance(of, Beside):
         of, at, steps = of.nodes, *(builder.extract_value(at, part) for part in (0, 1))
     first = llvm.cast(builder, lane(builder, at, k), of.scalar, types.intp)
-    found = llvm.item_pointer(builder, kind, array, [first, *rest])
+    pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
-        return found
+        return pointer
     # Relative to the first node, whose address is computed once for its neighbours.
     stride = llvm.ArrayParts(builder, kind, array).strides[0]
-    return llvm.byte_pointer(builder, found, builder.mul(steps, stride))
+    return llvm.byte_pointer(builder, pointer, builder.mul(steps, stride))
 
 
 @intrinsic
 def _gather(array, at):
-    """Items of an array at numbers in lanes, the first index."""
+    """Load items of an array at numbers in lanes, the first index."""
     lanes = Lanes(array.dtype, lanes_of(at))
 
-    def codegen(builder, value, place):
-        kinds, values = _indices(builder, at, place)
+    def codegen(builder, value, index):
+        kinds, values = _indices(builder, at, index)
         rest = _as_places(builder, kinds[1:], values[1:])
 
         def of(k):
@@ -428,8 +421,8 @@ def _is_one(nodes):
 def _beside(first, steps):
     made = Beside(first)
 
-    def codegen(builder, *given):
-        return llvm.make_struct(builder, made.register_type(), given)
+    def codegen(builder, *values):
+        return llvm.make_struct(builder, made.register_type(), values)
 
     return made(first, types.intp), codegen
 

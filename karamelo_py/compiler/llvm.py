@@ -1,4 +1,4 @@
-"""LLVM types of kernels, in registers and in memory, and code that takes them apart."""
+"""LLVM types of kernels, in registers and in memory, and code that takes values apart."""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -14,7 +14,13 @@ NOTHING = I8.as_pointer()  # None, classes and functions
 _REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
 
 
-class Lanes(types.Type):
+class LaneType(types.Type):
+    """A type of several points at once."""
+
+    width: int
+
+
+class Lanes(LaneType):
     """`width` numbers of a scalar type, side by side in a vector register."""
 
     def __init__(self, scalar: types.Type, width: int):
@@ -27,10 +33,9 @@ class Lanes(types.Type):
 
 @functools.cache
 def register_type(kind: types.Type) -> ir.Type:
-    """Give the LLVM type of a value in registers."""
-    own = getattr(kind, "register_type", None)  # of types of our own
-    if own is not None:
-        return own()
+    """Return the LLVM type of a value in registers."""
+    if hasattr(kind, "register_type"):
+        return kind.register_type()
     if isinstance(kind, types.Boolean):
         return I1
     if isinstance(kind, types.Integer):
@@ -47,7 +52,7 @@ def register_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def memory_type(kind: types.Type) -> ir.Type:
-    """Give the LLVM type of a value in memory, where truth takes a byte."""
+    """Return the LLVM type of a value in memory, where booleans take a byte."""
     if isinstance(kind, types.Boolean):
         return I8
     if isinstance(kind, types.Record):
@@ -59,19 +64,19 @@ def memory_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def is_empty(kind: types.Type) -> bool:
-    """Tell whether there is nothing in a value of a type, as in None and in tuples of tags."""
+    """Tell whether a type has no value, as None and tuples of tags."""
     if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
         return all(map(is_empty, kind))
     return register_type(kind) == NOTHING and not isinstance(kind, types.Record)
 
 
 def nothing() -> ir.Constant:
-    """Give the value of None, of classes and of functions."""
+    """Return the value of None, of classes and of functions."""
     return ir.Constant(NOTHING, None)
 
 
 def constant(builder: Any, kind: types.Type, value: Any) -> ir.Constant:
-    """Give a number, or an array, as a constant of this type."""
+    """Return a number, or an array, as a constant of this type."""
     if isinstance(kind, types.Array):
         return _constant_array(builder, kind, np.asarray(value))
     if isinstance(kind, types.Float):
@@ -91,11 +96,11 @@ def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
 
 
 def in_module(builder: Any, content: ir.Constant, name: str) -> ir.GlobalVariable:
-    """Put a constant into memory; where it is."""
+    """Put a constant into memory."""
     name = builder.module.get_unique_name(name)
-    place = ir.GlobalVariable(builder.module, content.type, name)
-    place.initializer, place.global_constant, place.linkage = content, True, "internal"
-    return place
+    variable = ir.GlobalVariable(builder.module, content.type, name)
+    variable.initializer, variable.global_constant, variable.linkage = content, True, "internal"
+    return variable
 
 
 def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
@@ -127,9 +132,10 @@ def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
 
 
 def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
-    """Name LLVM's instruction that converts a number; None where there is nothing to do."""
+    """Name the instruction that converts a number; None if there is nothing to do."""
     whole, real = types.Integer | types.Boolean, types.Float
-    signed, width = getattr(kind, "signed", False), getattr(kind, "bitwidth", 1)
+    signed = isinstance(kind, types.Integer) and kind.signed
+    width = kind.bitwidth if isinstance(kind, types.Integer | real) else 1
     if isinstance(kind, whole) and isinstance(wanted, types.Integer) and width != wanted.bitwidth:
         return "trunc" if width > wanted.bitwidth else "sext" if signed else "zext"
     if isinstance(kind, whole) and isinstance(wanted, real):
@@ -145,7 +151,7 @@ def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
 
 
 def scalar_of(kind: types.Type) -> types.Type:
-    """Return the type of the numbers in lanes; other types are returned unchanged."""
+    """Return the type of the numbers in lanes; other types unchanged."""
     return kind.scalar if isinstance(kind, Lanes) else kind
 
 
@@ -190,9 +196,9 @@ def room(builder: Any, kind: ir.Type) -> Any:
         return builder.alloca(kind)
 
 
-def at(builder: Any, pointer: Any, *places: int) -> Any:
-    """Compute the address of an item of a structure or array in memory."""
-    return builder.gep(pointer, [I32(place) for place in places], inbounds=True)
+def at(builder: Any, pointer: Any, *indices: int) -> Any:
+    """Return the address of an item of a structure or array in memory."""
+    return builder.gep(pointer, [I32(index) for index in indices], inbounds=True)
 
 
 def put(builder: Any, kind: types.Type, value: Any, pointer: Any, align: int | None = None) -> None:
@@ -250,7 +256,7 @@ def make_array(
 
 
 class ArrayParts:
-    """Take an array apart, each part when it is asked for."""
+    """Parts of an array, extracted on access."""
 
     def __init__(self, builder: Any, kind: types.Array, value: Any):
         self.builder, self.kind, self.value = builder, kind, value
@@ -271,32 +277,32 @@ class ArrayParts:
 def item_pointer(
     builder: Any, kind: types.Array, value: Any, indices: Sequence, last: Any = None
 ) -> Any:
-    """Give the address of an item; `last`, if it is known, is the stride of the last index."""
+    """Return the address of an item; `last` is the stride of the last index, if known."""
     parts = ArrayParts(builder, kind, value)
     if kind.layout == "C":
-        place = indices[0]
+        offset = indices[0]
         for index, count in zip(indices[1:], parts.shape[1:], strict=True):
-            place = builder.add(builder.mul(place, count), index)
-        return builder.gep(parts.data, [place])
+            offset = builder.add(builder.mul(offset, count), index)
+        return builder.gep(parts.data, [offset])
     strides = parts.strides if last is None else [*parts.strides[:-1], last]
     products = [builder.mul(s, i) for s, i in zip(strides, indices, strict=True)]
     return byte_pointer(builder, parts.data, functools.reduce(builder.add, products))
 
 
 def byte_pointer(builder: Any, pointer: Any, offset: Any) -> Any:
-    """Compute the address at an offset in bytes."""
-    place = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
-    return builder.bitcast(place, pointer.type)
+    """Return the address at an offset in bytes."""
+    address = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
+    return builder.bitcast(address, pointer.type)
 
 
 # --- functions and loops --------------------------------------------------------------------------
 
 
 def external(builder: Any, name: str, result: ir.Type, arguments: Sequence[ir.Type]) -> ir.Function:
-    """Declare a function that is elsewhere, or one of LLVM's own."""
-    known = builder.module.globals.get(name)
+    """Declare an external function, or one of LLVM."""
+    declared = builder.module.globals.get(name)
     kind = ir.FunctionType(result, arguments)
-    return known if known is not None else ir.Function(builder.module, kind, name)
+    return declared if declared is not None else ir.Function(builder.module, kind, name)
 
 
 def call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
@@ -320,7 +326,7 @@ def of_library(name: str) -> Callable:
 
 @contextmanager
 def counted(builder: Any, count: Any) -> Iterator[Any]:
-    """Write a loop: what is written within is done for each number below `count`."""
+    """Write a loop over the numbers below `count`; its body is written within this context."""
     before = builder.block
     head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))
     builder.branch(head)

@@ -12,7 +12,7 @@ from karamelo_py.compiler.trace.primitives import implements
 
 @noinline
 def _whole(a, down, up):
-    """Round to an integer, by sums, which every processor has."""
+    """Round to an integer by sums, which every processor has."""
     if not abs(a) < 2.0**52:
         return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
@@ -53,7 +53,7 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Power; small integer exponents are frequent, and pow costs ten multiplications."""
+    """Avoid pow for small integer exponents: it costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)
@@ -157,7 +157,7 @@ def of_one(op, a):
 @implements(of_one)
 @noinline
 def _function_of(op, a):
-    """Any function of one number, in one chain of branches to save code."""
+    """One chain of branches, to save code."""
     for number, do in _NUMBERED_UNARY:
         if op == number:
             return do(a)

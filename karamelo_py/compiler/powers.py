@@ -1,8 +1,8 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
-C library functions would be called number by number. These are series after range reduction (Muller
-2016, "Elementary Functions", chapter 11). Their relative error is about two round-off errors; for
-powers, times |y ln x| if that is above 1. Interpreted, they are Python's.
+Series after range reduction (Muller 2016, "Elementary Functions", chapter 11). Their relative error
+is about two round-off errors; for powers, times |y ln x| if that is above 1. Interpreted, they are
+Python's.
 """
 
 import math
@@ -71,8 +71,8 @@ def _taken_apart(x):
     number, whole, short, mantissa, _ = _bits(x)
     root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # of 1/2
 
-    def codegen(builder, given):
-        bits = builder.bitcast(given, whole)
+    def codegen(builder, value):
+        bits = builder.bitcast(value, whole)
         shift = _constant(whole, mantissa)
         e = builder.ashr(builder.sub(bits, _constant(whole, root)), shift)
         m = builder.bitcast(builder.sub(bits, builder.shl(e, shift)), number)
@@ -91,9 +91,9 @@ def _scaled(x, n):
     def codegen(builder, value, n):
         n = builder.fptosi(n, short)
         half = builder.ashr(n, _constant(short, 1))
-        for part in (half, builder.sub(n, half)):
+        for exponent in (half, builder.sub(n, half)):
             # In two steps: results reach infinity and denormal numbers.
-            e = builder.add(part, _constant(short, bias))
+            e = builder.add(exponent, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)
             factor = builder.bitcast(builder.shl(e, _constant(whole, mantissa)), number)

@@ -1,9 +1,8 @@
-"""Dual numbers: a value and its derivatives with respect to some others, in forward mode.
+"""Dual numbers: a value and its derivatives, in forward mode.
 
 A point function evaluated with them returns exact derivatives: for the stress of a law, its
 consistent tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3). Values have the
-same bits as without derivatives. A slope that is the literal 0 is known to vanish, and no code is
-written for it.
+same bits as without derivatives. No code is written for a slope that is the literal 0.
 """
 
 import math
@@ -116,7 +115,7 @@ def is_tensor(thing: Any) -> bool:
 
 
 def value_of(x: Any) -> Any:
-    """Return a number without slopes; for tuples and tensors, all their numbers."""
+    """Remove the slopes of a number, or of all numbers of a tuple."""
     if isinstance(x, Dual):
         return x.value
     if isinstance(x, tuple):

@@ -1,4 +1,4 @@
-"""Parallel loops: one implementation for all kernels, which calls the loop body by address.
+"""Parallel loops, one implementation for all kernels, which calls the loop body by address.
 
 The arguments of a loop stay in memory; the body is a function of their address and an index.
 
@@ -55,7 +55,7 @@ class Threaded(NamedTuple):
 
 
 def many_threads() -> bool:
-    """Tell whether many threads may write to one number at a time: see `values.in_one`."""
+    """Tell whether many threads may write to one number at a time, as on a GPU."""
     return False
 
 
@@ -67,12 +67,12 @@ def _many_threads(lowering: Any) -> bool:
 # --- shared memory words ----------------------------------------------------------------------
 
 
-def _word(builder: Any, place: Any) -> Any:
-    return builder.inttoptr(place, I64.as_pointer())
+def _word(builder: Any, address: Any) -> Any:
+    return builder.inttoptr(address, I64.as_pointer())
 
 
 @intrinsic
-def read(place):
+def read(address):
     """Load a word with acquire ordering."""
 
     def codegen(builder, at):
@@ -82,7 +82,7 @@ def read(place):
 
 
 @intrinsic
-def write(place, value):
+def write(address, value):
     """Store a word with release ordering."""
 
     def codegen(builder, at, number):
@@ -92,7 +92,7 @@ def write(place, value):
 
 
 @intrinsic
-def add(place, value):
+def add(address, value):
     """Add to a word atomically."""
 
     def codegen(builder, at, number):
@@ -102,12 +102,12 @@ def add(place, value):
 
 
 @intrinsic
-def replaced(place, old, new):
-    """Compare and swap: store `new` if the word is `old`; return whether it was."""
+def replaced(address, old, new):
+    """Store `new` if the word is `old`, atomically; return whether it was."""
 
     def codegen(builder, at, *numbers):
-        found = builder.cmpxchg(_word(builder, at), *numbers, "acq_rel", "acquire")
-        return builder.extract_value(found, 1)
+        result = builder.cmpxchg(_word(builder, at), *numbers, "acq_rel", "acquire")
+        return builder.extract_value(result, 1)
 
     return types.boolean(types.intp, types.intp, types.intp), codegen
 
@@ -169,13 +169,13 @@ if hasattr(os, "register_at_fork"):
 
 
 def _share_out(
-    count: int, part: int, task: int, arguments: int, threads: int, failure: int
+    count: int, run_range: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
     """Run a task for each index below `count`, by `part`, a function of a range of indices.
 
     `threads` is the number of threads; 0 for all.
     """
-    do, threads = _PART(part), threads or config.NUMBA_NUM_THREADS
+    do, threads = _PART(run_range), threads or config.NUMBA_NUM_THREADS
     size = min(count, threads)
     ends = [count * k // size for k in range(size + 1)] if size else [0, 0]
     pairs = pairwise(ends[1:])
@@ -198,20 +198,20 @@ machine.publish_python("karamelo_share_out", ctypes.CFUNCTYPE(None, *_SHARE_OUT)
 
 
 class _Task(NamedTuple):
-    """Calls a function of the items of a held tuple at an address, and an index."""
+    """Calls a function of an index and the items of a held tuple at an address."""
 
     function: Callable
-    held: HeldTuple
+    kind: HeldTuple
 
-    def __call__(self, place: Value, number: Value) -> None:
+    def __call__(self, address: Value, number: Value) -> None:
         lowering = now()
-        pointer = lowering.builder.inttoptr(place._value, self.held.register_type())
-        lowering.seen(self.function)(*HeldValue(self.held, pointer), number)
+        pointer = lowering.builder.inttoptr(address._value, self.kind.register_type())
+        lowering.seen(self.function)(*HeldValue(self.kind, pointer), number)
 
 
 def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
     made = lowering.function(name, run, (types.intp,) * count, types.none)
-    if getattr(made, "raises", False):
+    if hasattr(made, "raises"):
         lowering.builder.function.raises = True
     return Value(types.intp, lowering.builder.ptrtoint(made, I64))
 
@@ -219,13 +219,13 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
     """Store items; return the addresses of a function of them and an index, and of the items."""
-    held = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
-    chosen = traced(function.seen, (*held, types.intp))
-    there = held_as(lowering, items, held)
+    kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
+    chosen = traced(function.seen, (*kind, types.intp))
+    stored = held_as(lowering, items, kind)
     if lowering.builder is None:
         return Value(types.intp, None), Value(types.intp, None)
-    task = _address(lowering, chosen.name, _Task(function.seen, held), 2)
-    return task, Value(types.intp, lowering.builder.ptrtoint(there._value, I64))
+    task = _address(lowering, chosen.name, _Task(function.seen, kind), 2)
+    return task, Value(types.intp, lowering.builder.ptrtoint(stored._value, I64))
 
 
 @intrinsic
@@ -240,7 +240,7 @@ def _call(task, arguments, number):
 
 @in_kernels
 def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
-    """Call a function; its exceptions are left to the caller of the present one."""
+    """Call a function whose exceptions are left to the caller of the present one."""
     lowering.regardless = True
     try:
         return function(*arguments)
@@ -259,9 +259,9 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
     chosen = traced(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
-        part = _address(lowering, chosen.name, chosen.run, 4)
-        given = (count, part, task, arguments, threads)
-        numbers = [lowering.lowered(number, types.intp) for number in given]
+        run_range = _address(lowering, chosen.name, chosen.run, 4)
+        arguments_of_call = (count, run_range, task, arguments, threads)
+        numbers = [lowering.lowered(number, types.intp) for number in arguments_of_call]
         function = llvm.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
         builder.call(function, [*numbers, failure_at(builder)])
 
@@ -297,8 +297,7 @@ def new_team(threads: int) -> np.ndarray:
 
 @noinline
 def _take_part(team, k):
-    """Process the indices of thread `k` in the present loop, its own range first; return the
-    number.
+    """Process indices of the present loop, those of thread `k` first; return their number.
 
     Data of a thread is in its caches, and moving it may cost more than the work. So others take
     from a range only if it does not shrink for a while.
@@ -396,10 +395,7 @@ def shared_out(function: Callable) -> Callable:
 
 
 def by_threads(share: Callable) -> Callable:
-    """Make the kernel ``f(mode, count, ...)`` that runs ``share(..., k)`` for each k below `count`.
-
-    The threads of `mode` divide the indices.
-    """
+    """Make the kernel ``f(mode, count, ...)``: ``share(..., k)`` for each k below `count`."""
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 
@@ -413,10 +409,7 @@ def by_threads(share: Callable) -> Callable:
 
 
 def by_team(function: Callable) -> Callable:
-    """Make ``f(mode, ...)``: ``function(mode, ...)``, an integer, run by a team if there is one.
-
-    The first thread executes it, the others serve.
-    """
+    """Make ``f(mode, ...)``: ``function(mode, ...)``, an integer, run by a team if there is one."""
     inner = noinline(function)
 
     @shared

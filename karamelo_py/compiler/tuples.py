@@ -1,11 +1,11 @@
-"""Records of arrays, nested tuples as flat sequences, and arrays that may be absent.
+"""Records of arrays, and nested tuples as flat sequences.
 
 Comprehensions make lists, which Python interprets in two thirds of the time.
 """
 
 
 def flat(nested):
-    """The numbers of nested tuples in order."""
+    """List the numbers of nested tuples in order."""
     numbers = ()
     for item in nested:
         numbers += flat(item) if isinstance(item, tuple) else (item,)
@@ -13,7 +13,7 @@ def flat(nested):
 
 
 def nested_as(like, numbers):
-    """Numbers in order, nested like `like`, in the same classes."""
+    """Nest numbers like `like`, in the same classes."""
     made, begin = [], 0
     for item in like:
         inner = isinstance(item, tuple)
@@ -31,8 +31,5 @@ def count_in(nested):
 
 
 def record(table, i):
-    """Row `i` of a NamedTuple of arrays: the same NamedTuple of scalars.
-
-    Nested NamedTuples become NamedTuples of scalars, too.
-    """
+    """Row `i` of a NamedTuple of arrays, perhaps nested: the same NamedTuple of scalars."""
     return type(table)(*[record(c, i) if isinstance(c, tuple) else c[i] for c in table])

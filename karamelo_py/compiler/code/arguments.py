@@ -1,7 +1,4 @@
-"""Arguments of kernels, written to memory by Python and passed as one address.
-
-The memory has the layout of held tuples (:mod:`karamelo_py.compiler.trace.held`).
-"""
+"""Arguments of kernels: Python writes them to memory, and passes one address."""
 
 import ctypes
 import functools
@@ -21,7 +18,7 @@ from karamelo_py.compiler.trace.session import session
 
 
 class _Array(NamedTuple):
-    """Facts about a living array; NumPy does not resize arrays that are referenced."""
+    """A living array; NumPy does not resize arrays that are referenced."""
 
     alive: weakref.ref  # another array may get the id of a deleted one
     shape: tuple[int, ...]
@@ -32,12 +29,12 @@ class _Array(NamedTuple):
 
 def _array(array: np.ndarray) -> _Array:
     number = id(array)
-    known = session.arrays.get(number)
+    entry = session.arrays.get(number)
     if (
-        known is None
-        or known.alive() is not array
-        or known.shape != array.shape
-        or known.writeable is not array.flags.writeable
+        entry is None
+        or entry.alive() is not array
+        or entry.shape != array.shape
+        or entry.writeable is not array.flags.writeable
     ):
         flags = array.flags
         kind = (
@@ -48,15 +45,15 @@ def _array(array: np.ndarray) -> _Array:
         kinds = session.array_types
         kept = kinds[kind] if kind in kinds else kinds.setdefault(kind, next(session.numbers))
         alive = weakref.ref(array, functools.partial(_drop, number))
-        known = _Array(alive, array.shape, flags.writeable, kept, words)
-        session.arrays[number] = known
-    return known
+        entry = _Array(alive, array.shape, flags.writeable, kept, words)
+        session.arrays[number] = entry
+    return entry
 
 
 def _drop(number: int, alive: weakref.ref) -> None:
     """Remove a deleted array, unless another one has its id."""
-    known = session.arrays.get(number)
-    if known is not None and known.alive is alive:
+    entry = session.arrays.get(number)
+    if entry is not None and entry.alive is alive:
         session.arrays.pop(number, None)
 
 
@@ -66,10 +63,7 @@ def forget_array(array: np.ndarray) -> None:
 
 
 class Address(int):
-    """Address of a Python function for kernels; the function lives as long as this number.
-
-    A tuple of arguments that contains it may outlive its maker without dangling addresses.
-    """
+    """Address of a Python function for kernels; the function lives as long as this number."""
 
     callback: Any
 
@@ -84,19 +78,19 @@ class Plan(NamedTuple):
 
 
 class ArgumentBuffer:
-    """Collects the words of some arguments: held tuples one after another, inner first."""
+    """Collects the words of arguments: held tuples one after another, inner first."""
 
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
         self.kinds: list = []  # determine the types of the arguments
         self.words: list = []  # numbers in the tuples; 0 for a nested tuple
-        own, _ = self._of(arguments)
-        self.words += own
+        words, _ = self._of(arguments)
+        self.words += words
 
     def _of(self, items: tuple) -> tuple[list, bool]:
         """Return the words of a tuple, and whether it contains arrays."""
-        own: list = []
+        words: list = []
         arrays = False
         kinds = self.kinds
         kinds.append(type(items))
@@ -104,35 +98,35 @@ class ArgumentBuffer:
         for item in items:
             kind = type(item)
             if issubclass(kind, np.ndarray):
-                known = _array(item)
-                kinds.append(known.kind)
-                own += known.words
+                entry = _array(item)
+                kinds.append(entry.kind)
+                words += entry.words
                 arrays = True
             elif kind is float or kind is int or kind is bool:
                 kinds.append(kind)
-                own.append(item)
+                words.append(item)
             elif kind is Address:
                 kinds.append(int)
-                own.append(item)
+                words.append(item)
             elif issubclass(kind, tuple):
-                inner, held = self._of(item)
-                if held:
+                inner, has_arrays = self._of(item)
+                if has_arrays:
                     self.words += inner
-                    own.append(0)
+                    words.append(0)
                     arrays = True
                 else:
-                    own += inner
+                    words += inner
             elif issubclass(kind, np.generic):
                 kinds.append(item.dtype)
                 signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
-                own.append(signed.item())  # same bits: words are signed
+                words.append(signed.item())  # same bits: words are signed
             else:  # nothing to write: None, classes
                 kinds.append(item)
-                own.append(0)
-        return own, arrays
+                words.append(0)
+        return words, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments to memory; also return the offset of the outermost tuple.
+        """Write the arguments to memory; return it and the address of the outermost tuple.
 
         `at` is the address that the memory will be copied to, if it is not used in place.
         """
@@ -154,10 +148,7 @@ def _aligned(at: int, to: int) -> int:
 
 
 def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, int]:
-    """Add offsets and formats of the words of a type that starts at `at`.
-
-    Returns its end and alignment; LLVM's layout is C's.
-    """
+    """Add offsets and formats of the words of a type; return its end and alignment."""
     if isinstance(kind, ir.ArrayType | ir.Aggregate):
         items = [kind.element] * kind.count if isinstance(kind, ir.ArrayType) else kind.elements
         to = max([_lay(item, 0, [])[1] for item in items], default=1)
@@ -181,11 +172,11 @@ def plan_for(arguments: tuple) -> Plan:
     tuples: list[tuple[int, int]] = []
     end = 0
 
-    def lay(held: Any) -> int:
+    def lay(kind: Any) -> int:
         """Return the offset of a held tuple, which follows the tuples in it."""
         nonlocal end
-        inner = [lay(item) if is_held(item) else None for item in held]
-        model = held.register_type().pointee
+        inner = [lay(item) if is_held(item) else None for item in kind]
+        model = kind.register_type().pointee
         at = begin = _aligned(end, 16)
         for k, kind in enumerate(model.elements):
             if inner[k] is not None:
@@ -197,9 +188,9 @@ def plan_for(arguments: tuple) -> Plan:
     held = HeldTuple(tuple(held_type(typeof(argument)) for argument in arguments))
     first = lay(held)
     text, at = "=", 0
-    for place, word in places:
-        text += f"{place - at}x{word}"
-        at = place + struct.calcsize(f"={word}")
+    for offset, word in places:
+        text += f"{offset - at}x{word}"
+        at = offset + struct.calcsize(f"={word}")
     return Plan(struct.Struct(text), tuple(tuples), first, held.types)
 
 
@@ -221,7 +212,7 @@ def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
         return bool(number) if isinstance(kind, types.Boolean) else number
 
     def read(memory: bytearray) -> Any:
-        numbers = (struct.unpack_from(f"={text}", memory, place)[0] for place, text in places)
+        numbers = (struct.unpack_from(f"={text}", memory, offset)[0] for offset, text in places)
         return made(kind, numbers)
 
     return max(size, 1), read

@@ -59,7 +59,7 @@ def _wider(a: types.Type, b: types.Type) -> types.Type:
 
 
 def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
-    """Return the common lanes of two types, at least one of them lanes; literals adapt."""
+    """Return the common type of lanes and numbers; literals adapt."""
     if isinstance(a, Lanes) and isinstance(b, Lanes):
         if a == b:
             return a
@@ -78,7 +78,7 @@ def _is_whole(kind: types.Type) -> bool:
 
 
 def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None) -> Callable:
-    """Make an operation on one number, cast to a type: ``write(builder, kind, value)``."""
+    """Make an operation on a number cast to a type: ``write(builder, kind, value)``."""
 
     def operation(a: types.Type) -> Operation | None:
         kind = kind_of(a)
@@ -90,8 +90,6 @@ def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None)
 
 
 def _binary(kind_of: Callable, write: Callable) -> Callable:
-    """Make an operation on two numbers, likewise."""
-
     def operation(a: types.Type, b: types.Type) -> Operation | None:
         kind = kind_of(a, b)
         return kind and Operation(
@@ -177,9 +175,9 @@ def _whole_division(remainder: bool) -> Callable:
 
 def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
     zero, one = x.type(0), x.type(1)
-    known = isinstance(y, ir.Constant) and y.constant not in (0, -1)
+    safe = isinstance(y, ir.Constant) and y.constant not in (0, -1)
     bad = None
-    if not known:
+    if not safe:
         bad = builder.icmp_signed("==", y, zero)
         if kind.signed:  # the smallest number divided by -1
             least = builder.icmp_signed("==", x, x.type(kind.minval))
@@ -193,7 +191,7 @@ def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any
         rest = builder.select(other, builder.add(rest, y), rest)
     else:
         quotient, rest = builder.udiv(x, y), builder.urem(x, y)
-    if known:
+    if safe:
         return quotient, rest
     return tuple(builder.select(bad, zero, part) for part in (quotient, rest))
 
@@ -225,7 +223,7 @@ def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, A
 
 
 def _power(a: types.Type, b: types.Type) -> Operation | None:
-    """Return a power; known integer exponents become products."""
+    """Compile known integer exponents as products."""
     if isinstance(b, types.IntegerLiteral) and abs(b.literal_value) <= 0x10000:
         kind, exponent = common(a, a), b.literal_value
         if exponent < 0 and _is_whole(kind):
@@ -312,7 +310,7 @@ def _to(kind: types.Type) -> Callable:
 
 
 def _real_of(kind: types.Type) -> types.Type | None:
-    """Return the real type that a type converts to; integers in lanes do not convert."""
+    """Return the real type that a type converts to; None for integer lanes."""
     if isinstance(kind, Lanes):
         return None if _is_whole(kind) else kind
     return kind if isinstance(kind, types.Float) else types.float64
@@ -353,9 +351,9 @@ def _frexp(a: types.Type) -> Operation:
     result = types.Tuple((kind, types.int32))
 
     def parts(builder: Any, values: list) -> Any:
-        place = llvm.room(builder, llvm.I32)
-        fraction = llvm.call(builder, "frexp", values[0].type, [*values, place])
-        return llvm.make_tuple(builder, result, [fraction, builder.load(place)])
+        room = llvm.room(builder, llvm.I32)
+        fraction = llvm.call(builder, "frexp", values[0].type, [*values, room])
+        return llvm.make_tuple(builder, result, [fraction, builder.load(room)])
 
     return Operation(result, (kind,), parts)
 
@@ -380,8 +378,8 @@ def _numpy_extreme(sign: str) -> Callable:
         def extreme(builder: Any, values: list) -> Any:
             first, second = values
             chosen = builder.fcmp_unordered(sign, first, second)
-            known = builder.fcmp_ordered("ord", second, second)
-            return builder.select(builder.and_(chosen, known), first, second)
+            ordered = builder.fcmp_ordered("ord", second, second)
+            return builder.select(builder.and_(chosen, ordered), first, second)
 
         return Operation(kind, (kind, kind), extreme)
 
@@ -404,12 +402,12 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
-    """Python's gamma function, whose bits do not depend on the C library."""
+    """Call Python's gamma function, whose bits do not depend on the C library."""
     double = llvm.cast(builder, x, kind, types.float64)
-    given = exceptions.passed_to(builder, builder.function)
-    name = "karamelo_told_gamma" if given else "karamelo_gamma"  # Ctrl-C may interrupt it
-    found = llvm.call(builder, name, double.type, [double, *given])
-    return llvm.cast(builder, found, types.float64, kind)
+    failure = exceptions.passed_to(builder, builder.function)
+    name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it
+    result = llvm.call(builder, name, double.type, [double, *failure])
+    return llvm.cast(builder, result, types.float64, kind)
 
 
 _HYPOT = "_hypot" if sys.platform == "win32" else "hypot"

@@ -1,7 +1,6 @@
-"""Exceptions in kernels: recorded when raised, and raised again by Python after the kernel.
+"""Exceptions in kernels, raised again by Python after the kernel.
 
-Each kernel call by Python has a `Failure`. Its LLVM functions pass the address of it as their last
-argument, to other threads too (`told`).
+Each call by Python has a `Failure`; LLVM functions pass its address as their last argument.
 """
 
 import ctypes
@@ -36,7 +35,7 @@ _noting = threading.Lock()
 
 
 def note(error: BaseException, at: int) -> None:
-    """Record an exception in the `Failure` at an address, to be raised after the kernel."""
+    """Record an exception in the `Failure` at an address."""
     failure = Failure.from_address(at)
     with _noting:
         if not failure.failed:
@@ -46,16 +45,16 @@ def note(error: BaseException, at: int) -> None:
 
 
 def noting(function: Callable) -> Callable:
-    """Record exceptions of a function called by kernels, including Ctrl-C; Python would drop them.
+    """Record exceptions of a Python function called by kernels, including Ctrl-C.
 
-    After its arguments it receives the address of the `Failure`.
+    Its last argument is the address of the `Failure`.
     """
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
-        *given, at = arguments
+        *values, at = arguments
         try:
-            return function(*given)
+            return function(*values)
         except BaseException as error:
             note(error, at)
             return 0
@@ -64,7 +63,7 @@ def noting(function: Callable) -> Callable:
 
 
 def never_raising(function: Callable) -> Callable:
-    """Let a function called by a kernel like a C function return NaN instead of raising."""
+    """Return NaN instead of raising, as C functions do."""
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:
@@ -85,21 +84,21 @@ def _note(text: int, size: int) -> None:
 machine.publish_python("karamelo_fail", ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3), _note)
 
 
-def told(function: ir.Function) -> ir.Function:
+def passing(function: ir.Function) -> ir.Function:
     """Mark a function whose last argument is the address of the `Failure`."""
-    function.told = True
+    function.passes_failure = True
     return function
 
 
 def failure_at(builder: ir.IRBuilder) -> Any:
     """Return the address of the `Failure` in the present function, or 0."""
-    own = builder.function
-    return own.args[-1] if hasattr(own, "told") else llvm.I64(0)
+    function = builder.function
+    return function.args[-1] if hasattr(function, "passes_failure") else llvm.I64(0)
 
 
 def passed_to(builder: ir.IRBuilder, called: Any) -> list:
     """List the arguments passed to a function after its own."""
-    return [failure_at(builder)] if hasattr(called, "told") else []
+    return [failure_at(builder)] if hasattr(called, "passes_failure") else []
 
 
 def _return(builder: ir.IRBuilder) -> None:
@@ -114,20 +113,20 @@ def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
     """Write code that records an exception and returns."""
     text = pickle.dumps((kind, arguments))
     constant = ir.Constant(ir.ArrayType(llvm.I8, len(text)), bytearray(text))
-    place = llvm.in_module(builder, constant, "exception")
+    constant_at = llvm.in_module(builder, constant, "exception")
     function = llvm.external(builder, "karamelo_fail", ir.VoidType(), [llvm.I64] * 3)
-    at = builder.ptrtoint(place, llvm.I64)
+    at = builder.ptrtoint(constant_at, llvm.I64)
     builder.call(function, [at, llvm.I64(len(text)), failure_at(builder)])
     builder.function.raises = True
     _return(builder)
 
 
 def go_on(builder: ir.IRBuilder, called: Any, regardless: bool) -> None:
-    """Write code that returns at once if a called function has recorded an exception.
+    """Return at once if a called function has recorded an exception.
 
     With `regardless` the function continues and leaves the check to its caller.
     """
-    if not getattr(called, "raises", False):
+    if not hasattr(called, "raises"):
         return
     builder.function.raises = True
     if regardless:

@@ -1,7 +1,6 @@
-"""LLVM: target processor, optimisation, and loading of code.
+"""LLVM: target processor, optimisation, loading of code.
 
-No fast math: contraction of products and sums would depend on inlining, so that results would
-differ between one and two threads, or between a run in pieces and a whole one.
+No fast math: contraction would depend on inlining, and results on threads and restarts.
 """
 
 import contextlib
@@ -31,7 +30,7 @@ def features() -> str:
 
 @functools.cache
 def describe() -> str:
-    """Everything that determines the code besides the source."""
+    """Describe everything that determines the code besides its text."""
     words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
     return repr((*words, features(), OPTIONS, LEVEL))
 
@@ -66,10 +65,10 @@ def _optimised(
 ) -> llvm.ModuleRef:
     module = llvm.parse_assembly(text)
     if library is not None:
-        own = {function.name for function in module.functions if not function.is_declaration}
+        defined = {function.name for function in module.functions if not function.is_declaration}
         module.link_in(llvm.parse_bitcode(library))
         for function in module.functions:
-            if not (function.is_declaration or function.name in own):
+            if not (function.is_declaration or function.name in defined):
                 function.linkage = llvm.Linkage.internal
     module.triple, module.data_layout = target.triple, str(target.target_data)
     module.verify()
@@ -88,10 +87,7 @@ def compile_text(text: str) -> bytes:
 
 
 def assembly(text: str, triple: str, processor: str, library: bytes | None = None) -> str:
-    """Compile module text to assembly for another processor, such as a GPU.
-
-    Called functions may come from a `library`, LLVM bitcode.
-    """
+    """Compile module text to assembly for another processor; `library` is LLVM bitcode."""
     _set_options()
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
@@ -116,7 +112,7 @@ def publish(name: str, address: int) -> None:
 
 
 def is_known(name: str) -> bool:
-    """Tell whether loaded code can call a function by name."""
+    """Tell whether the C library of this process has a function."""
     return sys.platform == "win32" or hasattr(ctypes.CDLL(None), name)
 
 

@@ -1,14 +1,11 @@
-"""Compiled kernels on disk, in two levels; never a reason to stop.
+"""Compiled kernels on disk, in two levels.
 
-A file ``.kernel`` has what is known of a kernel: its name, its result, what it calls. It is found
-by a hash of the function, of the types of its arguments, and of the sources of all that write
-kernels: while no source changes, nothing is done again. Otherwise the kernel is traced, and its
-machine code found by a hash of its LLVM text, in a file ``.code``: what an edit leaves as it was is
-not compiled again.
+A file ``.kernel`` has the name, result and callees of a kernel. Its key is a hash of the function,
+the argument types and the sources of all that write kernels. If there is none, the kernel is
+traced, and its machine code looked up by a hash of the LLVM text, in a file ``.code``.
 
-What is read becomes code: only files that this user or the administrator alone may write are read,
-and a checksum tells whether they are whole. Whatever is wrong with a file or the folder, the kernel
-is compiled as if it were not there, and the user told once.
+Files become code: only those that no other user can write, with a correct checksum, are read.
+Whatever is wrong with them, the kernel is compiled, and the user warned once.
 """
 
 import contextlib
@@ -48,7 +45,7 @@ _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
 
 class Unknown(Exception):
-    """Tell that a kernel depends on what has no name that is the same in another run."""
+    """A kernel depends on a thing without a name that is the same in another process."""
 
 
 # --- first level: by the sources ------------------------------------------------------------------
@@ -61,7 +58,7 @@ def short_hash(*words: str) -> str:
 
 @functools.cache
 def _source(path: Path) -> str:
-    """Hash a source as Python has read it; of a later state, nothing is known."""
+    """Hash a source as Python has read it; raise `Unknown` if it is newer."""
     with contextlib.suppress(OSError):
         about = path.stat()
         if max(about.st_mtime, about.st_ctime) < _began:
@@ -71,14 +68,14 @@ def _source(path: Path) -> str:
 
 @functools.cache
 def _sources() -> str:
-    """Hash the sources of the rooms of this package that write kernels."""
+    """Hash the sources of `choices.ROOMS`."""
     package = Path(__file__).parents[2]
     paths = sorted(path for room in choices.ROOMS for path in (package / room).rglob("*.py"))
     return short_hash(*(f"{path.relative_to(package)} {_source(path)}" for path in paths))
 
 
 def _stamp(name: str) -> str:
-    """Hash a module elsewhere with the modules that it names, but of other installed packages."""
+    """Hash a module elsewhere, and the modules not installed that it refers to."""
     words: dict[str, str] = {}
     ahead = {name}
     while ahead:
@@ -87,14 +84,14 @@ def _stamp(name: str) -> str:
         file = names.get("__file__")
         if one == "__main__" or not file:
             raise Unknown(one)
-        known = [(k, v) for k, v in names.items() if k[:2] != "__"]
+        plain = [(k, v) for k, v in names.items() if k[:2] != "__"]
         values = []
-        for key, value in known:
+        for key, value in plain:
             with contextlib.suppress(Unknown, RecursionError):
                 values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
         if not one.startswith(__package__.partition(".")[0]):  # its rooms import as they may
-            named = choices.modules_of(*(v for _, v in known if isinstance(v, _NAMED)))
+            named = choices.modules_of(*(v for _, v in plain if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
     return short_hash(*(words[one] for one in sorted(words)))
 
@@ -104,13 +101,13 @@ def _names_in(module: str) -> dict[str, Any]:
 
 
 def _is_own(module: str, top: str) -> bool:
-    """Tell whether a module is of the package `top`, or of no package that is installed."""
+    """Tell whether a module is of the package `top`, or of no installed package."""
     file = _names_in(module).get("__file__") or _INSTALLED[0]
     return module.partition(".")[0] == top or not file.startswith(_INSTALLED)
 
 
 def _words(thing: Any) -> str:
-    """Describe what a function is made of, in words that mean the same in every process."""
+    """Describe the parts of a function in words that are the same in every process."""
     if isinstance(thing, _PLAIN):
         return f"{type(thing).__name__} {thing!r}"
     if isinstance(thing, dict):
@@ -122,8 +119,8 @@ def _words(thing: Any) -> str:
     if isinstance(thing, type):
         return _class(thing)
     if hasattr(thing, "__module__") and hasattr(thing, "__name__"):
-        known = _names_in(thing.__module__).get(thing.__name__)
-        if known is thing or (hasattr(known, "function") and known.function is thing):
+        named = _names_in(thing.__module__).get(thing.__name__)
+        if named is thing or (hasattr(named, "function") and named.function is thing):
             return f"{thing.__module__}:{thing.__name__}"  # the sources say what it is
     function = thing.definition if hasattr(thing, "definition") else thing  # of an intrinsic
     if not isinstance(function, python.FunctionType):
@@ -140,22 +137,22 @@ def _words(thing: Any) -> str:
 
 
 def _class(one: type, by_name: bool = False) -> str:
-    """Describe a class by its name, its fields and the plain attributes that it was given.
+    """Describe a class by name, fields and plain attributes.
 
     Raises `Unknown` for a class that its name does not lead to: one of a plug-in, or any `by_name`.
     """
     first, *rest = one.__qualname__.split(".")
-    found = _names_in(one.__module__).get(first)
+    named = _names_in(one.__module__).get(first)
     for name in rest:
-        found = vars(found).get(name) if isinstance(found, type) else None
-    if found is not one and (by_name or choices.is_elsewhere(one.__module__)):
+        named = vars(named).get(name) if isinstance(named, type) else None
+    if named is not one and (by_name or choices.is_elsewhere(one.__module__)):
         raise Unknown(name_of(one))
     plain = [(k, v) for k, v in vars(one).items() if isinstance(v, _PLAIN) and k[:2] != "__"]
     return f"{name_of(one)} {vars(one).get('_fields')} {sorted(plain)}"
 
 
 def describe(numba_type: Any) -> str:
-    """Describe a type in words that mean the same in every process; tags with their fields."""
+    """Describe a type in words that are the same in every process; tags with their fields."""
     how = type(numba_type).__name__  # held or a value
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
@@ -167,9 +164,9 @@ def describe(numba_type: Any) -> str:
 
 
 class KernelFiles:
-    """The cached kernels of one function; a kernel that `load` cannot load does not count.
+    """The cached kernels of one function, loaded by `load`.
 
-    They are made for a `processor`, and `called` are functions that are written into them.
+    They are made for a `processor`; `called` are functions that are inlined in them.
     """
 
     def __init__(
@@ -179,23 +176,23 @@ class KernelFiles:
         self._called = called
 
     def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], Any]) -> Any:
-        """Read a kernel; where there is none, compile it, while others wait for the file."""
+        """Read a kernel; if there is none, compile it, while other processes wait for the file."""
         try:
             key = self._key(kinds, result)
         except (Unknown, RecursionError):
             return compiled()
-        found = self._found(key)
-        if found is None:
+        unit = self._found(key)
+        if unit is None:
             with lock.lock(files.folder() / f"{key}.lock"):
                 # Another process may have compiled it since the first look.
-                found = self._found(key)
-                if found is None:
-                    found = compiled()
-                    self._save(key, found)
-        return found
+                unit = self._found(key)
+                if unit is None:
+                    unit = compiled()
+                    self._save(key, unit)
+        return unit
 
     def _key(self, kinds: tuple, result: Any) -> str:
-        """Name the file: by function, types, machine, and the sources that any kernel may have."""
+        """Name the file by function, types, machine and sources."""
         function = self._function
         classes = (one for kind in kinds for one in choices.classes_in(kind))
         made = [function, *self._called, *choices.registered]
@@ -238,7 +235,7 @@ def _without_code(unit: Any) -> Any:
 
 
 def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
-    """Read the code of a text, whose hash is in the `name`; where there is none, make it."""
+    """Read the code of a text, whose hash is in the `name`, or make it."""
     path = files.folder() / f"{name}.code"
     code = _content(path)
     if code is None:
@@ -248,7 +245,7 @@ def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
 
 
 def code_of(name: str) -> bytes:
-    """Read code that was there when its kernel was kept; FileNotFoundError if it no longer is."""
+    """Read code that existed when its kernel was saved, or raise FileNotFoundError."""
     code = _content(files.folder() / f"{name}.code")
     if code is None:
         raise FileNotFoundError(name)
@@ -279,7 +276,7 @@ def _damaged(path: Path) -> None:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write a file; forget those that were used least recently where all take too much room."""
+    """Write a file; delete those least recently used above `ROOM` bytes."""
     try:
         files.write(path, content)
         ages = []

@@ -1,8 +1,7 @@
-"""Lock that lets one process compile a kernel while others wait for its file.
+"""Lock by which one process compiles a kernel while others wait for its file.
 
-The lock is on a file next to the kernel, and released by the system when its process ends. It only
-saves work: on read-only folders, file systems without locks, and after a timeout, each process
-compiles for itself.
+The system releases it when its process ends. It only saves work: on read-only folders, file systems
+without locks, and after a timeout, each process compiles.
 """
 
 import contextlib
@@ -27,19 +26,18 @@ waiting = contextlib.nullcontext  # context while a process waits, reported as c
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
     """Hold the lock on `path`, if it is available in time."""
-    with contextlib.ExitStack() as held:
+    with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # read-only, or no locks
-            _take(path, held)
+            _take(path, stack)
         yield
 
 
-def _take(path: Path, held: contextlib.ExitStack) -> None:
-    """Take the lock; `held` releases it."""
+def _take(path: Path, stack: contextlib.ExitStack) -> None:
     if fcntl is None:
         return
     path.parent.mkdir(parents=True, exist_ok=True)
     file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-    held.callback(os.close, file)
+    stack.callback(os.close, file)
     if not _locked(file, 0.0):
         if not session.waits:
             return
@@ -47,9 +45,9 @@ def _take(path: Path, held: contextlib.ExitStack) -> None:
             session.waits = _locked(file, PATIENCE)
         if not session.waits:
             return
-    held.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked in the meantime
+    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked in the meantime
     # Waiting processes have this file open, and find the kernel when they get the lock.
-    held.callback(_take_away, path)
+    stack.callback(_take_away, path)
 
 
 def _take_away(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Control flow of a function that is written: branches, merges and loops."""
+"""Control flow of a traced function: branches, merges and loops."""
 
 import operator
 import types as python
@@ -27,7 +27,7 @@ IN_A_LOOP = " between iterations of a loop"
 
 
 class Edge(NamedTuple):
-    """End of a branch: its last block, the variables, and what was read."""
+    """End of a branch: its last block, the variables, and items read from held tuples."""
 
     block: Any
     names: dict[str, Any]
@@ -74,7 +74,6 @@ def is_value(thing: Any) -> bool:
 
 
 def is_real(thing: Any) -> bool:
-    """Tell whether a thing is a real number known only at run time."""
     return isinstance(thing, Value) and isinstance(thing._kind, types.Float)
 
 
@@ -106,10 +105,7 @@ def _counter(kinds: tuple) -> types.Integer:
 
 
 class Flow:
-    """Writes the control flow of one call of a function.
-
-    Without a builder, only types are determined.
-    """
+    """Writes the control flow of one call of a function; without a builder, only its types."""
 
     def __init__(self, lowering: Any):
         self.lowering, self.builder = lowering, lowering.builder
@@ -123,7 +119,7 @@ class Flow:
         """End a branch here."""
         return Edge(self.builder and self.builder.block, names, self.lowering.read)
 
-    def part(self, condition: Value) -> tuple[Edge, Edge]:
+    def split(self, condition: Value) -> tuple[Edge, Edge]:
         """Start two branches, for a condition that is true or false."""
         truth = emit(bool, condition)
         blocks = self._block(), self._block()
@@ -138,7 +134,7 @@ class Flow:
         self.lowering.read = edge.read
 
     def meet(self, edges: list[Edge]) -> dict[str, Any]:
-        """Continue where branches merge; return the variables. Some are undefined afterwards."""
+        """Continue where branches merge; return the variables that are defined there."""
         first = edges[0]
         if len(edges) == 1:
             self.start(first)
@@ -147,9 +143,9 @@ class Flow:
         names: dict[str, Any] = {}
         for name, thing in first.names.items():
             if all(name in edge.names for edge in edges):
-                found = self._merged([thing, *(edge.names[name] for edge in edges[1:])], phis)
-                if found is not _DROPPED:
-                    names[name] = found
+                merged = self._merged([thing, *(edge.names[name] for edge in edges[1:])], phis)
+                if merged is not _DROPPED:
+                    names[name] = merged
         block = self._block()
         for k, edge in enumerate(edges):
             self.start(edge)
@@ -203,8 +199,8 @@ class Flow:
             return _DROPPED
         return self._phi(first, kind, things, phis)
 
-    def _phi(self, like: Any, kind: types.Type, things: list, phis: list[Phi]) -> Any:
-        made = (HeldValue if isinstance(like, HeldValue) else Value)(kind, None)
+    def _phi(self, model: Any, kind: types.Type, things: list, phis: list[Phi]) -> Any:
+        made = (HeldValue if isinstance(model, HeldValue) else Value)(kind, None)
         phis.append(Phi(made, things))
         return made
 
@@ -287,19 +283,19 @@ class Flow:
         lowering, builder = self.lowering, self.builder
         kind = _counter(tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds))
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
-        known = step if isinstance(step, int) else None
-        if known == 0:
+        fixed = step if isinstance(step, int) else None
+        if fixed == 0:
             raise ValueError("the step of a range is 0")
         start, stop, step = (
             Value(kind, builder and lowering.lowered(bound, kind)) for bound in (start, stop, step)
         )
 
         def goes_on(counter: Value) -> Value:
-            if known is None:
+            if fixed is None:
                 up = emit(operator.and_, step > 0, counter < stop)
                 return emit(operator.or_, up, emit(operator.and_, step < 0, counter > stop))
             compare = builder and (builder.icmp_signed if kind.signed else builder.icmp_unsigned)
-            sign = "<" if known > 0 else ">"
+            sign = "<" if fixed > 0 else ">"
             return Value(types.boolean, builder and compare(sign, counter._value, stop._value))
 
         def after(counter: Value) -> Value:
@@ -310,18 +306,15 @@ class Flow:
     # --- operations that differ from Python's for values
 
     def negate(self, thing: Any) -> Any:
-        """Compile `not`."""
         return emit(operator.not_, thing) if is_value(thing) else not thing
 
     def both(self, a: Any, b: Any) -> Any:
-        """Compile the conjunction of two comparisons."""
         return emit(operator.and_, a, b) if is_value(a) and is_value(b) else a and b
 
-    def item(self, things: Any, place: Any) -> Any:
-        """Compile an item of an array or of a tuple."""
-        if isinstance(things, tuple) and is_value(place):
-            return emit(operator.getitem, things, place)
-        return things[place]
+    def item(self, things: Any, index: Any) -> Any:
+        if isinstance(things, tuple) and is_value(index):
+            return emit(operator.getitem, things, index)
+        return things[index]
 
     def call(self, function: Callable, arguments: list, keywords: dict) -> Any:
         """Compile a call."""
@@ -329,7 +322,8 @@ class Flow:
             return emit(len, arguments[0])
         if function is range and any(map(is_value, arguments)):
             return Range(*arguments)
-        own = isinstance(getattr(function, "__self__", None), tuple) and function.__name__[0] != "_"
-        if own and isinstance(function, python.MethodType) and not hasattr(function, "__wrapped__"):
-            return self.lowering.seen(function.__func__)(function.__self__, *arguments, **keywords)
+        if isinstance(function, python.MethodType) and isinstance(function.__self__, tuple):
+            plain = function.__func__
+            if plain.__name__[0] != "_" and not hasattr(function, "__wrapped__"):
+                return self.lowering.seen(plain)(function.__self__, *arguments, **keywords)
         return function(*arguments, **keywords)

@@ -34,7 +34,7 @@ class CannotCompile(TypeError):
 
     def __init__(self, reason: str, function: Callable):
         super().__init__(f"{reason} (in {name_of(function)})")
-        code = getattr(function, "__code__", None)
+        code = function.__code__ if isinstance(function, python.FunctionType) else None
         self.begins = (code.co_filename, code.co_firstlineno) if code else ("", 0)
 
 

@@ -9,22 +9,22 @@ from numba import types
 
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code.arithmetic import OPERATIONS
-from karamelo_py.compiler.trace.values import Untraceable, Value
+from karamelo_py.compiler.trace.values import Emitted, Untraceable, Value
 
 
-def _places(place: Any) -> tuple:
-    return place if isinstance(place, tuple) else (place,)
+def _indices(index: Any) -> tuple:
+    return index if isinstance(index, tuple) else (index,)
 
 
-def is_part(kind: types.Array, place: Any) -> bool:
-    """Tell whether indices select a slice of an array instead of an item."""
-    places = _places(place)
+def is_part(kind: types.Array, index: Any) -> bool:
+    """Tell whether indices select a slice instead of an item."""
+    places = _indices(index)
     return len(places) < kind.ndim or any(isinstance(one, slice) for one in places)
 
 
-def part_type(kind: types.Array, place: Any) -> types.Array:
+def part_type(kind: types.Array, index: Any) -> types.Array:
     """Return the type of a slice of an array."""
-    places = _places(place)
+    places = _indices(index)
     if len(places) > kind.ndim:
         raise Untraceable(f"an array of {kind.ndim} dimensions has no {len(places)} indices")
     slices = [k for k, one in enumerate(places) if isinstance(one, slice)]
@@ -44,8 +44,8 @@ def _index(lowering: Any, thing: Any, count: Any) -> Any:
     """Compute an index; negative ones count from the end."""
     kind = _index_type(lowering, thing)
     value = lowering.lowered(thing, types.intp)
-    known = isinstance(thing, int) and thing >= 0
-    if known or isinstance(kind, types.Boolean) or not kind.signed:
+    is_positive = isinstance(thing, int) and thing >= 0
+    if is_positive or isinstance(kind, types.Boolean) or not kind.signed:
         return value
     return _from_the_end(lowering.builder, value, count)
 
@@ -55,10 +55,10 @@ def _from_the_end(builder: Any, value: Any, count: Any) -> Any:
     return builder.select(negative, builder.add(value, count), value)
 
 
-def item_place(lowering: Any, array: Value, place: Any) -> Any:
+def item_address(lowering: Any, array: Value, index: Any) -> Any:
     """Compute the address of an item."""
     parts = llvm.ArrayParts(lowering.builder, array._kind, array._value)
-    pairs = zip(_places(place), parts.shape, strict=True)
+    pairs = zip(_indices(index), parts.shape, strict=True)
     indices = [_index(lowering, one, count) for one, count in pairs]
     return llvm.item_pointer(lowering.builder, array._kind, array._value, indices)
 
@@ -67,38 +67,38 @@ def _align(kind: types.Array) -> int | None:
     return None if kind.aligned else 1
 
 
-def get(lowering: Any, array: Value, place: Any) -> Any:
+def get(lowering: Any, array: Value, index: Any) -> Any:
     """Read an item, or make a slice."""
     kind, builder = array._kind, lowering.builder
-    if is_part(kind, place):
-        made = part_type(kind, place)
-        return Value(made, builder and _part(lowering, array, place, made))
+    if is_part(kind, index):
+        made = part_type(kind, index)
+        return Value(made, builder and _part(lowering, array, index, made))
     if builder is None:
-        for one in _places(place):
+        for one in _indices(index):
             _index_type(lowering, one)
         return lowering.wrapped(kind.dtype, None)
-    at = item_place(lowering, array, place)
+    at = item_address(lowering, array, index)
     if isinstance(kind.dtype, types.Record):
         return Value(kind.dtype, builder.bitcast(at, llvm.NOTHING))
     return lowering.wrapped(kind.dtype, llvm.get(builder, kind.dtype, at, _align(kind)))
 
 
-def put(lowering: Any, array: Value, place: Any, value: Any) -> None:
+def put(lowering: Any, array: Value, index: Any, value: Any) -> None:
     """Write an item, or all items of a slice."""
     kind, builder = array._kind, lowering.builder
-    given = types.unliteral(lowering.kind_of(value))
-    if not isinstance(given, types.Number | types.Boolean | types.Array):
-        raise Untraceable(f"{given} cannot be put into an array")
+    kind_of_value = types.unliteral(lowering.kind_of(value))
+    if not isinstance(kind_of_value, types.Number | types.Boolean | types.Array):
+        raise Untraceable(f"{kind_of_value} cannot be put into an array")
     if not kind.mutable:
         raise Untraceable("an array that must not be changed")
     if builder is None:
         return
-    if not is_part(kind, place):
+    if not is_part(kind, index):
         number = lowering.lowered(value, kind.dtype)
-        llvm.put(builder, kind.dtype, number, item_place(lowering, array, place), _align(kind))
+        llvm.put(builder, kind.dtype, number, item_address(lowering, array, index), _align(kind))
         return
-    made = part_type(kind, place)
-    _fill(lowering, Value(made, _part(lowering, array, place, made)), value)
+    made = part_type(kind, index)
+    _fill(lowering, Value(made, _part(lowering, array, index, made)), value)
 
 
 def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
@@ -112,9 +112,9 @@ def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
             _fill(lowering, array, value, (*outer, index))
         return
     if isinstance(value._kind, types.Array):
-        own = value._kind
-        at = llvm.item_pointer(builder, own, value._value, outer[kind.ndim - own.ndim :])
-        value = Value(own.dtype, llvm.get(builder, own.dtype, at, _align(own)))
+        source = value._kind
+        at = llvm.item_pointer(builder, source, value._value, outer[kind.ndim - source.ndim :])
+        value = Value(source.dtype, llvm.get(builder, source.dtype, at, _align(source)))
     at = llvm.item_pointer(builder, kind, array._value, outer)
     llvm.put(builder, kind.dtype, lowering.lowered(value, kind.dtype), at, _align(kind))
 
@@ -141,11 +141,11 @@ def _bounds(lowering: Any, one: slice, count: Any) -> tuple[Any, Any, Any]:
     return first, size, llvm.I64(step)
 
 
-def _part(lowering: Any, array: Value, place: Any, made: types.Array) -> Any:
+def _part(lowering: Any, array: Value, index: Any, made: types.Array) -> Any:
     builder = lowering.builder
     parts = llvm.ArrayParts(builder, array._kind, array._value)
     shape, strides, offset = [], [], llvm.I64(0)
-    places = _places(place)
+    places = _indices(index)
     for k, (count, stride) in enumerate(zip(parts.shape, parts.strides, strict=True)):
         one = places[k] if k < len(places) else slice(None)
         if isinstance(one, slice):
@@ -175,8 +175,8 @@ def _of_array(lowering: Any, thing: Value, name: str) -> Any:
     kind, builder = thing._kind, lowering.builder
     parts = llvm.ArrayParts(builder, kind, thing._value)
     if name in ("shape", "strides"):
-        found = getattr(parts, name) if builder else [None] * kind.ndim
-        return tuple(Value(types.intp, one) for one in found)
+        sizes = getattr(parts, name) if builder else [None] * kind.ndim
+        return tuple(Value(types.intp, one) for one in sizes)
     if name == "size":
         sizes = _of_array(lowering, thing, "shape")
         return math.prod(sizes[1:], start=sizes[0]) if sizes else 1
@@ -191,24 +191,24 @@ def _of_record(lowering: Any, thing: Value, name: str) -> Any:
     kind, builder = thing._kind, lowering.builder
     if name not in kind.fields:
         raise AttributeError(f"a record has no field '{name}'")
-    found = kind.typeof(name)
+    field = kind.typeof(name)
     at = builder and builder.gep(thing._value, [llvm.I64(kind.offset(name))])
-    if isinstance(found, types.NestedArray):
-        made = types.Array(found.dtype, found.ndim, "C", aligned=False)
+    if isinstance(field, types.NestedArray):
+        made = types.Array(field.dtype, field.ndim, "C", aligned=False)
         if builder is None:
             return Value(made, None)
-        size = llvm.memory_type(found.dtype)
+        size = llvm.memory_type(field.dtype)
         strides = [
-            math.prod(found.shape[k + 1 :]) * found.dtype.bitwidth // 8 for k in range(found.ndim)
+            math.prod(field.shape[k + 1 :]) * field.dtype.bitwidth // 8 for k in range(field.ndim)
         ]
         return Value(made, llvm.make_array(
             builder, made, builder.bitcast(at, size.as_pointer()),
-            list(map(llvm.I64, found.shape)), list(map(llvm.I64, strides)),
+            list(map(llvm.I64, field.shape)), list(map(llvm.I64, strides)),
         ))  # fmt: skip
     if builder is None:
-        return lowering.wrapped(found, None)
-    at = builder.bitcast(at, llvm.memory_type(found).as_pointer())
-    return lowering.wrapped(found, llvm.get(builder, found, at, 1))
+        return lowering.wrapped(field, None)
+    at = builder.bitcast(at, llvm.memory_type(field).as_pointer())
+    return lowering.wrapped(field, llvm.get(builder, field, at, 1))
 
 
 def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
@@ -216,22 +216,22 @@ def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
     kind, builder = thing._kind, lowering.builder
     if not isinstance(kind, types.Record) or name not in kind.fields:
         raise AttributeError(f"{kind} has no attribute '{name}' that can be set")
-    found = kind.typeof(name)
+    field = kind.typeof(name)
     if builder is not None:
         at = builder.gep(thing._value, [llvm.I64(kind.offset(name))])
-        at = builder.bitcast(at, llvm.memory_type(found).as_pointer())
-        llvm.put(builder, found, lowering.lowered(value, found), at, 1)
+        at = builder.bitcast(at, llvm.memory_type(field).as_pointer())
+        llvm.put(builder, field, lowering.lowered(value, field), at, 1)
 
 
 def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
-    wanted = OPERATIONS[getattr(number, "seen", number)](types.int64).result
+    wanted = OPERATIONS[number.seen if isinstance(number, Emitted) else number](types.int64).result
     if wanted.bitwidth != thing._kind.bitwidth:
         raise Untraceable("numbers of other widths have other bits")
     builder = lowering.builder
     return Value(wanted, builder and builder.bitcast(thing._value, llvm.register_type(wanted)))
 
 
-def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
+def item_of_tuple(lowering: Any, things: tuple, index: Value) -> Any:
     """Return an item of a tuple at an index known at run time."""
     kinds = [types.unliteral(lowering.kind_of(thing)) for thing in things]
     kind, builder = lowering.unify(*kinds), lowering.builder
@@ -240,9 +240,9 @@ def item_of_tuple(lowering: Any, things: tuple, place: Value) -> Any:
     if builder is None:
         return lowering.wrapped(kind, None)
     values = [lowering.lowered(thing, kind) for thing in things]
-    index = _index(lowering, place, llvm.I64(len(values)))
+    index = _index(lowering, index, llvm.I64(len(values)))
     room = llvm.room(builder, ir.ArrayType(llvm.memory_type(kind), len(values)))
     for k, value in enumerate(values):
         llvm.put(builder, kind, value, llvm.at(builder, room, 0, k))
-    found = builder.gep(room, [llvm.I64(0), index], inbounds=True)
-    return lowering.wrapped(kind, llvm.get(builder, kind, found))
+    pointer = builder.gep(room, [llvm.I64(0), index], inbounds=True)
+    return lowering.wrapped(kind, llvm.get(builder, kind, pointer))

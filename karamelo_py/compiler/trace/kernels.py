@@ -1,8 +1,7 @@
 """Kernels: loops called by Python and other kernels, traced as a whole and cached on disk.
 
-A kernel is one LLVM function for arguments of some types, with a unique name that contains the hash
-of its text. Python writes the arguments to memory (`argument_buffer`) and calls its entry with
-their address; kernels that call it refer to its name and do not contain it.
+A kernel is one LLVM function for arguments of some types; its name contains the hash of its text.
+Python calls its entry with the address of the arguments. Other kernels refer to its name.
 """
 
 import contextvars
@@ -60,9 +59,9 @@ def load(unit: Unit) -> list[int]:
             for needed in unit.needs:
                 load(needed)
             content = unit.code or cache.code_of(unit.name)
-            found = machine.load(content, unit.name, unit.name + ENTRY)
-            machine.publish(unit.name, found[0])
-            loaded[unit.name] = found
+            addresses = machine.load(content, unit.name, unit.name + ENTRY)
+            machine.publish(unit.name, addresses[0])
+            loaded[unit.name] = addresses
         return loaded[unit.name]
 
 
@@ -100,7 +99,7 @@ lock.waiting = compilation
 
 @contextmanager
 def _no_collections() -> Iterator[None]:
-    """Disable Python's garbage collector, which would traverse a trace in vain."""
+    """Disable Python's garbage collector: a trace has much to traverse and nothing to free."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -152,31 +151,28 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> Un
 
 
 def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
-    """Write code that reads arguments of these types from memory."""
-    held = HeldTuple(kinds)
-    place = builder.inttoptr(address, held.register_type())
+    """Load arguments of these types from memory."""
+    types_of_items = HeldTuple(kinds)
+    pointer = builder.inttoptr(address, types_of_items.register_type())
     full = (k for k, kind in enumerate(kinds) if not llvm.is_empty(kind))
-    return [item_of(builder, held, place, k) for k in full]
+    return [item_of(builder, types_of_items, pointer, k) for k in full]
 
 
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
-    """Write the entry: it calls the function with arguments in memory, and stores the result there.
-
-    It is called with the addresses of these, and of a `Failure`.
-    """
+    """Write the entry, called with addresses of arguments, result and `Failure`."""
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [llvm.I64] * 3), NAME + ENTRY)
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
-    given = builder.call(main, [*items_at(builder, kinds, entry.args[0]), entry.args[2]])
+    value = builder.call(main, [*items_at(builder, kinds, entry.args[0]), entry.args[2]])
     if not llvm.is_empty(result):
-        room = builder.inttoptr(entry.args[1], llvm.memory_type(result).as_pointer())
-        llvm.put(builder, result, given, room, 1)
+        pointer = builder.inttoptr(entry.args[1], llvm.memory_type(result).as_pointer())
+        llvm.put(builder, result, value, pointer, 1)
     builder.ret_void()
 
 
 class Kernel:
     """A function called from Python and other kernels, compiled by types and cached on disk.
 
-    Tuples are passed by reference.
+    Tuples with arrays are passed by reference.
     """
 
     def __init__(self, function: Callable):
@@ -221,7 +217,7 @@ class Kernel:
         self._planned(ArgumentBuffer(arguments), arguments)
 
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
-        """Return how arguments are passed, the entry, and size and reader of the result."""
+        """Return layout of arguments, entry, and size and reader of the result."""
         kinds = tuple(written.kinds)
         self._find_changes()
         plans = self._plans
@@ -233,28 +229,25 @@ class Kernel:
 
     def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
         """Write a call from another kernel."""
-        held = [lowering.call(hold, (argument,)) for argument in arguments]
-        kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in held)
+        values = [lowering.call(hold, (argument,)) for argument in arguments]
+        kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in values)
         if in_one_module():
-            return lowering.call_own(traced(self.function, kinds), kinds, held)
+            return lowering.call_own(traced(self.function, kinds), kinds, values)
         unit = self.unit(kinds)
         choices.note(unit.modules)
         if lowering.builder is None:
             return lowering.wrapped(unit.result, None)
         module = lowering.builder.module
         module.needs[unit.name] = unit
-        known = module.globals.get(unit.name)
-        called = known or new_function(module, kinds, unit.result, unit.name)
+        declared = module.globals.get(unit.name)
+        called = declared or new_function(module, kinds, unit.result, unit.name)
         if unit.raises:
             called.raises = True
-        return lowering.call_function(called, kinds, unit.result, held)
+        return lowering.call_function(called, kinds, unit.result, values)
 
 
 def kernel(function: Callable) -> Callable:
-    """Make a kernel; interpreted, it is the function itself.
-
-    Without fast math: contraction of products and sums would depend on inlining. Use `fma`.
-    """
+    """Make a kernel; interpreted, it is the function itself."""
     return function if choices.INTERPRETED else Kernel(function)
 
 
@@ -272,8 +265,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain it: they need not be compiled again for another function, and it is
-    compiled once for all of them.
+    Callers do not contain it, and need not be compiled again for another function.
     """
     key = function, signature, session.changes
     addresses = session.addresses
@@ -288,8 +280,8 @@ def address_of(function: Callable, signature: types.Type) -> int:
 def address_of_python(function: Callable, signature: types.Type) -> Address:
     """Return the address by which kernels call a Python function of integers.
 
-    Its exceptions are raised again after the kernel. Keep the `Address`, not an int made from it,
-    as long as kernels may call it.
+    Its exceptions are raised after the kernel. Store the `Address`, not an int made from it, while
+    kernels may call it.
     """
     if choices.INTERPRETED:
         callback: Any = functools.partial(function)  # a bound method would be freed at once
@@ -312,19 +304,19 @@ def caller_of(signature: Any) -> Callable:
 
     @intrinsic
     def by_address(address, *arguments):
-        def codegen(builder, place, *values):
+        def codegen(builder, address_value, *values):
             kind = function_type(parameters, result, llvm.I64)
-            pointer = builder.inttoptr(place, kind.as_pointer())
+            pointer = builder.inttoptr(address_value, kind.as_pointer())
             return builder.call(pointer, [*values, failure_at(builder)])
 
         return result(types.int64, *parameters), codegen
 
     @in_kernels
     def call(lowering, address, *arguments):
-        own = called_in_one(signature)
-        if not own:
+        replacement = called_in_one(signature)
+        if not replacement:
             return lowering.call(by_address, (address, *arguments))
         pairs = zip(arguments, parameters, strict=True)
-        return lowering.seen(own)(*[lowering.cast(a, kind) for a, kind in pairs])
+        return lowering.seen(replacement)(*[lowering.cast(a, kind) for a, kind in pairs])
 
     return call

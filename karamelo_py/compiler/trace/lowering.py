@@ -26,7 +26,8 @@ class FunctionType(types.Opaque):
 
     def __init__(self, function: Callable):
         self.function = function
-        super().__init__(f"Function({getattr(function, '__qualname__', function)}, {id(function)})")
+        name = function.__qualname__ if hasattr(function, "__qualname__") else function
+        super().__init__(f"Function({name}, {id(function)})")
 
 
 _TRACED = traced.Value, traced.HeldValue
@@ -34,7 +35,7 @@ _TRACED = traced.Value, traced.HeldValue
 
 @functools.cache
 def _is_of_values(one: type) -> bool:
-    """Tell whether a class of types is of values; to ask Numba's abstract classes takes long."""
+    """Tell whether a class of types is of values; Numba's abstract classes are slow to ask."""
     others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
     return not issubclass(one, others)
 
@@ -42,7 +43,7 @@ def _is_of_values(one: type) -> bool:
 class Lowering:
     """Writes code with a builder, or only determines types without one.
 
-    ``seen(function)`` replaces functions used in the functions that are run.
+    ``seen(thing)`` replaces globals of traced functions.
     """
 
     dispatch: Callable  # calls functions selected by type
@@ -57,7 +58,7 @@ class Lowering:
     # --- values in point functions, and their types
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
-        """Wrap a value for point functions."""
+        """Wrap a value for traced functions."""
         if _is_of_values(type(kind)):
             return traced.Value(kind, value)
         if isinstance(kind, types.Literal):
@@ -78,7 +79,7 @@ class Lowering:
         return self.seen(kind.function)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """Return the type of a wrapped thing; integers keep their value in it."""
+        """Return the type of a wrapped thing; the type of an integer contains its value."""
         if isinstance(thing, _TRACED):
             return thing._kind
         if isinstance(thing, int):
@@ -95,7 +96,7 @@ class Lowering:
         raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Return the code of a wrapped thing in the type `wanted`."""
+        """Return the LLVM value of a wrapped thing in the type `wanted`."""
         if isinstance(thing, _TRACED):
             return llvm.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
@@ -133,9 +134,9 @@ class Lowering:
             return traced.BUILTINS[function](self, *arguments)
         if function in _OF_ITEMS and _has_slice(arguments[1]):
             return self.of_item(*arguments)
-        found = self.dispatch(function, arguments)
-        if found is not NotImplemented:
-            return found
+        value = self.dispatch(function, arguments)
+        if value is not NotImplemented:
+            return value
         self.operations += 1
         if self.operations > MOST_OPERATIONS and self.builder is None:
             raise traced.Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
@@ -153,13 +154,13 @@ class Lowering:
     def operation(self, function: Callable, kinds: tuple) -> arithmetic.Operation | None:
         """Return the operation of a function for arguments of these types."""
         key = function, numbers_of(kinds)
-        known = session.operations
-        if key not in known:
+        cache = session.operations
+        if key not in cache:
             if isinstance(function, traced.Intrinsic):
-                known[key] = _of_intrinsic(function, kinds)
+                cache[key] = _of_intrinsic(function, kinds)
             else:
-                known[key] = arithmetic.operation(function, kinds)
-        return known[key]
+                cache[key] = arithmetic.operation(function, kinds)
+        return cache[key]
 
     def other(self, function: Callable, arguments: tuple, kinds: tuple) -> Any:
         """Return the result of a function that is not an operation on numbers."""
@@ -171,18 +172,18 @@ class Lowering:
             f"{name_of(function)} is not defined for ({', '.join(map(traced.words, kinds))})"
         )
 
-    def of_item(self, things: Any, place: Any, *value: Any) -> Any:
+    def of_item(self, things: Any, index: Any, *value: Any) -> Any:
         """Read or write an item of an array or tuple."""
         if isinstance(things, traced.Value) and isinstance(things._kind, types.Array):
             do = indexing.put if value else indexing.get
-            return do(self, things, place, *value)
-        if isinstance(things, tuple) and isinstance(place, traced.Value) and not value:
-            return indexing.item_of_tuple(self, things, place)
+            return do(self, things, index, *value)
+        if isinstance(things, tuple) and isinstance(index, traced.Value) and not value:
+            return indexing.item_of_tuple(self, things, index)
         raise traced.Untraceable(f"{self.kind_of(things)} has no items")
 
-    def in_type_of(self, thing: Any, like: Any) -> Any:
-        """Convert an integer to the real type of `like`."""
-        kind = llvm.scalar_of(like._kind)
+    def in_type_of(self, thing: Any, model: Any) -> Any:
+        """Convert an integer to the real type of `model`."""
+        kind = llvm.scalar_of(model._kind)
         if isinstance(thing._kind, llvm.Lanes):
             kind = llvm.Lanes(kind, thing._kind.width)
         value = self.builder and llvm.cast(self.builder, thing._value, thing._kind, kind)
@@ -205,30 +206,30 @@ class Lowering:
     # --- separate functions
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """Return the function of the present module that does what `run` does."""
+        """Return the separate function of the present module for `run`."""
         module = self.builder.module
-        own = vars(module).setdefault("own", {})
-        if (run, kinds) not in own:
-            made = new_function(module, kinds, result, f"{name}.{len(own)}")
+        functions = vars(module).setdefault("own", {})
+        if (run, kinds) not in functions:
+            made = new_function(module, kinds, result, f"{name}.{len(functions)}")
             made.linkage = "internal"
             made.attributes.add("nounwind")
-            own[run, kinds] = made
+            functions[run, kinds] = made
             Lowering(self.seen, ir.IRBuilder(made.append_basic_block("entry"))).give_back(
                 run, kinds, made.args, result
             )
-        return own[run, kinds]
+        return functions[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
         """Return the result of `run` from the present function."""
-        given = iter(values)
+        passed = iter(values)
         with traced.writing(self):
-            found = run(
-                *(self.wrapped(k, None if llvm.is_empty(k) else next(given)) for k in kinds)
+            value = run(
+                *(self.wrapped(k, None if llvm.is_empty(k) else next(passed)) for k in kinds)
             )
             if llvm.is_empty(result):
                 self.builder.ret_void()
             else:
-                self.builder.ret(self.lowered(found, result))
+                self.builder.ret(self.lowered(value, result))
 
     def call_own(self, traced: Any, kinds: tuple, arguments: tuple) -> Any:
         """Call a separate function of this module, made from a `TracedFunction`."""
@@ -249,32 +250,32 @@ class Lowering:
 
 
 def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
-    """LLVM type of a function of values of these types; empty ones are not passed."""
+    """Return the LLVM type of a function of these types; empty ones are not passed."""
     gives = ir.VoidType() if llvm.is_empty(result) else llvm.register_type(result)
-    given = [llvm.register_type(k) for k in kinds if not llvm.is_empty(k)]
-    return ir.FunctionType(gives, [*given, *more])
+    arguments = [llvm.register_type(k) for k in kinds if not llvm.is_empty(k)]
+    return ir.FunctionType(gives, [*arguments, *more])
 
 
 def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str) -> ir.Function:
-    """Start an LLVM function; except on GPUs it gets the address of a `Failure`."""
+    """Start an LLVM function; except on GPUs its last argument is the address of a `Failure`."""
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
-    return exceptions.told(ir.Function(module, function_type(kinds, result, llvm.I64), name))
+    return exceptions.passing(ir.Function(module, function_type(kinds, result, llvm.I64), name))
 
 
 _OF_ITEMS = {operator.getitem, operator.setitem}
 
 
-def _has_slice(place: Any) -> bool:
-    return any(isinstance(one, slice) for one in (place if isinstance(place, tuple) else (place,)))
+def _has_slice(index: Any) -> bool:
+    return any(isinstance(one, slice) for one in (index if isinstance(index, tuple) else (index,)))
 
 
 def _of_intrinsic(function: traced.Intrinsic, kinds: tuple) -> arithmetic.Operation | None:
     plain = tuple(map(types.unliteral, kinds))
-    found = function.definition(*plain) or function.definition(*kinds)
-    if found is None:
+    definition = function.definition(*plain) or function.definition(*kinds)
+    if definition is None:
         return None
-    signature, codegen = found
+    signature, codegen = definition
     return arithmetic.Operation(
         signature.return_type, signature.args, lambda builder, values: codegen(builder, *values)
     )
@@ -282,9 +283,9 @@ def _of_intrinsic(function: traced.Intrinsic, kinds: tuple) -> arithmetic.Operat
 
 def name_of(function: Callable) -> str:
     """Name a function in messages."""
-    return getattr(function, "__name__", str(function))
+    return function.__name__ if hasattr(function, "__name__") else str(function)
 
 
 def numbers_of(kinds: tuple) -> tuple[int, ...]:
-    """Numba's numbers of types, which compare faster."""
+    """Return Numba's numbers of types, which compare faster."""
     return tuple([kind._code for kind in kinds])

@@ -1,8 +1,4 @@
-"""Functions in kernels, selected by type: of points, of numbers, and of numbers in lanes.
-
-A function of numbers is defined first, then its version for lanes
-(:mod:`karamelo_py.compiler.lanes`).
-"""
+"""Functions in kernels selected by type: of points, of numbers, and of numbers in lanes."""
 
 import math
 import operator
@@ -14,13 +10,14 @@ from numba import types
 
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code.arithmetic import common
-from karamelo_py.compiler.llvm import I64, Lanes, scalar_of
+from karamelo_py.compiler.llvm import I64, Lanes, LaneType, scalar_of
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.functions import INSTEAD, PointFunction, forget, outdate_kernels
 from karamelo_py.compiler.trace.values import (
     OF_REALS,
     Untraceable,
     Value,
+    implementations,
     in_kernels,
     intrinsic,
     mapped,
@@ -32,16 +29,15 @@ from karamelo_py.compiler.trace.values import (
 def implements(function: Callable, *numbers: type, by_type: bool = False) -> Callable:
     """Decorate the implementation of `function` in kernels for number types (default: all others).
 
-    A number type is a NamedTuple with operators (:func:`~.algebra.algebra`), or lanes; it is also
-    found inside tuples. The implementation is traced, or code written by hand. With `by_type` it is
-    a Python function that returns the implementation for argument types; None falls back to the
-    previous one.
+    A number type is a NamedTuple with operators (`algebra`), or lanes; it is also found inside
+    tuples. The implementation is traced, or an `intrinsic`. With `by_type` it is a Python function
+    that returns the implementation for argument types; None selects the previous one.
     """
 
     def register(made: Callable) -> Callable:
-        known = choices.choosers.setdefault(function, [])
-        of_numbers = any(function in getattr(one, "implements", ()) for one in numbers)
-        if of_numbers or (known and not numbers):
+        implementations_of = choices.choosers.setdefault(function, [])
+        of_numbers = any(function in (implementations(one) or ()) for one in numbers)
+        if of_numbers or (implementations_of and not numbers):
             outdate_kernels()
         for one in numbers:
             if "implements" not in vars(one):
@@ -49,9 +45,9 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
             one.implements[function] = made
         choices.register(made)
         if by_type:
-            known.insert(0, made)
+            implementations_of.insert(0, made)
         elif not numbers:
-            known.append(lambda *_: made)
+            implementations_of.append(lambda *_: made)
         forget()
         return made
 
@@ -59,7 +55,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
 
 
 def shared(function: Callable) -> Callable:
-    """Mark a helper that may have implementations for lanes or number types: `implements`."""
+    """Mark a helper that may have implementations for lanes or number types (`implements`)."""
     return implements(function)(function)
 
 
@@ -69,12 +65,12 @@ def point_function(
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     The decorated function gives name, parameters and docstring. ``name.on(Class, ...)`` adds
-    implementations, also in plug-ins; they are inherited by derived classes. They run as plain
-    Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection happens at compile time.
-    With ``otherwise`` the decorated function is the default implementation.
+    implementations, also in plug-ins; derived classes inherit them. They run as plain Python
+    (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection happens at compile time. With
+    ``otherwise`` the decorated function is the default implementation.
 
-    Point functions process one point or several at once (:mod:`karamelo_py.compiler.lanes`).
-    Functions named in ``scalarised`` of a class, because they branch, are called point by point.
+    Point functions process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those
+    named in ``scalarised`` of a class, because they branch, are called point by point.
     """
 
     def declare(stub: Callable) -> PointFunction:
@@ -84,7 +80,7 @@ def point_function(
             classes = tuple(choices.tag_class(a) for a in arguments[:tags])
             apart = any(stub.__name__ in getattr(tag, "scalarised", ()) for tag in classes)
             if apart and lanes_of(arguments):
-                return lambda *given: lane_by_lane(made, False, given)
+                return lambda *values: lane_by_lane(made, False, values)
             return made.find(classes)
 
         choices.choosers[made] = [choose]
@@ -94,21 +90,15 @@ def point_function(
 
 
 def real(value: float, like: Any) -> Any:
-    """Convert `value` to the number type of `like`.
-
-    Literals take the type of the other operand; this is for values without one.
-    """
+    """Convert `value` to the number type of `like`, for literals without another operand."""
     return type(like)(value)
 
 
 def lanes_of(numba_type: Any) -> int:
-    """Count the lanes of a type or a value (:mod:`karamelo_py.compiler.lanes`).
-
-    0 for numbers; for tuples, the lanes of their items.
-    """
+    """Count the lanes of a type or a value: 0 for numbers, the maximum for tuples."""
     if isinstance(numba_type, tuple | types.BaseTuple):
         return max(map(lanes_of, numba_type), default=0)
-    return getattr(numba_type, "width", 0)
+    return numba_type.width if isinstance(numba_type, LaneType) else 0
 
 
 INSTEAD[lanes_of] = lambda thing: lanes_of(now().kind_of(thing))
@@ -123,7 +113,7 @@ def _of_width(width: int, scalar: types.Type) -> types.Type:
 def _real(value, like):
     scalar = scalar_of(like) if isinstance(like, Lanes | types.Float) else types.float64
     made = _of_width(lanes_of((value, like)), scalar)
-    return made(value, like), lambda builder, given, _: llvm.cast(builder, given, value, made)
+    return made(value, like), lambda builder, number, _: llvm.cast(builder, number, value, made)
 
 
 @implements(int, Lanes)
@@ -132,7 +122,7 @@ def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
     whole = Lanes(types.int32, a.width)  # supported by every processor, and large enough for cells
-    return whole(a), lambda builder, given: llvm.cast(builder, given, a, whole)
+    return whole(a), lambda builder, number: llvm.cast(builder, number, a, whole)
 
 
 def round_off(like: Any) -> Any:
@@ -154,9 +144,9 @@ def _round_off(like):
 
 
 def index(i: int) -> int:
-    """Return `i` as an array index that is known not to be negative.
+    """Return `i` as an array index that is not negative.
 
-    Saves the test for negative indices at every access (10 % of a sweep).
+    This saves the test for negative indices at every access (10 % of a sweep).
     """
     return i
 
@@ -168,7 +158,7 @@ implements(index, Lanes)(lambda i: i)
 
 @shared
 def fma(a: float, b: float, c: float) -> float:
-    """Add a b to c with one rounding when compiled, in any context."""
+    """Return a b + c, rounded once when compiled."""
     return a * b + c
 
 
@@ -187,7 +177,6 @@ def _fma(a, b, c):
 
 @intrinsic
 def select(condition, a, b):
-    """Select lane by lane."""
     lanes = common(a, b)
     lanes = lanes if isinstance(lanes, Lanes) else Lanes(a, condition.width)
     return lanes(condition, lanes, lanes), lambda builder, *values: builder.select(*values)
@@ -216,30 +205,30 @@ def _all_bits(builder: Any, mask: Any, sign: str, wanted: int) -> Any:
 
 @shared
 def all_lanes(condition: bool) -> bool:
-    """Tell whether a condition holds in all lanes; without lanes, the condition itself."""
+    """Tell whether a condition holds in all lanes."""
     return condition
 
 
 @implements(all_lanes, Lanes)
 @intrinsic
 def _all(mask):
-    return types.boolean(mask), lambda builder, given: _all_bits(builder, given, "==", -1)
+    return types.boolean(mask), lambda builder, bits: _all_bits(builder, bits, "==", -1)
 
 
 @shared
 def any_lane(condition: bool) -> bool:
-    """Tell whether a condition holds in any lane; without lanes, the condition itself."""
+    """Tell whether a condition holds in any lane."""
     return condition
 
 
 @implements(any_lane, Lanes)
 @intrinsic
 def _any(mask):
-    return types.boolean(mask), lambda builder, given: _all_bits(builder, given, "!=", 0)
+    return types.boolean(mask), lambda builder, bits: _all_bits(builder, bits, "!=", 0)
 
 
 def all_same(builder: Any, value: Any) -> Any:
-    """Check that all lanes contain the same integer."""
+    """Tell whether all lanes contain the same integer."""
     first = llvm.shuffle(builder, value, value, [0] * value.type.count)
     return _all_bits(builder, builder.icmp_signed("==", value, first), "==", -1)
 
@@ -283,7 +272,7 @@ def _from_memory(builder: Any, stored: Value) -> Value:
     return Value(stored._kind, bits if bits.type == wanted else builder.trunc(bits, wanted))
 
 
-def _place(builder: Any, stored: Value, k: Any) -> Any:
+def _lane_address(builder: Any, stored: Value, k: Any) -> Any:
     scalar = llvm.memory_type(stored._kind.scalar)
     return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
 
@@ -305,8 +294,8 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
     def run(k: Any) -> Any:
         def of_lane(value: Value) -> Value:
             scalar = value._kind.scalar
-            place = builder and _place(builder, value, k)
-            return Value(scalar, builder and llvm.get(builder, scalar, place))
+            address = builder and _lane_address(builder, value, k)
+            return Value(scalar, builder and llvm.get(builder, scalar, address))
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
@@ -315,13 +304,18 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))
             if builder:
-                llvm.put(builder, scalar, lowering.lowered(thing, scalar), _place(builder, made, k))
+                llvm.put(
+                    builder,
+                    scalar,
+                    lowering.lowered(thing, scalar),
+                    _lane_address(builder, made, k),
+                )
             return made
 
         read, lowering.read = lowering.read, dict(lowering.read)
-        found = mapped(to_lane, function(*_lanes_changed(stored, of_lane)))
+        result = mapped(to_lane, function(*_lanes_changed(stored, of_lane)))
         lowering.read = read
-        return found
+        return result
 
     if builder is None:
         return run(None)
@@ -330,12 +324,12 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
         # Hides the count from LLVM, so that the loop remains, with one copy of the function.
         count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
     with llvm.counted(builder, count) as k:
-        found = run(k)
-    return _lanes_changed(found, lambda value: _from_memory(builder, value))
+        result = run(k)
+    return _lanes_changed(result, lambda value: _from_memory(builder, value))
 
 
 for _function in (
     math.log, math.log1p, math.exp, math.expm1, math.pow, math.sin, math.cos, math.tan, math.atan2,
     operator.pow, operator.floordiv, operator.mod,
 ):  # fmt: skip
-    implements(_function, Lanes)(lambda *given, do=_function: lane_by_lane(do, True, given))
+    implements(_function, Lanes)(lambda *values, do=_function: lane_by_lane(do, True, values))

@@ -1,8 +1,8 @@
 """Front end: compiles the text of a function, statement by statement.
 
-Python's own values are computed at once. If a condition is known only at run time, code is written
-for both branches, and variables are merged where they meet (phis of SSA form). A loop over a known
-range is unrolled if short or if necessary; other loops remain loops.
+Python's own values are computed at once. For a condition known only at run time, both branches are
+written, and variables merge as phis of SSA form. A loop over a known range is unrolled if short or
+if necessary; other loops remain loops.
 """
 
 import ast
@@ -58,15 +58,15 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
 
 @functools.cache
 def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """Parse a text; list functions by name and first line, decorators included."""
-    found: dict[tuple[str, int], list] = {}
+    """List the functions of a text by name and first line, decorators included."""
+    functions: dict[tuple[str, int], list] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
             first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
-            found.setdefault((node.name, first), []).append(node)
+            functions.setdefault((node.name, first), []).append(node)
         elif isinstance(node, ast.Lambda):
-            found.setdefault(("<lambda>", node.lineno), []).append(node)
-    return found
+            functions.setdefault(("<lambda>", node.lineno), []).append(node)
+    return functions
 
 
 def _has(node: ast.expr, code: python.CodeType) -> bool:
@@ -81,12 +81,14 @@ def source_of(code: python.CodeType) -> list[ast.stmt]:
     text = "".join(linecache.getlines(code.co_filename))
     if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start anew")
-    known = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
+    candidates = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
     if code.co_name == "<lambda>":  # perhaps one of several in a line, or nested
-        known = sorted((n for n in known if _has(n.body, code)), key=lambda n: -n.body.col_offset)
-    if not known:
+        candidates = sorted(
+            (n for n in candidates if _has(n.body, code)), key=lambda n: -n.body.col_offset
+        )
+    if not candidates:
         raise Untraceable("its text is not known: write it into a file")
-    node = known[0]
+    node = candidates[0]
     if isinstance(node, ast.FunctionDef):
         return node.body
     return [ast.copy_location(ast.Return(node.body), node.body)]
@@ -141,13 +143,13 @@ def _bound(
 ) -> dict[str, Any]:
     """Return the initial variables of a call; `seen` replaces defaults."""
     bound = signature.bind(*arguments, **keywords)
-    given = {*bound.arguments}
+    passed = {*bound.arguments}
     bound.apply_defaults()
-    return {n: x if n in given else seen(x) for n, x in bound.arguments.items()}
+    return {n: x if n in passed else seen(x) for n, x in bound.arguments.items()}
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Replace values by types; `within` are functions that know further things."""
+    """Replace values by types; `within` are the functions whose closures are being read."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):
@@ -196,11 +198,9 @@ class AstCompiler:
 
     @property
     def flow(self) -> Flow:
-        """The present writer; types may be determined before there is code."""
         return Flow(values.now())
 
     def result(self) -> Any:
-        """Compile the body; return the result of the function."""
         self.block(self.walked.body)
         if self.walked.generates:  # evaluated at once
             return self.yielded
@@ -214,13 +214,12 @@ class AstCompiler:
 
     @property
     def branches(self) -> bool:
-        """Tell whether this is in a branch; otherwise everything is as in Python."""
+        """Tell whether this is in a branch or a loop of the kernel."""
         return bool(self.depth or self.returns or self.breaks or self.continues)
 
     # --- branches
 
     def edge(self) -> Edge:
-        """End a branch here."""
         return self.flow.edge(self.names)
 
     def here(self) -> list[Edge]:
@@ -228,12 +227,11 @@ class AstCompiler:
         return [self.edge()] if self.goes else []
 
     def leave(self, edges: list[Edge]) -> None:
-        """End this branch here: it continues where `ways` merge."""
+        """End this branch here: it continues where `edges` merge."""
         edges.append(self.edge())
         self.goes = False
 
     def meet(self, edges: list[Edge]) -> None:
-        """Continue where branches merge."""
         self.goes = bool(edges)
         if edges:
             self.names = self.flow.meet(edges)
@@ -242,7 +240,7 @@ class AstCompiler:
         """Compile both branches, and continue where they merge."""
         edges: list[Edge] = []
         before = self.names
-        for begin, do in zip(self.flow.part(condition), (then, otherwise), strict=True):
+        for begin, do in zip(self.flow.split(condition), (then, otherwise), strict=True):
             self.names = dict(before)
             self.goes = True
             self.flow.start(begin)
@@ -264,7 +262,6 @@ class AstCompiler:
         raise Untraceable(f"kernels know no {_WORDS.get(kind, kind)}")
 
     def name(self, name: str) -> Any:
-        """Look a name up."""
         if name in self.names:
             return self.names[name]
         if name in self.free:
@@ -358,7 +355,6 @@ class AstCompiler:
         return result
 
     def compare(self, op: ast.cmpop, a: Any, b: Any) -> Any:
-        """Compile one comparison."""
         if isinstance(op, ast.Is | ast.IsNot):
             return (a is b) == isinstance(op, ast.Is)
         if isinstance(op, ast.In):
@@ -368,7 +364,6 @@ class AstCompiler:
         return _BINARY[type(op)](a, b)
 
     def among(self, a: Any, things: Any) -> Any:
-        """Compile `a in things`."""
         if is_value(things):
             raise Untraceable("kernels do not look for a number in an array")
         same = [operator.eq(a, b) for b in things] if is_value(a) else [a in things]
@@ -388,7 +383,6 @@ class AstCompiler:
         return self.either(value, *((rest, stay) if every else (stay, rest)))
 
     def either(self, condition: Any, then: Callable, otherwise: Callable) -> Any:
-        """Compile a conditional expression."""
         result = ast.Name("?")
         self.branch(
             condition, lambda: self.give(result, then()), lambda: self.give(result, otherwise())
@@ -405,7 +399,11 @@ class AstCompiler:
 
     def Call(self, node: ast.Call) -> Any:
         function = self.do(node.func)
-        if self.branches and isinstance(getattr(function, "__self__", None), _CHANGING):
+        if (
+            self.branches
+            and hasattr(function, "__self__")
+            and isinstance(function.__self__, _CHANGING)
+        ):
             raise Untraceable(_ON_ALL_WAYS)
         arguments = self.items(node.args)
         keywords: dict[str, Any] = {}
@@ -427,25 +425,24 @@ class AstCompiler:
 
         return self.closing(call, node, signature)
 
-    def signature(self, given: ast.arguments) -> inspect.Signature:
-        """Make the signature of a nested function."""
-        bare = copy.copy(given)
-        bare.defaults, bare.kw_defaults = [], [None] * len(given.kwonlyargs)
+    def signature(self, parameters: ast.arguments) -> inspect.Signature:
+        bare = copy.copy(parameters)
+        bare.defaults, bare.kw_defaults = [], [None] * len(parameters.kwonlyargs)
         text = ast.fix_missing_locations(ast.Expression(ast.Lambda(bare, ast.Constant(None))))
-        like = eval(compile(text, "signature", "eval"))
-        like.__defaults__ = tuple(map(self.do, given.defaults))
-        pairs = zip(given.kwonlyargs, given.kw_defaults, strict=True)
-        like.__kwdefaults__ = {a.arg: self.do(node) for a, node in pairs if node is not None}
-        return inspect.signature(like)
+        function = eval(compile(text, "signature", "eval"))
+        function.__defaults__ = tuple(map(self.do, parameters.defaults))
+        pairs = zip(parameters.kwonlyargs, parameters.kw_defaults, strict=True)
+        function.__kwdefaults__ = {a.arg: self.do(node) for a, node in pairs if node is not None}
+        return inspect.signature(function)
 
     def closing(
         self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature
     ) -> Callable:
         """Mark a function with its text and variables, which determine its code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
-        known = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
+        variables = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
         defaults = [p.default for p in signature.parameters.values()]
-        call.closes_over = lambda: (node, defaults, known())
+        call.closes_over = lambda: (node, defaults, variables())
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
@@ -486,15 +483,15 @@ class AstCompiler:
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Compile statements in order; record where one fails."""
+        """Compile statements in order; record the place where one fails."""
         for statement in statements:
             if not self.goes:
                 return
             try:
                 self.do(statement)
             except BaseException as error:
-                place = self.walked.__code__.co_filename, statement.lineno
-                vars(error).setdefault("places", []).append(place)
+                here = self.walked.__code__.co_filename, statement.lineno
+                vars(error).setdefault("places", []).append(here)
                 raise
 
     def Pass(self, node: ast.Pass) -> None:
@@ -536,10 +533,10 @@ class AstCompiler:
         self.names[node.name] = self.closing(call, node, signature)
 
     def Raise(self, node: ast.Raise) -> None:
-        what, arguments = node.exc, []
-        if isinstance(what, ast.Call):
-            what, arguments = what.func, self.items(what.args)
-        kind = getattr(builtins, what.id, None) if isinstance(what, ast.Name) else None
+        exception, arguments = node.exc, []
+        if isinstance(exception, ast.Call):
+            exception, arguments = exception.func, self.items(exception.args)
+        kind = vars(builtins).get(exception.id) if isinstance(exception, ast.Name) else None
         if not isinstance(kind, type) or any(map(is_value, arguments)):
             self.unknown(node)
         self.flow.fail(kind, tuple(arguments))
@@ -584,8 +581,8 @@ class AstCompiler:
             made = operation(getattr(thing, target.attr), self.do(node.value))
             setattr(thing, target.attr, made)
         elif isinstance(target, ast.Subscript):
-            things, place = self.changed(target), self.do(target.slice)
-            things[place] = operation(things[place], self.do(node.value))
+            things, index = self.changed(target), self.do(target.slice)
+            things[index] = operation(things[index], self.do(node.value))
         else:
             before = self.name(target.id)
             if is_value(before) and isinstance(before._kind, types.Array):  # changes in place
@@ -624,7 +621,7 @@ class AstCompiler:
         return loops[key] is not None
 
     def without_code(self, do: Callable[[], None]) -> None:
-        """Do something for its types only, and restore the state."""
+        """Determine types only, and restore the state."""
         go_back, here = self.state(), values.now()
         typed = type(here)(here.seen)
         typed.read = dict(here.read)
@@ -635,7 +632,7 @@ class AstCompiler:
             go_back()
 
     def state(self) -> Callable[[], None]:
-        """Return a function that restores the present state after a trial."""
+        """Return a function that restores the present state."""
         names, depth = dict(self.names), self.depth
         breaks, continues = self.breaks, self.continues
         returns, read = [*self.returns], dict(self.flow.lowering.read)
@@ -648,7 +645,6 @@ class AstCompiler:
         return go_back
 
     def unroll(self, node: ast.For, through: Iterable) -> None:
-        """Unroll a loop."""
         outer = self.breaks, self.continues
         self.breaks, self.continues = [], []
         for item in through:
@@ -706,7 +702,7 @@ class AstCompiler:
         condition = counter.goes_on(count) if counter else self.do(node.test)
         edges = []
         if is_value(condition):
-            inside, outside = self.flow.part(condition)
+            inside, outside = self.flow.split(condition)
             edges.append(outside._replace(names=self.names))
             self.names = dict(self.names)
             self.flow.start(inside)
