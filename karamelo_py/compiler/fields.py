@@ -66,12 +66,11 @@ def tensor(kin: Any) -> int:
 
 
 def planar(kin: Any) -> int:
-    """Components of a d x d matrix."""
     return kin.dimension**2
 
 
 class Field(NamedTuple):
-    """Numbers of each point or node: the base of fields."""
+    """Base of fields: numbers of each point or node."""
 
     array: Any
 
@@ -99,12 +98,10 @@ def name_of(kind: type) -> str:
 
 
 def is_kept(kind: type) -> bool:
-    """Tell whether a field outlives a step."""
     return kind.kept
 
 
 def columns_of(kind: type) -> tuple[str, ...]:
-    """Names of the components of a field in output, possibly none."""
     return kind.columns
 
 
@@ -138,7 +135,6 @@ def _first_of_line(room: np.ndarray) -> int:
 
 
 def length_of_rows(shape: tuple[int, ...], dtype: type) -> int:
-    """Numbers of memory that `rows_of_points` of this shape needs."""
     *rows, count = shape
     return prod(rows) * _distance_of_rows(count, dtype) + LINE // np.dtype(dtype).itemsize
 
@@ -149,7 +145,6 @@ def _distance_of_rows(count: int, dtype: type) -> int:
 
 
 def as_rows_of_points(array: np.ndarray) -> np.ndarray:
-    """Convert `array` to `rows_of_points`."""
     array = np.asarray(array)
     if array.ndim == 1 or not array.flags.c_contiguous:
         return array
@@ -167,7 +162,7 @@ def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """Make the field of `count` points, (components, count), with initial values."""
+    """Make a field (components, count) with initial values."""
     array = rows_of_points((kind.shape(kin), count), real)
     array[:] = _start(kind, kin, real)[:, None]
     return kind(array)
@@ -185,7 +180,7 @@ def records(count: int, width: int, real: type) -> np.ndarray:
 
 
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
-    """Make the field of `count` nodes, (count, components), with initial values."""
+    """Make a field (count, components) with initial values."""
     width = kind.shape(kin)
     # Three numbers are loaded and stored as four, the width of a register.
     array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
@@ -243,7 +238,6 @@ def forget(array, p, which):
 
 
 def load_vector(kin, array, p):
-    """The first components of point `p` as a vector."""
     return kin.Vector._make([array[k, p] for k in range(kin.dimension)])
 
 

@@ -20,7 +20,6 @@ _AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "
 
 
 def folder() -> Path:
-    """Return the cache folder of kernels."""
     home = os.environ.get("KARAMELO_PY_CACHE") or platformdirs.user_cache_dir("karamelo-py")
     return Path(home) / "kernels"
 
@@ -70,7 +69,6 @@ def report(text: str) -> None:
 
 
 def report_error(error: OSError) -> None:
-    """Tell the user that the cache folder cannot be used."""
     report(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
 
 

@@ -158,7 +158,6 @@ def _of_nvidia(name: str) -> str | None:
 
 
 def library() -> bytes:
-    """Read NVIDIA's mathematics library."""
     from cuda import pathfinder
 
     try:
@@ -201,7 +200,6 @@ def numbers_of(function: Callable, arguments: tuple) -> int:
 
 
 def assembled(text: str, processor: str) -> str:
-    """Compile module text to PTX."""
     return machine.assembly(text, TRIPLE, processor, library() if '@"__nv_' in text else None)
 
 
@@ -209,7 +207,7 @@ def assembled(text: str, processor: str) -> str:
 
 
 def bandwidth(card: Any, size: int = 1 << 30) -> float:
-    """Measure the copy bandwidth of a GPU: bytes read and written per second."""
+    """Measure the copy bandwidth: bytes read and written per second."""
     source, target = card.allocate(size), card.allocate(size)
     fastest = min(card.seconds_of([lambda: card.copy(target, source, size)] * 5))
     card.free(source)
@@ -218,8 +216,6 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 
 class Code(NamedTuple):
-    """Code of a thread function, like `Unit`."""
-
     name: str
     code: bytes  # empty if it is to be read from the disk
     file: str
@@ -240,7 +236,6 @@ class _Coded:
         self._known: dict[tuple, Any] = {}
 
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> Any:
-        """Prepare the function for launches with arguments of these types."""
         called = called or {}
         key = function, kinds, session.changes, *called.values()
         if key not in self._known:
@@ -270,7 +265,7 @@ class _Coded:
 
 
 class Emulator(_Coded):
-    """Runs thread functions on the processor, in separate memory; documents a device's methods."""
+    """Runs thread functions on the processor, in separate memory."""
 
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
@@ -281,28 +276,25 @@ class Emulator(_Coded):
         self._rooms: dict[int, Any] = {}
 
     def allocate(self, size: int) -> int:
-        """Allocate memory; return its address."""
         room = ctypes.create_string_buffer(size + 64)
         at = -(-ctypes.addressof(room) // 64) * 64
         self._rooms[at] = room
         return at
 
     def memory(self) -> tuple[int, int]:
-        """Return bytes of free and total memory, larger than any scene."""
+        """Return bytes of free and total memory."""
         return 1 << 60, 1 << 60
 
     def free(self, address: int) -> None:
-        """Free memory."""
         del self._rooms[address]
 
     def copy_to(self, target: int, source: int, size: int) -> None:
-        """Copy from program memory to device memory."""
+        """Copy from program memory to device memory; the first argument is the target."""
         ctypes.memmove(target, source, size)
 
     copy = copy_from = copy_to  # the first argument is the destination
 
     def loaded(self, code: Code) -> Callable:
-        """Load code for launches."""
         (address,) = machine.load(code.code, code.name)
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
@@ -315,8 +307,6 @@ class Emulator(_Coded):
             entry(i, *arguments)
 
     def together(self, launches: Sequence[Callable]) -> Callable:
-        """Combine several launches."""
-
         def do() -> None:
             for launch in launches:
                 launch()
@@ -473,7 +463,7 @@ class Card(_Coded):
 
 
 def card() -> Card | Emulator:
-    """Return the GPU of this machine, or its substitute if KARAMELO_PY_GPU=emulated."""
+    """Return the GPU, or its substitute if KARAMELO_PY_GPU=emulated."""
     return Emulator() if os.environ.get("KARAMELO_PY_GPU") == "emulated" else Card()
 
 
@@ -488,7 +478,7 @@ class _There(NamedTuple):
 
 
 def _extent(array: np.ndarray) -> int:
-    """Count bytes from the first item to the end of the last."""
+    """Count bytes up to the end of the last item."""
     if not array.size:
         return 0
     steps = zip(array.shape, array.strides, strict=True)
@@ -544,11 +534,9 @@ class Images:
 
     @property
     def size(self) -> int:
-        """Bytes on the device."""
         return sum(self._rooms.values())
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
-        """Make an array in device memory only."""
         size = max(int(np.prod(shape)) * np.dtype(dtype).itemsize, 1)
         return np.ndarray(shape, dtype, (ctypes.c_char * size).from_address(self._room(size)))
 
@@ -571,7 +559,6 @@ class Images:
         self.card.copy_to(at, ctypes.addressof(room), len(content))
 
     def close(self) -> None:
-        """Free all memory."""
         _free_all(self.card, self._rooms)
         self._known.clear()
 

@@ -132,43 +132,36 @@ def prefetch(array: Any, at: tuple) -> None:
 
 
 class LaneGroup(LaneType):
-    """Type of the numbers of up to `width` consecutive points."""
+    """Type of up to `width` consecutive points: number of the first, and count."""
 
     def __init__(self, width: int):
         self.width = width
         super().__init__(name=f"LaneGroup({width})")
 
     def register_type(self) -> ir.Type:
-        """LLVM type: the first number, and the count."""
         return ir.LiteralStructType([I64, I64])
 
 
 class Beside(LaneType):
-    """Type of nodes at a distance from those in lanes, the same in all lanes."""
+    """Type of nodes in lanes, and a distance from them."""
 
     def __init__(self, nodes: Lanes):
         self.nodes, self.width = nodes, nodes.width
         super().__init__(name=f"Beside({nodes})")
 
     def register_type(self) -> ir.Type:
-        """LLVM type: the nodes, and the distance."""
         return ir.LiteralStructType([llvm.register_type(self.nodes), I64])
 
 
 class FourLanes(NamedTuple):
-    """Four points at once."""
-
     width = 4
 
 
 class EightLanes(NamedTuple):
-    """Eight points at once."""
-
     width = 8
 
 
 def lanes_for(bits: int) -> type:
-    """Choose the number of lanes for numbers of this many bits."""
     return {64: FourLanes, 32: EightLanes}[bits]
 
 
@@ -185,7 +178,6 @@ def group(tag, first, count):
 
 @intrinsic
 def spread(tag, value):
-    """Return the same number in all lanes."""
     lanes = Lanes(value, tag.instance_class.width)
     return lanes(tag, value), lambda builder, _, number: splat(builder, number, lanes)
 
@@ -215,7 +207,7 @@ def _room_for(points, numbers):
     return array(points, numbers), codegen
 
 
-def _masked(builder: Any, p: Any, width: int) -> Any:
+def _masked(builder: ir.IRBuilder, p: Any, width: int) -> Any:
     numbers = Lanes(types.int64, width)
     count = splat(builder, builder.extract_value(p, 1), numbers)
     all_of_them = ir.Constant(llvm.register_type(numbers), list(range(width)))
@@ -233,7 +225,7 @@ def _of_present(p, value):
     return select(_present(p), value, real(0, value))
 
 
-def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> Any:
+def _either(builder: ir.IRBuilder, condition: Any, first: Callable, second: Callable) -> Any:
     """Branch: the value of `first` if the condition holds, else of `second`."""
     results = []
     with builder.if_else(condition) as branches:
@@ -249,7 +241,7 @@ def _either(builder: Any, condition: Any, first: Callable, second: Callable) -> 
 
 
 def _all_or_masked(
-    builder: Any, pointer: Any, p: Any, lanes: Lanes, whole: Callable, partly: Callable
+    builder: ir.IRBuilder, pointer: Any, p: Any, lanes: Lanes, whole: Callable, partly: Callable
 ) -> Any:
     """Read or write all lanes if all have a point, as in nearly all groups; else masked.
 
@@ -267,7 +259,7 @@ def _all_or_masked(
     return _either(builder, full, lambda: whole(at, size), masked)
 
 
-def _points_at(builder: Any, array: types.Array, value: Any, at: Any, index: Any) -> tuple:
+def _points_at(builder: ir.IRBuilder, array: types.Array, value: Any, at: Any, index: Any) -> tuple:
     """Return the address of an item whose last index is a group, and the group."""
     kinds, values = _indices(builder, at, index)
     first = builder.extract_value(values[-1], 0)
@@ -277,13 +269,13 @@ def _points_at(builder: Any, array: types.Array, value: Any, at: Any, index: Any
     return llvm.item_pointer(builder, array, value, indices, size), values[-1]
 
 
-def _indices(builder: Any, at: Any, value: Any) -> tuple[list, list]:
+def _indices(builder: ir.IRBuilder, at: Any, value: Any) -> tuple[list, list]:
     if isinstance(at, types.BaseTuple):
         return list(at), llvm.unpack(builder, value)
     return [at], [value]
 
 
-def _as_places(builder: Any, kinds: list, values: list) -> list:
+def _as_places(builder: ir.IRBuilder, kinds: list, values: list) -> list:
     return [llvm.cast(builder, v, k, types.intp) for k, v in zip(kinds, values, strict=True)]
 
 
@@ -331,8 +323,7 @@ def _store_points(array, at, value):
     return types.void(array, at, value if isinstance(value, Lanes) else lanes), codegen
 
 
-def ask(builder: Any, pointer: Any, ahead: Any) -> None:
-    """Prefetch data at this offset from an address."""
+def ask(builder: ir.IRBuilder, pointer: Any, ahead: Any) -> None:
     at = builder.gep(builder.bitcast(pointer, llvm.NOTHING), [ahead])
     kinds = [llvm.NOTHING, I32, I32, I32]
     function = llvm.external(builder, "llvm.prefetch.p0", ir.VoidType(), kinds)
@@ -368,7 +359,6 @@ def at_lane(builder, kind, array, of, at, k, *rest):
 
 @intrinsic
 def _gather(array, at):
-    """Load items of an array at numbers in lanes, the first index."""
     lanes = Lanes(array.dtype, lanes_of(at))
 
     def codegen(builder, value, index):

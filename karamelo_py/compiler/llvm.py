@@ -33,7 +33,6 @@ class Lanes(LaneType):
 
 @functools.cache
 def register_type(kind: types.Type) -> ir.Type:
-    """Return the LLVM type of a value in registers."""
     if hasattr(kind, "register_type"):
         return kind.register_type()
     if isinstance(kind, types.Boolean):
@@ -52,7 +51,7 @@ def register_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def memory_type(kind: types.Type) -> ir.Type:
-    """Return the LLVM type of a value in memory, where booleans take a byte."""
+    """Return the LLVM type in memory, where booleans take a byte."""
     if isinstance(kind, types.Boolean):
         return I8
     if isinstance(kind, types.Record):
@@ -75,8 +74,7 @@ def nothing() -> ir.Constant:
     return ir.Constant(NOTHING, None)
 
 
-def constant(builder: Any, kind: types.Type, value: Any) -> ir.Constant:
-    """Return a number, or an array, as a constant of this type."""
+def constant(builder: ir.IRBuilder, kind: types.Type, value: Any) -> ir.Constant:
     if isinstance(kind, types.Array):
         return _constant_array(builder, kind, np.asarray(value))
     if isinstance(kind, types.Float):
@@ -84,7 +82,7 @@ def constant(builder: Any, kind: types.Type, value: Any) -> ir.Constant:
     return ir.Constant(register_type(kind), value if isinstance(value, float) else int(value))
 
 
-def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
+def _constant_array(builder: ir.IRBuilder, kind: types.Array, value: np.ndarray) -> Any:
     value = np.ascontiguousarray(value)
     item = memory_type(kind.dtype)
     value = value.view(np.uint8) if value.dtype == np.bool_ else value
@@ -95,16 +93,14 @@ def _constant_array(builder: Any, kind: types.Array, value: np.ndarray) -> Any:
     )
 
 
-def in_module(builder: Any, content: ir.Constant, name: str) -> ir.GlobalVariable:
-    """Put a constant into memory."""
+def in_module(builder: ir.IRBuilder, content: ir.Constant, name: str) -> ir.GlobalVariable:
     name = builder.module.get_unique_name(name)
     variable = ir.GlobalVariable(builder.module, content.type, name)
     variable.initializer, variable.global_constant, variable.linkage = content, True, "internal"
     return variable
 
 
-def cast(builder: Any, value: Any, kind: types.Type, wanted: types.Type) -> Any:
-    """Convert a value of one type to another."""
+def cast(builder: ir.IRBuilder, value: Any, kind: types.Type, wanted: types.Type) -> Any:
     if isinstance(wanted, types.Literal):
         wanted = types.unliteral(wanted)
     if kind == wanted:
@@ -155,28 +151,24 @@ def scalar_of(kind: types.Type) -> types.Type:
     return kind.scalar if isinstance(kind, Lanes) else kind
 
 
-def splat(builder: Any, value: Any, lanes: Lanes) -> Any:
-    """Put the same number into all lanes."""
+def splat(builder: ir.IRBuilder, value: Any, lanes: Lanes) -> Any:
     none = ir.Constant(register_type(lanes), ir.Undefined)
     one = builder.insert_element(none, value, I32(0))
     return shuffle(builder, one, none, [0] * lanes.width)
 
 
-def lane(builder: Any, value: Any, k: int) -> Any:
-    """Extract lane `k`."""
+def lane(builder: ir.IRBuilder, value: Any, k: int) -> Any:
     return builder.extract_element(value, I32(k))
 
 
-def pack(builder: Any, values: list, lanes: Lanes) -> Any:
-    """Put a number into each lane."""
+def pack(builder: ir.IRBuilder, values: list, lanes: Lanes) -> Any:
     made = ir.Constant(register_type(lanes), ir.Undefined)
     for k, value in enumerate(values):
         made = builder.insert_element(made, value, I32(k))
     return made
 
 
-def shuffle(builder: Any, a: Any, b: Any, order: list[int]) -> Any:
-    """Choose lanes of two vectors."""
+def shuffle(builder: ir.IRBuilder, a: Any, b: Any, order: list[int]) -> Any:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(order)), order))
 
 
@@ -190,31 +182,31 @@ def overloaded(kind: ir.Type) -> str:
 # --- memory ---------------------------------------------------------------------------------------
 
 
-def room(builder: Any, kind: ir.Type) -> Any:
+def room(builder: ir.IRBuilder, kind: ir.Type) -> Any:
     """Allocate stack memory of the present function, once for all iterations of a loop."""
     with builder.goto_entry_block():
         return builder.alloca(kind)
 
 
-def at(builder: Any, pointer: Any, *indices: int) -> Any:
-    """Return the address of an item of a structure or array in memory."""
+def at(builder: ir.IRBuilder, pointer: Any, *indices: int) -> Any:
     return builder.gep(pointer, [I32(index) for index in indices], inbounds=True)
 
 
-def put(builder: Any, kind: types.Type, value: Any, pointer: Any, align: int | None = None) -> None:
-    """Store a value."""
+def put(
+    builder: ir.IRBuilder, kind: types.Type, value: Any, pointer: Any, align: int | None = None
+) -> None:
     value = _converted(builder, kind, value, memory_type, lambda truth: builder.zext(truth, I8))
     builder.store(value, pointer, align=align)
 
 
-def get(builder: Any, kind: types.Type, pointer: Any, align: int | None = None) -> Any:
-    """Load a value."""
+def get(builder: ir.IRBuilder, kind: types.Type, pointer: Any, align: int | None = None) -> Any:
     value = builder.load(pointer, align=align)
     return _converted(builder, kind, value, register_type, lambda byte: builder.trunc(byte, I1))
 
 
-def _converted(builder: Any, kind: types.Type, value: Any, to: Callable, truth: Callable) -> Any:
-    """Convert each truth value among nested tuples."""
+def _converted(
+    builder: ir.IRBuilder, kind: types.Type, value: Any, to: Callable, truth: Callable
+) -> Any:
     if register_type(kind) == memory_type(kind):
         return value
     if not isinstance(kind, types.BaseTuple):
@@ -227,12 +219,11 @@ def _converted(builder: Any, kind: types.Type, value: Any, to: Callable, truth: 
 # --- tuples and arrays ----------------------------------------------------------------------------
 
 
-def make_tuple(builder: Any, kind: types.Type, items: Sequence) -> Any:
-    """Build a tuple."""
+def make_tuple(builder: ir.IRBuilder, kind: types.Type, items: Sequence) -> Any:
     return make_struct(builder, register_type(kind), items)
 
 
-def make_struct(builder: Any, kind: ir.Type, items: Sequence) -> Any:
+def make_struct(builder: ir.IRBuilder, kind: ir.Type, items: Sequence) -> Any:
     """Build a structure, or an array in registers."""
     made = ir.Constant(kind, ir.Undefined)
     for k, item in enumerate(items):
@@ -240,16 +231,14 @@ def make_struct(builder: Any, kind: ir.Type, items: Sequence) -> Any:
     return made
 
 
-def unpack(builder: Any, value: Any) -> list:
-    """Take a tuple apart."""
+def unpack(builder: ir.IRBuilder, value: Any) -> list:
     count = len(value.type.elements) if hasattr(value.type, "elements") else value.type.count
     return [builder.extract_value(value, k) for k in range(count)]
 
 
 def make_array(
-    builder: Any, kind: types.Array, data: Any, shape: Sequence, strides: Sequence
+    builder: ir.IRBuilder, kind: types.Array, data: Any, shape: Sequence, strides: Sequence
 ) -> Any:
-    """Put an array together."""
     made = register_type(kind)
     parts = [data, *(make_struct(builder, made.elements[1], part) for part in (shape, strides))]
     return make_struct(builder, made, parts)
@@ -258,7 +247,7 @@ def make_array(
 class ArrayParts:
     """Parts of an array, extracted on access."""
 
-    def __init__(self, builder: Any, kind: types.Array, value: Any):
+    def __init__(self, builder: ir.IRBuilder, kind: types.Array, value: Any):
         self.builder, self.kind, self.value = builder, kind, value
 
     @functools.cached_property
@@ -275,9 +264,9 @@ class ArrayParts:
 
 
 def item_pointer(
-    builder: Any, kind: types.Array, value: Any, indices: Sequence, last: Any = None
+    builder: ir.IRBuilder, kind: types.Array, value: Any, indices: Sequence, last: Any = None
 ) -> Any:
-    """Return the address of an item; `last` is the stride of the last index, if known."""
+    """Return the address of an item; `last` is the last stride, if known."""
     parts = ArrayParts(builder, kind, value)
     if kind.layout == "C":
         offset = indices[0]
@@ -289,8 +278,7 @@ def item_pointer(
     return byte_pointer(builder, parts.data, functools.reduce(builder.add, products))
 
 
-def byte_pointer(builder: Any, pointer: Any, offset: Any) -> Any:
-    """Return the address at an offset in bytes."""
+def byte_pointer(builder: ir.IRBuilder, pointer: Any, offset: Any) -> Any:
     address = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
     return builder.bitcast(address, pointer.type)
 
@@ -298,14 +286,16 @@ def byte_pointer(builder: Any, pointer: Any, offset: Any) -> Any:
 # --- functions and loops --------------------------------------------------------------------------
 
 
-def external(builder: Any, name: str, result: ir.Type, arguments: Sequence[ir.Type]) -> ir.Function:
+def external(
+    builder: ir.IRBuilder, name: str, result: ir.Type, arguments: Sequence[ir.Type]
+) -> ir.Function:
     """Declare an external function, or one of LLVM."""
     declared = builder.module.globals.get(name)
     kind = ir.FunctionType(result, arguments)
     return declared if declared is not None else ir.Function(builder.module, kind, name)
 
 
-def call(builder: Any, name: str, result: ir.Type, values: list) -> Any:
+def call(builder: ir.IRBuilder, name: str, result: ir.Type, values: list) -> Any:
     """Call a function of LLVM (whose name contains the type) or of the C library."""
     kinds = [value.type for value in values]
     if name.startswith("llvm."):
@@ -325,7 +315,7 @@ def of_library(name: str) -> Callable:
 
 
 @contextmanager
-def counted(builder: Any, count: Any) -> Iterator[Any]:
+def counted(builder: ir.IRBuilder, count: Any) -> Iterator[Any]:
     """Write a loop over the numbers below `count`; its body is written within this context."""
     before = builder.block
     head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))

@@ -150,7 +150,6 @@ _NAMES = {number: name for name, number in OPERATIONS.items()}
 
 
 def of_one(op, a):
-    """The function `op` of one number."""
     return quietly(_NAMES[int(op)], a)
 
 
@@ -165,7 +164,6 @@ def _function_of(op, a):
 
 
 def of_two(op, a, b):
-    """The operation `op` on two numbers; comparisons and logical ones give 1.0 or 0.0."""
     return quietly(_NAMES[int(op)], a, b)
 
 

@@ -110,7 +110,6 @@ class Dual(namedtuple("Dual", "value slopes")):
 
 
 def is_tensor(thing: Any) -> bool:
-    """Tell whether a thing is a vector or tensor, with products in its class."""
     return isinstance(thing, tuple) and not isinstance(thing, Dual)
 
 
@@ -138,7 +137,6 @@ def seeded(numbers: tuple) -> Any:
 
 
 def is_zero(slope: Any) -> bool:
-    """Tell whether a slope is known to vanish."""
     return is_literal(slope) and slope == 0
 
 

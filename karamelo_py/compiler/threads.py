@@ -67,14 +67,12 @@ def _many_threads(lowering: Any) -> bool:
 # --- shared memory words ----------------------------------------------------------------------
 
 
-def _word(builder: Any, address: Any) -> Any:
+def _word(builder: ir.IRBuilder, address: Any) -> Any:
     return builder.inttoptr(address, I64.as_pointer())
 
 
 @intrinsic
 def read(address):
-    """Load a word with acquire ordering."""
-
     def codegen(builder, at):
         return builder.load_atomic(_word(builder, at), "acquire", 8)
 
@@ -83,8 +81,6 @@ def read(address):
 
 @intrinsic
 def write(address, value):
-    """Store a word with release ordering."""
-
     def codegen(builder, at, number):
         builder.store_atomic(number, _word(builder, at), "release", 8)
 
@@ -93,8 +89,6 @@ def write(address, value):
 
 @intrinsic
 def add(address, value):
-    """Add to a word atomically."""
-
     def codegen(builder, at, number):
         builder.atomic_rmw("add", _word(builder, at), number, "acq_rel")
 

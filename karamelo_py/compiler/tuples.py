@@ -24,7 +24,6 @@ def nested_as(like, numbers):
 
 
 def count_in(nested):
-    """Count the numbers in nested tuples."""
     if type(nested) is tuple and not nested:
         return 0
     return sum([count_in(item) if isinstance(item, tuple) else 1 for item in nested])

@@ -97,7 +97,7 @@ def _size(array: Any) -> int:
 _fma = llvm.of_library("llvm.fma")  # a b + c of vectors, rounded once
 
 
-def _transposed(builder: Any, rows: list) -> list:
+def _transposed(builder: ir.IRBuilder, rows: list) -> list:
     """Transpose four vectors of four or two numbers: lanes from records."""
     if rows[0].type.count == 2:
         ab = shuffle(builder, rows[0], rows[1], [0, 2, 1, 3])
@@ -112,7 +112,7 @@ def _transposed(builder: Any, rows: list) -> list:
     ]
 
 
-def _record(builder: Any, kind: Any, pointer: Any, components: int) -> Any:
+def _record(builder: ir.IRBuilder, kind: Any, pointer: Any, components: int) -> Any:
     """Cast an address to that of a vector of components."""
     vector = ir.VectorType(llvm.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())
@@ -131,7 +131,7 @@ def _chunks(count: int) -> list[tuple[int, int]]:
     return out
 
 
-def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
+def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> list:
     """Return lanes of `count` components from the records of the points."""
     if count == 1:
         return [pack(builder, [lane(builder, row, 0) for row in rows], lanes)]
@@ -141,7 +141,7 @@ def _lanes_from(builder: Any, rows: list, lanes: Lanes, count: int) -> list:
     return [shuffle(builder, *pair, list(range(8))) for pair in zip(*parts, strict=True)]
 
 
-def _gathered(builder: Any, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
+def _gathered(builder: ir.IRBuilder, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
     """Gather records; ``read(lane, column, count)`` loads components of one point."""
     components: list = []
     for begin, count in _chunks(len(like)):
@@ -268,7 +268,7 @@ def _move(*kinds):
     return types.void(array, number, other, number, number, like, types.boolean), codegen
 
 
-def _records(builder: Any, parts: list) -> list:
+def _records(builder: ir.IRBuilder, parts: list) -> list:
     """Make four records of four, two or one components from lanes."""
     if len(parts) == 4:
         return _transposed(builder, parts)
@@ -343,7 +343,7 @@ def _scatter_affine(*kinds):
     return types.void(array, nodes, types.int64, weights, value, slopes), codegen
 
 
-def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
+def _records_of(builder: ir.IRBuilder, parts: list, lanes: Lanes, count: int) -> list:
     """Make a record of `count` components for each lane."""
     parts = [*parts, *[ir.Constant(llvm.register_type(lanes), None)] * 8][:count]
     rows = []
@@ -359,7 +359,7 @@ def _records_of(builder: Any, parts: list, lanes: Lanes, count: int) -> list:
     return rows
 
 
-def _kept_in_memory(builder: Any, vectors: list) -> Callable:
+def _kept_in_memory(builder: ir.IRBuilder, vectors: list) -> Callable:
     """Store vectors in memory that is opaque to LLVM; return a function of vector and lane.
 
     It gives the address of a number. Broadcasting from memory is part of the load; from a register

@@ -51,7 +51,6 @@ def _array(array: np.ndarray) -> _Array:
 
 
 def _drop(number: int, alive: weakref.ref) -> None:
-    """Remove a deleted array, unless another one has its id."""
     entry = session.arrays.get(number)
     if entry is not None and entry.alive is alive:
         session.arrays.pop(number, None)
@@ -69,7 +68,7 @@ class Address(int):
 
 
 class Plan(NamedTuple):
-    """Layout of the words of arguments of some types."""
+    """Layout of the words of arguments."""
 
     text: struct.Struct
     tuples: tuple[tuple[int, int], ...]  # index of a word that is a nested tuple, and its start
@@ -167,7 +166,6 @@ def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, in
 
 
 def plan_for(arguments: tuple) -> Plan:
-    """Make the layout of arguments of these types."""
     places: list[tuple[int, str]] = []
     tuples: list[tuple[int, int]] = []
     end = 0
@@ -195,7 +193,7 @@ def plan_for(arguments: tuple) -> Plan:
 
 
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
-    """Return the size in bytes of a result, and a function that reads it."""
+    """Return the bytes of a result, and a function that reads it."""
     places: list[tuple[int, str]] = []
     size, _ = _lay(llvm.memory_type(kind), 0, places)
 

@@ -37,7 +37,6 @@ _TYPES = {
 
 
 def common(*kinds: types.Type) -> types.Type:
-    """Return the type of a sum of numbers of these types."""
     return functools.reduce(_wider, kinds)
 
 
@@ -100,7 +99,7 @@ def _binary(kind_of: Callable, write: Callable) -> Callable:
 
 
 def _sum(of_reals: str, of_whole: str) -> Callable:
-    def write(builder: Any, kind: types.Type, *values: Any) -> Any:
+    def write(builder: ir.IRBuilder, kind: types.Type, *values: Any) -> Any:
         return getattr(builder, of_whole if _is_whole(kind) else of_reals)(*values)
 
     return _binary(common, write)
@@ -120,7 +119,7 @@ def _shift(write: Callable) -> Callable:
     return _binary(lambda a, b: common(a, a) if _is_whole(a) and _is_whole(b) else None, write)
 
 
-def _shifted_right(builder: Any, kind: types.Integer, *values: Any) -> Any:
+def _shifted_right(builder: ir.IRBuilder, kind: types.Integer, *values: Any) -> Any:
     return (builder.ashr if kind.signed else builder.lshr)(*values)
 
 
@@ -139,7 +138,7 @@ def _truth_of(kind: types.Type) -> types.Type:
 
 
 def _compared(sign: str, kind: types.Type) -> Callable:
-    def compared(builder: Any, values: list) -> Any:
+    def compared(builder: ir.IRBuilder, values: list) -> Any:
         if not _is_whole(kind):
             compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
         else:
@@ -152,7 +151,7 @@ def _compared(sign: str, kind: types.Type) -> Callable:
 
 def _mixed(sign: str, first_signed: bool) -> Callable:
 
-    def compared(builder: Any, values: list) -> Any:
+    def compared(builder: ir.IRBuilder, values: list) -> Any:
         values = [v if v.type.width == 64 else builder.sext(v, llvm.I64) for v in values]
         negative = builder.icmp_signed("<", values[not first_signed], llvm.I64(0))
         below = builder.icmp_signed(
@@ -164,16 +163,16 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 
 
 def _whole_division(remainder: bool) -> Callable:
-    """Make Python's integer division; division by 0 gives 0."""
+    """Make Python's integer division; x // 0 is 0."""
 
-    def write(builder: Any, kind: types.Type, *values: Any) -> Any:
+    def write(builder: ir.IRBuilder, kind: types.Type, *values: Any) -> Any:
         of = _whole_parts if _is_whole(kind) else _real_parts
         return of(builder, kind, *values)[remainder]
 
     return _binary(common, write)
 
 
-def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
+def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
     zero, one = x.type(0), x.type(1)
     safe = isinstance(y, ir.Constant) and y.constant not in (0, -1)
     bad = None
@@ -196,7 +195,7 @@ def _whole_parts(builder: Any, kind: types.Integer, x: Any, y: Any) -> tuple[Any
     return tuple(builder.select(bad, zero, part) for part in (quotient, rest))
 
 
-def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, Any]:
+def _real_parts(builder: ir.IRBuilder, kind: types.Float, x: Any, y: Any) -> tuple[Any, Any]:
     """Divide like Python's floats (Objects/floatobject.c); division by 0 gives NumPy's results."""
     real = x.type
     zero, one = real(0.0), real(1.0)
@@ -223,7 +222,6 @@ def _real_parts(builder: Any, kind: types.Float, x: Any, y: Any) -> tuple[Any, A
 
 
 def _power(a: types.Type, b: types.Type) -> Operation | None:
-    """Compile known integer exponents as products."""
     if isinstance(b, types.IntegerLiteral) and abs(b.literal_value) <= 0x10000:
         kind, exponent = common(a, a), b.literal_value
         if exponent < 0 and _is_whole(kind):
@@ -236,7 +234,7 @@ def _power(a: types.Type, b: types.Type) -> Operation | None:
 
 
 def _product(kind: types.Type, exponent: int) -> Callable:
-    def power(builder: Any, values: list) -> Any:
+    def power(builder: ir.IRBuilder, values: list) -> Any:
         multiply = builder.mul if _is_whole(kind) else builder.fmul
         factor, left, made = values[0], abs(exponent), None
         while left:
@@ -254,7 +252,7 @@ def _alone(a: types.Type) -> types.Type:
     return common(a, a)
 
 
-def _negative(builder: Any, kind: types.Type, value: Any) -> Any:
+def _negative(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
     return builder.neg(value) if _is_whole(kind) else builder.fneg(value)
 
 
@@ -264,7 +262,7 @@ def _inverted(a: types.Type) -> types.Type | None:
     return a if isinstance(a, types.Boolean) else common(a, a)
 
 
-def _not(builder: Any, kind: types.Type, value: Any) -> Any:
+def _not(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
     return builder.not_(value)
 
 
@@ -274,7 +272,7 @@ def _sized(a: types.Type) -> types.Type | None:
     return common(a, a) if isinstance(a, types.Boolean) else a
 
 
-def _size(builder: Any, kind: types.Type, value: Any) -> Any:
+def _size(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
     if not _is_whole(kind):
         return llvm.call(builder, "llvm.fabs", value.type, [value])
     below = builder.icmp_signed("<", value, value.type(0))
@@ -290,7 +288,7 @@ def _extreme(sign: str) -> Callable:
         kind = common(*kinds)
         better = _compared(sign, kind)
 
-        def extreme(builder: Any, values: list) -> Any:
+        def extreme(builder: ir.IRBuilder, values: list) -> Any:
             best = values[0]
             for value in values[1:]:
                 best = builder.select(better(builder, [value, best]), value, best)
@@ -301,7 +299,7 @@ def _extreme(sign: str) -> Callable:
     return operation
 
 
-def _as_it_is(builder: Any, kind: types.Type, value: Any) -> Any:
+def _as_it_is(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
     return value
 
 
@@ -327,21 +325,21 @@ def _of_reals(name: str, count: int = 1) -> Callable:
 
 
 def _rounding(name: str) -> Callable:
-    def rounded(builder: Any, kind: types.Type, value: Any) -> Any:
+    def rounded(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
         return builder.fptosi(llvm.call(builder, name, value.type, [value]), llvm.I64)
 
     return _unary(_real_of, rounded, types.int64)
 
 
-def _is_no_number(builder: Any, kind: types.Type, x: Any) -> Any:
+def _is_no_number(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
     return builder.fcmp_unordered("uno", x, x)
 
 
-def _is_infinite(builder: Any, kind: types.Type, x: Any) -> Any:
+def _is_infinite(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
     return builder.fcmp_ordered("==", _size(builder, kind, x), x.type(math.inf))
 
 
-def _is_finite(builder: Any, kind: types.Type, x: Any) -> Any:
+def _is_finite(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
     rest = builder.fsub(x, x)
     return builder.fcmp_ordered("ord", rest, rest)
 
@@ -350,7 +348,7 @@ def _frexp(a: types.Type) -> Operation:
     kind = _real_of(a)
     result = types.Tuple((kind, types.int32))
 
-    def parts(builder: Any, values: list) -> Any:
+    def parts(builder: ir.IRBuilder, values: list) -> Any:
         room = llvm.room(builder, llvm.I32)
         fraction = llvm.call(builder, "frexp", values[0].type, [*values, room])
         return llvm.make_tuple(builder, result, [fraction, builder.load(room)])
@@ -368,14 +366,14 @@ def _scaled(factor: float) -> Callable:
 
 
 def _numpy_extreme(sign: str) -> Callable:
-    """Make NumPy's minimum or maximum; NaN if an operand is NaN."""
+    """Make NumPy's minimum or maximum; NaN if an operand is."""
 
     def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
         if _is_whole(kind):
             return _extreme(sign)(a, b)
 
-        def extreme(builder: Any, values: list) -> Any:
+        def extreme(builder: ir.IRBuilder, values: list) -> Any:
             first, second = values
             chosen = builder.fcmp_unordered(sign, first, second)
             ordered = builder.fcmp_ordered("ord", second, second)
@@ -401,7 +399,7 @@ _TOLD = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int64)
 machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of_python))
 
 
-def _gamma(builder: Any, kind: types.Type, x: Any) -> Any:
+def _gamma(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
     """Call Python's gamma function, whose bits do not depend on the C library."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
@@ -509,7 +507,6 @@ _POWERS = {operator.pow, math.pow, np.power}  # as products for known exponents
 
 
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
-    """Return the operation of a function for these types, or None."""
     made, plain = OPERATIONS.get(function), tuple(map(types.unliteral, kinds))
     if made is None or not all(isinstance(kind, _NUMBER) for kind in plain):
         return None

@@ -23,7 +23,6 @@ class Failure(ctypes.Structure):
     _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
 
     def raise_first(self) -> None:
-        """Raise the recorded exception, if there is one."""
         if self.failed:
             error = self.first
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(error))
@@ -91,13 +90,12 @@ def passing(function: ir.Function) -> ir.Function:
 
 
 def failure_at(builder: ir.IRBuilder) -> Any:
-    """Return the address of the `Failure` in the present function, or 0."""
+    """Return the address of the present `Failure`, or 0."""
     function = builder.function
     return function.args[-1] if hasattr(function, "passes_failure") else llvm.I64(0)
 
 
 def passed_to(builder: ir.IRBuilder, called: Any) -> list:
-    """List the arguments passed to a function after its own."""
     return [failure_at(builder)] if hasattr(called, "passes_failure") else []
 
 

@@ -22,7 +22,7 @@ LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 @functools.cache
 def features() -> str:
-    """List the instruction sets of the processor; empty if LLVM does not know it."""
+    """List the instruction sets of the processor."""
     with contextlib.suppress(RuntimeError):
         return llvm.get_host_cpu_features().flatten()
     return ""
@@ -82,7 +82,6 @@ def _optimised(
 
 
 def compile_text(text: str) -> bytes:
-    """Compile module text to machine code."""
     return _target().emit_object(_optimised(text, _target(), level=LEVEL))
 
 
@@ -96,7 +95,7 @@ def assembly(text: str, triple: str, processor: str, library: bytes | None = Non
 
 
 def load(code: bytes, *names: str) -> list[int]:
-    """Load machine code; return the addresses of functions in it."""
+    """Load machine code; return addresses of functions."""
     engine = _engine()
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -107,12 +106,11 @@ def load(code: bytes, *names: str) -> list[int]:
 
 
 def publish(name: str, address: int) -> None:
-    """Make a function available by name to code loaded later."""
+    """Make a function callable by name from code loaded later."""
     llvm.add_symbol(name, address)
 
 
 def is_known(name: str) -> bool:
-    """Tell whether the C library of this process has a function."""
     return sys.platform == "win32" or hasattr(ctypes.CDLL(None), name)
 
 

@@ -52,7 +52,6 @@ class Unknown(Exception):
 
 
 def short_hash(*words: str) -> str:
-    """Hash texts to the 32 digits that names of files have."""
     return hashlib.sha256("|".join(words).encode()).hexdigest()[:32]
 
 
@@ -68,7 +67,6 @@ def _source(path: Path) -> str:
 
 @functools.cache
 def _sources() -> str:
-    """Hash the sources of `choices.ROOMS`."""
     package = Path(__file__).parents[2]
     paths = sorted(path for room in choices.ROOMS for path in (package / room).rglob("*.py"))
     return short_hash(*(f"{path.relative_to(package)} {_source(path)}" for path in paths))
@@ -192,7 +190,6 @@ class KernelFiles:
         return unit
 
     def _key(self, kinds: tuple, result: Any) -> str:
-        """Name the file by function, types, machine and sources."""
         function = self._function
         classes = (one for kind in kinds for one in choices.classes_in(kind))
         made = [function, *self._called, *choices.registered]
@@ -235,7 +232,6 @@ def _without_code(unit: Any) -> Any:
 
 
 def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
-    """Read the code of a text, whose hash is in the `name`, or make it."""
     path = files.folder() / f"{name}.code"
     code = _content(path)
     if code is None:
@@ -245,7 +241,6 @@ def machine_code(name: str, make: Callable[[], bytes]) -> bytes:
 
 
 def code_of(name: str) -> bytes:
-    """Read code that existed when its kernel was saved, or raise FileNotFoundError."""
     code = _content(files.folder() / f"{name}.code")
     if code is None:
         raise FileNotFoundError(name)

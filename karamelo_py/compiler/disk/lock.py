@@ -56,7 +56,6 @@ def _take_away(path: Path) -> None:
 
 
 def _locked(file: int, patience: float) -> bool:
-    """Lock a file within this many seconds; return whether it worked."""
     end = time.monotonic() + patience
     while True:
         with contextlib.suppress(BlockingIOError):

@@ -45,8 +45,6 @@ class Range:
 
 
 class Counter(NamedTuple):
-    """Counter of a loop over a range."""
-
     start: Value
     goes_on: Callable[[Value], Value]
     after: Callable[[Value], Value]
@@ -60,8 +58,6 @@ class Phi(NamedTuple):
 
 
 class LoopHeader(NamedTuple):
-    """Start of a loop: its block, and the variables that change."""
-
     block: Any
     phis: list[Phi]
     names: dict[str, Any]
@@ -69,7 +65,6 @@ class LoopHeader(NamedTuple):
 
 
 def is_value(thing: Any) -> bool:
-    """Tell whether a thing is known only at run time."""
     return isinstance(thing, Value)
 
 
@@ -116,7 +111,6 @@ class Flow:
         return self.builder and self.builder.append_basic_block("way")
 
     def edge(self, names: dict[str, Any]) -> Edge:
-        """End a branch here."""
         return Edge(self.builder and self.builder.block, names, self.lowering.read)
 
     def split(self, condition: Value) -> tuple[Edge, Edge]:
@@ -128,7 +122,6 @@ class Flow:
         return tuple(Edge(block, {}, dict(self.lowering.read)) for block in blocks)
 
     def start(self, edge: Edge) -> None:
-        """Continue at an edge."""
         if self.builder:
             self.builder.position_at_end(edge.block)
         self.lowering.read = edge.read
@@ -159,7 +152,6 @@ class Flow:
         return names
 
     def _enter(self, block: Any, phis: list[Phi], values: list) -> None:
-        """Jump to a block whose `phis` get `values`."""
         if not self.builder:
             return
         lowered = [
@@ -205,7 +197,6 @@ class Flow:
         return made
 
     def fail(self, kind: type, arguments: tuple) -> None:
-        """Write code by which the kernel raises an exception."""
         if self.builder:
             exceptions.fail(self.builder, kind, arguments)
 
@@ -254,7 +245,7 @@ class Flow:
     def _close_phis(
         self, head: LoopHeader, before: Any, after: Any, values: list, grown: dict
     ) -> None:
-        """Collect the new values of the phis of `before`, in order."""
+        """Collect the new values of the phis of `before`."""
         if isinstance(before, Value | HeldValue):
             path = head.paths[len(values)]
             if is_number_type(after):
@@ -279,7 +270,6 @@ class Flow:
             raise Untraceable(f"{before!r} becomes something else{IN_A_LOOP}")
 
     def counted(self, bounds: tuple) -> Counter:
-        """Count the iterations of a loop over a range."""
         lowering, builder = self.lowering, self.builder
         kind = _counter(tuple(types.unliteral(lowering.kind_of(bound)) for bound in bounds))
         start, stop, step = {1: (0, *bounds, 1), 2: (*bounds, 1)}.get(len(bounds), bounds)
@@ -317,7 +307,6 @@ class Flow:
         return things[index]
 
     def call(self, function: Callable, arguments: list, keywords: dict) -> Any:
-        """Compile a call."""
         if function is len and is_value(arguments[0]):
             return emit(len, arguments[0])
         if function is range and any(map(is_value, arguments)):

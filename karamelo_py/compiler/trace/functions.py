@@ -12,6 +12,7 @@ from traceback import walk_tb
 from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler.code.arithmetic import OPERATIONS
@@ -65,7 +66,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
 
 
 class Module:
-    """Presents the functions of a module like globals."""
+    """Presents a module's functions as replacements."""
 
     def __init__(self, module: python.ModuleType, seen: Callable[[Any], Any]):
         self._module, self._seen = module, seen
@@ -163,8 +164,6 @@ def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
 
 
 class TracedFunction(NamedTuple):
-    """A function to run for argument types."""
-
     run: Callable
     result: types.Type
     modules: frozenset[str]  # outside `choices.ROOMS`
@@ -285,7 +284,6 @@ class PointFunction:
         return register
 
     def defined(self, *classes: type) -> bool:
-        """Tell whether there is an implementation for these classes."""
         return self.find(classes) is not self._fallback
 
 
@@ -315,7 +313,6 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
 
 
 def _call(function: Callable, arguments: tuple) -> Any:
-    """Call the implementation selected by the argument types, if there is one."""
     if function not in choosers:
         return NotImplemented
     lowering = values.now()
@@ -335,6 +332,5 @@ def _call(function: Callable, arguments: tuple) -> Any:
 Lowering.dispatch = staticmethod(_call)
 
 
-def write_into(builder: Any) -> Lowering:
-    """Make a lowering that writes code with this builder."""
+def write_into(builder: ir.IRBuilder) -> Lowering:
     return Lowering(_seen, builder)

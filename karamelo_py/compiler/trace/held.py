@@ -48,7 +48,6 @@ class HeldTuple(types.BaseTuple):
         return self.instance_class, self.types
 
     def register_type(self) -> ir.Type:
-        """LLVM type: a pointer to a structure of the items."""
         return ir.LiteralStructType(map(llvm.memory_type, self.types)).as_pointer()
 
     def __getitem__(self, k: int) -> types.Type:
@@ -91,7 +90,6 @@ def _hold(lowering: Any, thing: Any) -> Any:
 
 
 def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
-    """Store things in memory as a held tuple of this type."""
     builder = lowering.builder
     items = [_hold(lowering, thing) for thing in things]
     room = builder and llvm.room(builder, held.register_type().pointee)
@@ -101,8 +99,7 @@ def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
     return HeldValue(held, room)
 
 
-def item_of(builder: Any, held: HeldTuple, pointer: Any, k: int) -> Any:
-    """Load item `k` of a held tuple."""
+def item_of(builder: ir.IRBuilder, held: HeldTuple, pointer: Any, k: int) -> Any:
     return llvm.get(builder, held[k], llvm.at(builder, pointer, 0, k))
 
 
@@ -121,7 +118,7 @@ def _at_hand(lowering: Any, held: Any) -> Any:
     return HeldValue(held._kind, _copy(lowering.builder, held._kind, held._value))
 
 
-def _copy(builder: Any, held: HeldTuple, source: Any) -> Any:
+def _copy(builder: ir.IRBuilder, held: HeldTuple, source: Any) -> Any:
     room = llvm.room(builder, source.type.pointee)
     builder.store(builder.load(source), room)
     for k, item in enumerate(held):
@@ -132,5 +129,4 @@ def _copy(builder: Any, held: HeldTuple, source: Any) -> Any:
 
 
 def is_held(kind: Any) -> bool:
-    """Tell whether a type is a held tuple."""
     return isinstance(kind, HeldTuple)

@@ -17,13 +17,12 @@ def _indices(index: Any) -> tuple:
 
 
 def is_part(kind: types.Array, index: Any) -> bool:
-    """Tell whether indices select a slice instead of an item."""
+    """Tell whether indices select a slice."""
     places = _indices(index)
     return len(places) < kind.ndim or any(isinstance(one, slice) for one in places)
 
 
 def part_type(kind: types.Array, index: Any) -> types.Array:
-    """Return the type of a slice of an array."""
     places = _indices(index)
     if len(places) > kind.ndim:
         raise Untraceable(f"an array of {kind.ndim} dimensions has no {len(places)} indices")
@@ -50,13 +49,12 @@ def _index(lowering: Any, thing: Any, count: Any) -> Any:
     return _from_the_end(lowering.builder, value, count)
 
 
-def _from_the_end(builder: Any, value: Any, count: Any) -> Any:
+def _from_the_end(builder: ir.IRBuilder, value: Any, count: Any) -> Any:
     negative = builder.icmp_signed("<", value, llvm.I64(0))
     return builder.select(negative, builder.add(value, count), value)
 
 
 def item_address(lowering: Any, array: Value, index: Any) -> Any:
-    """Compute the address of an item."""
     parts = llvm.ArrayParts(lowering.builder, array._kind, array._value)
     pairs = zip(_indices(index), parts.shape, strict=True)
     indices = [_index(lowering, one, count) for one, count in pairs]
@@ -68,7 +66,6 @@ def _align(kind: types.Array) -> int | None:
 
 
 def get(lowering: Any, array: Value, index: Any) -> Any:
-    """Read an item, or make a slice."""
     kind, builder = array._kind, lowering.builder
     if is_part(kind, index):
         made = part_type(kind, index)
@@ -84,7 +81,6 @@ def get(lowering: Any, array: Value, index: Any) -> Any:
 
 
 def put(lowering: Any, array: Value, index: Any, value: Any) -> None:
-    """Write an item, or all items of a slice."""
     kind, builder = array._kind, lowering.builder
     kind_of_value = types.unliteral(lowering.kind_of(value))
     if not isinstance(kind_of_value, types.Number | types.Boolean | types.Array):
@@ -102,7 +98,6 @@ def put(lowering: Any, array: Value, index: Any, value: Any) -> None:
 
 
 def _fill(lowering: Any, array: Value, value: Any, outer: tuple = ()) -> None:
-    """Set each item of an array to a number, or to the item of another array."""
     builder, kind = lowering.builder, array._kind
     parts = llvm.ArrayParts(builder, kind, array._value)
     if len(outer) < kind.ndim:
@@ -160,7 +155,6 @@ def _part(lowering: Any, array: Value, index: Any, made: types.Array) -> Any:
 
 
 def attribute(lowering: Any, thing: Value, name: str) -> Any:
-    """Return an attribute of an array, a record or a number."""
     kind = thing._kind
     if isinstance(kind, types.Array):
         return _of_array(lowering, thing, name)
@@ -212,7 +206,6 @@ def _of_record(lowering: Any, thing: Value, name: str) -> Any:
 
 
 def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
-    """Write a field of a record."""
     kind, builder = thing._kind, lowering.builder
     if not isinstance(kind, types.Record) or name not in kind.fields:
         raise AttributeError(f"{kind} has no attribute '{name}' that can be set")
@@ -232,7 +225,7 @@ def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
 
 
 def item_of_tuple(lowering: Any, things: tuple, index: Value) -> Any:
-    """Return an item of a tuple at an index known at run time."""
+    """Return an item at an index known at run time."""
     kinds = [types.unliteral(lowering.kind_of(thing)) for thing in things]
     kind, builder = lowering.unify(*kinds), lowering.builder
     if kind is None:

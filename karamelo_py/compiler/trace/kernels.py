@@ -41,7 +41,7 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 
 
 class Unit(NamedTuple):
-    """Machine code of a function for arguments of some types."""
+    """Machine code of a function for argument types."""
 
     name: str  # its entry for Python has this name plus ENTRY
     result: types.Type
@@ -66,7 +66,7 @@ def load(unit: Unit) -> list[int]:
 
 
 class Compilation:
-    """Reports compilation in this Python thread, or waiting for another process."""
+    """Reports compilation in this Python thread, and waiting for another process."""
 
     def __init__(self) -> None:
         self._listeners = contextvars.ContextVar[tuple]("listeners", default=())
@@ -151,7 +151,6 @@ def _compiled(function: Callable, kinds: tuple, result: types.Type | None) -> Un
 
 
 def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
-    """Load arguments of these types from memory."""
     types_of_items = HeldTuple(kinds)
     pointer = builder.inttoptr(address, types_of_items.register_type())
     full = (k for k, kind in enumerate(kinds) if not llvm.is_empty(kind))
@@ -185,7 +184,6 @@ class Kernel:
         builtin(self)(self.in_kernel)
 
     def unit(self, kinds: tuple, result: types.Type | None = None) -> Unit:
-        """Return the machine code for arguments of these types."""
         with one_at_a_time:
             self._find_changes()
             if kinds not in self.units:
@@ -228,7 +226,6 @@ class Kernel:
         return plans[kinds]
 
     def in_kernel(self, lowering: Any, *arguments: Any) -> Any:
-        """Write a call from another kernel."""
         values = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in values)
         if in_one_module():

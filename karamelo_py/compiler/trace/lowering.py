@@ -22,8 +22,6 @@ _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
 class FunctionType(types.Opaque):
-    """Type of a known function or class."""
-
     def __init__(self, function: Callable):
         self.function = function
         name = function.__qualname__ if hasattr(function, "__qualname__") else function
@@ -79,7 +77,7 @@ class Lowering:
         return self.seen(kind.function)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """Return the type of a wrapped thing; the type of an integer contains its value."""
+        """Return the type of a wrapped thing; integers are literal types."""
         if isinstance(thing, _TRACED):
             return thing._kind
         if isinstance(thing, int):
@@ -96,7 +94,7 @@ class Lowering:
         raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Return the LLVM value of a wrapped thing in the type `wanted`."""
+        """Return the LLVM value of a thing in the type `wanted`."""
         if isinstance(thing, _TRACED):
             return llvm.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
@@ -110,12 +108,11 @@ class Lowering:
         return llvm.nothing()
 
     def constant(self, array: np.ndarray) -> traced.Value:
-        """Return a constant array."""
         kind = typeof(array)
         return traced.Value(kind, self.builder and llvm.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
-        """Return the common type of several types, or None."""
+        """Return the common type of types, or None."""
         first = kinds[0]
         if all(kind == first for kind in kinds):
             return first
@@ -129,7 +126,6 @@ class Lowering:
     # --- operations
 
     def call(self, function: Callable, arguments: tuple) -> Any:
-        """Return the result of `function` for these arguments."""
         if function in traced.BUILTINS:
             return traced.BUILTINS[function](self, *arguments)
         if function in _OF_ITEMS and _has_slice(arguments[1]):
@@ -152,7 +148,6 @@ class Lowering:
         return self.wrapped(operation.result, operation.code(self.builder, values))
 
     def operation(self, function: Callable, kinds: tuple) -> arithmetic.Operation | None:
-        """Return the operation of a function for arguments of these types."""
         key = function, numbers_of(kinds)
         cache = session.operations
         if key not in cache:
@@ -163,7 +158,6 @@ class Lowering:
         return cache[key]
 
     def other(self, function: Callable, arguments: tuple, kinds: tuple) -> Any:
-        """Return the result of a function that is not an operation on numbers."""
         if function is len and isinstance(kinds[0], types.Array):
             return self.attribute(arguments[0], "shape")[0]
         if function is bool and isinstance(kinds[0], types.BaseTuple | types.NoneType):
@@ -173,7 +167,6 @@ class Lowering:
         )
 
     def of_item(self, things: Any, index: Any, *value: Any) -> Any:
-        """Read or write an item of an array or tuple."""
         if isinstance(things, traced.Value) and isinstance(things._kind, types.Array):
             do = indexing.put if value else indexing.get
             return do(self, things, index, *value)
@@ -182,7 +175,6 @@ class Lowering:
         raise traced.Untraceable(f"{self.kind_of(things)} has no items")
 
     def in_type_of(self, thing: Any, model: Any) -> Any:
-        """Convert an integer to the real type of `model`."""
         kind = llvm.scalar_of(model._kind)
         if isinstance(thing._kind, llvm.Lanes):
             kind = llvm.Lanes(kind, thing._kind.width)
@@ -190,13 +182,11 @@ class Lowering:
         return traced.Value(kind, value)
 
     def cast(self, thing: Any, kind: types.Type) -> Any:
-        """Cast a wrapped thing to the type `kind`."""
         return self.wrapped(kind, self.builder and self.lowered(thing, kind))
 
     attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
     def item(self, held: traced.HeldValue, k: int) -> Any:
-        """Return an item of a held tuple."""
         key = id(held), k
         if key not in self.read:
             value = self.builder and item_of(self.builder, held._kind, held._value, k)
@@ -241,7 +231,6 @@ class Lowering:
     def call_function(
         self, function: Any, kinds: tuple, result: types.Type, arguments: tuple
     ) -> Any:
-        """Call an LLVM function."""
         pairs = zip(arguments, kinds, strict=True)
         values = [self.lowered(a, k) for a, k in pairs if not llvm.is_empty(k)]
         made = self.builder.call(function, values + exceptions.passed_to(self.builder, function))
@@ -282,7 +271,6 @@ def _of_intrinsic(function: traced.Intrinsic, kinds: tuple) -> arithmetic.Operat
 
 
 def name_of(function: Callable) -> str:
-    """Name a function in messages."""
     return function.__name__ if hasattr(function, "__name__") else str(function)
 
 

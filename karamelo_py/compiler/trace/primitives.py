@@ -198,7 +198,7 @@ def _where(condition, a, b):
 OF_REALS |= {fma, where}
 
 
-def _all_bits(builder: Any, mask: Any, sign: str, wanted: int) -> Any:
+def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> Any:
     bits = builder.bitcast(mask, ir.IntType(mask.type.count))
     return builder.icmp_signed(sign, bits, ir.Constant(bits.type, wanted))
 
@@ -227,8 +227,7 @@ def _any(mask):
     return types.boolean(mask), lambda builder, bits: _all_bits(builder, bits, "!=", 0)
 
 
-def all_same(builder: Any, value: Any) -> Any:
-    """Tell whether all lanes contain the same integer."""
+def all_same(builder: ir.IRBuilder, value: Any) -> Any:
     first = llvm.shuffle(builder, value, value, [0] * value.type.count)
     return _all_bits(builder, builder.icmp_signed("==", value, first), "==", -1)
 
@@ -253,13 +252,12 @@ def _lanes_changed(thing: Any, change: Callable) -> Any:
     return mapped(changed, thing)
 
 
-def _room(builder: Any, lanes: Lanes) -> Any:
-    """Allocate memory for lanes; booleans take bytes there."""
+def _room(builder: ir.IRBuilder, lanes: Lanes) -> Any:
     kind = ir.VectorType(llvm.memory_type(lanes.scalar), lanes.width)
     return builder and llvm.room(builder, kind)
 
 
-def _in_memory(builder: Any, value: Value) -> Value:
+def _in_memory(builder: ir.IRBuilder, value: Value) -> Value:
     room, bits = _room(builder, value._kind), value._value
     if builder:
         wanted = room.type.pointee
@@ -267,12 +265,12 @@ def _in_memory(builder: Any, value: Value) -> Value:
     return Value(value._kind, room)
 
 
-def _from_memory(builder: Any, stored: Value) -> Value:
+def _from_memory(builder: ir.IRBuilder, stored: Value) -> Value:
     bits, wanted = builder.load(stored._value), llvm.register_type(stored._kind)
     return Value(stored._kind, bits if bits.type == wanted else builder.trunc(bits, wanted))
 
 
-def _lane_address(builder: Any, stored: Value, k: Any) -> Any:
+def _lane_address(builder: ir.IRBuilder, stored: Value, k: Any) -> Any:
     scalar = llvm.memory_type(stored._kind.scalar)
     return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
 

@@ -46,7 +46,7 @@ _began = time.time()
 
 
 def _is_as_read(code: python.CodeType, text: str) -> bool:
-    """Tell whether a file is unchanged since Python read it; interactive code has no file."""
+    """Tell whether a file is unchanged since Python read it."""
     try:
         about = os.stat(code.co_filename)
     except OSError:
@@ -58,7 +58,7 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
 
 @functools.cache
 def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """List the functions of a text by name and first line, decorators included."""
+    """List functions by name and first line, decorators included."""
     functions: dict[tuple[str, int], list] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
@@ -119,12 +119,10 @@ class AstFunction:
         self.plain = -1 if others else code.co_argcount  # parameters, where all are positional
 
     def free(self) -> dict[str, Any]:
-        """Return the closure variables."""
         cells = zip(self.__code__.co_freevars, self.function.__closure__ or (), strict=True)
         return {name: self.seen(cell.cell_contents) for name, cell in cells}
 
     def of_module(self, name: str) -> Any:
-        """Return a global or builtin."""
         true = self.function.__globals__
         if name not in true and not hasattr(builtins, name):
             raise NameError(f"name '{name}' is not defined")
@@ -223,7 +221,6 @@ class AstCompiler:
         return self.flow.edge(self.names)
 
     def here(self) -> list[Edge]:
-        """List the present branch, if it is reachable."""
         return [self.edge()] if self.goes else []
 
     def leave(self, edges: list[Edge]) -> None:
@@ -237,7 +234,6 @@ class AstCompiler:
             self.names = self.flow.meet(edges)
 
     def branch(self, condition: Any, then: Callable, otherwise: Callable) -> None:
-        """Compile both branches, and continue where they merge."""
         edges: list[Edge] = []
         before = self.names
         for begin, do in zip(self.flow.split(condition), (then, otherwise), strict=True):
@@ -253,11 +249,9 @@ class AstCompiler:
     # --- expressions
 
     def do(self, node: ast.AST) -> Any:
-        """Compile a statement, or an expression to its value."""
         return _COMPILED.get(type(node), AstCompiler.unknown)(self, node)
 
     def unknown(self, node: ast.AST) -> None:
-        """Refuse a construct that kernels do not support."""
         kind = type(node).__name__
         raise Untraceable(f"kernels know no {_WORDS.get(kind, kind)}")
 
@@ -287,7 +281,6 @@ class AstCompiler:
         return self.flow.item(self.do(node.value), self.do(node.slice))
 
     def items(self, nodes: list[ast.expr]) -> list:
-        """Compile the items of a tuple, or arguments."""
         out: list = []
         for node in nodes:
             if isinstance(node, ast.Starred):
@@ -446,7 +439,6 @@ class AstCompiler:
         return call
 
     def comprehended(self, node: ast.expr, item: Callable[[], Any]) -> list:
-        """Evaluate a comprehension item by item."""
         out: list = []
         outer = dict(self.names)
 
@@ -483,7 +475,7 @@ class AstCompiler:
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Compile statements in order; record the place where one fails."""
+        """Compile statements; record the place where one fails."""
         for statement in statements:
             if not self.goes:
                 return
@@ -548,7 +540,6 @@ class AstCompiler:
         self.If(ast.If(node.test, [], [ast.copy_location(failed, node)]))
 
     def give(self, target: ast.expr, value: Any) -> None:
-        """Assign a value to a target."""
         if isinstance(target, ast.Name):
             self.names[target.id] = value
         elif isinstance(target, ast.Tuple | ast.List):
@@ -567,7 +558,6 @@ class AstCompiler:
             self.unknown(target)
 
     def changed(self, target: ast.Subscript) -> Any:
-        """Compile the object whose item is assigned."""
         things = self.do(target.value)
         if self.branches and isinstance(things, _CHANGING):
             raise Untraceable(_ON_ALL_WAYS)
@@ -608,7 +598,7 @@ class AstCompiler:
             self.unroll(node, through)
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
-        """Tell whether a loop over a known range remains a loop: if it is long and can be one."""
+        """Tell whether a loop over a known range is long and can remain a loop."""
         if len(through) <= LONG:
             return False
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))

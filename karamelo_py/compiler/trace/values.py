@@ -20,7 +20,6 @@ class Untraceable(BaseException):
 
 
 def words(kind: types.Type) -> str:
-    """Name a type for users."""
     if isinstance(kind, types.BaseTuple):
         tag = tag_class(kind)
         return tag.__name__ if tag else "a tuple"
@@ -78,7 +77,7 @@ def is_begun(key: tuple) -> bool:
 
 
 def _real_kind(thing: Any) -> Any:
-    """Return the number type of a real number or real lanes; None for other things."""
+    """Return the type of a real number or real lanes, or None."""
     kind = scalar_of(thing._kind) if isinstance(thing, Value) else None
     return kind if isinstance(kind, types.Float) else None
 
@@ -126,17 +125,14 @@ all_called_in_one = _replacements.get  # None if modules call others
 
 
 def in_one_module() -> bool:
-    """Tell whether a module contains all that it calls."""
     return _replacements.get() is not None
 
 
 def called_in_one(signature: Any) -> Callable | None:
-    """Return the replacement of a call by address, or None."""
     return dict(_replacements.get() or ()).get(signature)
 
 
 def emit(function: Callable, *arguments: Any) -> Any:
-    """Write a call of an operation, or of a function selected by type."""
     return now().call(function, arguments)
 
 
@@ -214,7 +210,6 @@ _BITS = ("and_", "or_", "xor", "lshift", "rshift")
 
 
 def _operated(operation: Callable, a: Any, b: Any) -> Any:
-    """Write an operation; tensors and the like handle theirs."""
     if isinstance(a if isinstance(b, Value) else b, tuple):
         return NotImplemented
     if operation is operator.pow and type(b) is int and 1 < b <= 4 and _real_kind(a):
@@ -252,12 +247,10 @@ _operators()
 
 
 def rebuilt(model: tuple, items: Iterable) -> tuple:
-    """Make a tuple of the class of `model`."""
     return type(model)(*items) if hasattr(model, "_fields") else tuple(items)
 
 
 def mapped(change: Callable, thing: Any) -> Any:
-    """Change each thing in nested tuples."""
     if isinstance(thing, tuple):
         return rebuilt(thing, [mapped(change, item) for item in thing])
     return change(thing)
@@ -297,12 +290,12 @@ class HeldValue:
 
 
 def implementations(kind: type) -> dict[Callable, Callable] | None:
-    """Return the functions that a number type implements; None for other classes."""
+    """Return the functions that a number type implements, or None."""
     return getattr(kind, "implements", None)
 
 
 def implemented(function: Callable, arguments: tuple) -> Callable | None:
-    """Return the implementation of a function for a tuple number type among the arguments."""
+    """Return the implementation for a number type among the arguments."""
     for a in arguments:
         if isinstance(a, tuple):
             table = implementations(type(a))
@@ -313,7 +306,6 @@ def implemented(function: Callable, arguments: tuple) -> Callable | None:
 
 
 def is_literal(thing: Any) -> bool:
-    """Tell whether a number is a literal, known at compile time."""
     return type(thing) in (int, float)
 
 
@@ -336,11 +328,9 @@ class Emitted:
         return emit(self.seen, *arguments)
 
     def defined(self, *classes: type) -> bool:
-        """Tell whether a point function has an implementation for these classes."""
         return self.seen.defined(*classes)
 
     def find(self, classes: tuple) -> Callable:
-        """Return the implementation of a point function for these classes, for kernels."""
         return now().seen(self.seen.find(classes))
 
 
