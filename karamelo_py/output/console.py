@@ -93,7 +93,7 @@ class Console:
             if self._burst < BURST or now - self._released > LINES:
                 self._release()
 
-    def banner(self, title: str, facts: Mapping[str, Any]) -> None:
+    def banner(self, title: str, facts: Mapping[str, object]) -> None:
         """Write a title and facts, one per line."""
         names = max(map(len, facts), default=0)
         rows = [f"  {name.ljust(names)}  {show(value)}" for name, value in facts.items()]
@@ -102,7 +102,7 @@ class Console:
 
     def summary(
         self,
-        facts: Mapping[str, Any],
+        facts: Mapping[str, object],
         stages: Sequence[tuple[str, float]] = (),
         title: str = "Run finished",
     ) -> None:
@@ -214,7 +214,7 @@ def _print(stream: TextIO, text: str) -> None:
     stream.flush()
 
 
-def show(value: Any) -> str:
+def show(value: object) -> str:
     """Format for a table: 1 234 567, 0.333333."""
     if isinstance(value, bool) or value is None:
         return str(value)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import inf
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -37,14 +37,29 @@ LAST = 2**62  # above all point numbers
 PIECE = 1 << 17  # points per piece
 
 
+class PointGroup(Protocol):
+    """A group of points, or all; see `scene.group`."""
+
+    all: bool
+
+    @property
+    def ids(self) -> np.ndarray: ...
+
+    def has(self, ids: np.ndarray) -> np.ndarray: ...
+
+
+class Grouped(Protocol):
+    group: PointGroup
+
+
 class Fields(PointTable):
     """Tables, pieces and exact sums of all points, of `simulation` or the current arrays."""
 
     def __init__(self, hub: Scene, simulation: Any = None):
         self.hub = hub
         self._own = simulation
-        self._key: Any = None
-        self._cache: dict[str, Any] = {}
+        self._key: tuple | None = None
+        self._cache: dict[str, np.ndarray] = {}
 
     @property
     def simulation(self) -> Any:
@@ -77,13 +92,13 @@ class Fields(PointTable):
         comm = simulation.comm if simulation.comm.size > 1 else None
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
-    def members(self, group: Any) -> np.ndarray:
+    def members(self, group: PointGroup) -> np.ndarray:
         """0-based ids of a particle group, without deleted points."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
 
-    def total(self, name: str, group: Any = None) -> float:
+    def total(self, name: str, group: PointGroup | None = None) -> float:
         """Sum a quantity of `SUMMED` over a group or all points, exactly."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
@@ -94,7 +109,7 @@ class Fields(PointTable):
                 add_all(limbs, 0, values)
         return rounded(self.comm.allreduce(limbs)[0])
 
-    def rows_of(self, group: Any) -> Iterator[tuple[Block, np.ndarray]]:
+    def rows_of(self, group: PointGroup | None) -> Iterator[tuple[Block, np.ndarray]]:
         """Yield a group's local points in pieces: block and rows."""
         for block in self.setup.blocks:
             ids = block.points.id
@@ -105,7 +120,7 @@ class Fields(PointTable):
                 if len(rows):
                     yield block, rows
 
-    def some(self, group: Any) -> Iterator[PointTable]:
+    def some(self, group: PointGroup | None) -> Iterator[PointTable]:
         """Yield a group's local points in pieces, then an empty table."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
@@ -115,7 +130,7 @@ class Fields(PointTable):
         parts, ids = [Part(block, rows, slice(None))], block.points.id[rows]
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
-    def added_up(self, part: Any, name: str = "terms", *arguments: Any) -> np.ndarray:
+    def added_up(self, part: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
         """Sum terms over the points of a part's group, exactly.
 
         The method `name` of `part` is called with tables of some of the points, and `arguments`. It
@@ -148,13 +163,13 @@ class Fields(PointTable):
         of_all = sum(self.comm.everyone("a total", limbs))
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
-    def each(self, part: Any, name: str, *arguments: Any) -> list:
+    def each(self, part: Grouped, name: str, *arguments: object) -> list:
         """Collect results of a part's method, one per piece of its group."""
         results = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
         local = [one for one in results if one is not None]
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
-    def seen(self, say: Callable, *arguments: Any) -> list:
+    def seen(self, say: Callable, *arguments: object) -> list:
         """Collect a function's result of each process."""
         return self.comm.allgather(say(self.simulation, *arguments))
 
@@ -261,7 +276,7 @@ def _joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
     return made_of(points, made)
 
 
-def _kinetic(s: Any, block: Any) -> np.ndarray:
+def _kinetic(s: Setup, block: Block) -> np.ndarray:
     points = block.points
     v = point_table.shown_velocity(s, points).astype(float)
     return 0.5 * points.mass.astype(float) * (v**2).sum(axis=0)
@@ -270,7 +285,7 @@ def _kinetic(s: Any, block: Any) -> np.ndarray:
 def _of_law(density: Callable) -> Callable:
     """Energy of each point from a density per volume."""
 
-    def energies(s: Any, block: Any) -> np.ndarray | None:
+    def energies(s: Setup, block: Block) -> np.ndarray | None:
         if not can(block.laws, density):
             return None
         points = known_to_laws(block.points)
@@ -282,12 +297,12 @@ def _of_law(density: Callable) -> Callable:
     return energies
 
 
-def _bounces(s: Any, block: Any) -> np.ndarray | None:
+def _bounces(_: Setup, block: Block) -> np.ndarray | None:
     counts = fields.field(block.points.fields, Bounces)
     return None if counts is None else counts.astype(float).ravel()
 
 
-def _born_with(s: Any, block: Any) -> np.ndarray | None:
+def _born_with(_: Setup, block: Block) -> np.ndarray | None:
     """Initial internal energy of a gas; stored energy is relative to it, or would lose digits."""
     law = elastic_law(block.laws)
     if not can(law, taken_heat):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS, TIME, known_to_laws, of_force, of_momentum
+from karamelo_py.kernels.arrays import MASS, TIME, Block, known_to_laws, of_force, of_momentum
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_to_nodes
 from karamelo_py.kernels.hooks import CompiledHook
@@ -159,20 +159,20 @@ COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
 LOADS = "post_particles_to_grid"
 
 
-def _volume(simulation: Any, block: Any) -> np.ndarray:
+def _volume(simulation: Any, block: Block) -> np.ndarray:
     points = known_to_laws(block.points)
     rows = np.zeros((len(points.id), EXPORTED))
     export_state(simulation.setup.kin, points, block.laws, rows)
     return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
 
 
-def _force(axis: int, simulation: Any, block: Any) -> np.ndarray | None:
+def _force(axis: int, _: object, block: Block) -> np.ndarray | None:
     force = fields.field(block.points.fields, Force)
     return None if force is None or axis >= len(force) else force[axis]
 
 
 # Values (n,) of a block's points, or None.
-BROUGHT: dict[str, Callable[[Any, Any], np.ndarray | None]] = {
+BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
     "vol": _volume,
     "rigid": lambda simulation, block: (  # 1: rigid
         np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None

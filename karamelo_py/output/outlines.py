@@ -57,7 +57,11 @@ def outlines(x: np.ndarray) -> list[np.ndarray]:
     within = _largest(filled, 2)
     share = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
     across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
-    lines: Any = contour_generator(across, up, share.T).lines(0.5)
+    return _contours(across, up, share.T, 0.5)
+
+
+def _contours(x: np.ndarray, y: np.ndarray, z: np.ndarray, level: float) -> list[np.ndarray]:
+    lines: Any = contour_generator(x, y, z).lines(level)
     return lines
 
 
@@ -100,8 +104,7 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
     depths = depth(places.reshape(-1, 2)).reshape(places.shape[:2])
-    lines: Any = contour_generator(x, y, depths).lines(0.0)
-    return lines
+    return _contours(x, y, depths, 0.0)
 
 
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
@@ -252,8 +255,7 @@ class Front:
             low + self.cell * (np.arange(n) + 0.5)
             for low, n in zip(self.low, filled.shape, strict=True)
         )
-        lines: Any = contour_generator(across, up, filled.T).lines(0.5)
-        return lines
+        return _contours(across, up, filled.T, 0.5)
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
         """Tell whether all cells `around` x (n, 2) are in front of these heights."""

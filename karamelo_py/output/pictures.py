@@ -10,6 +10,8 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
+from matplotlib.axis import Axis
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
@@ -86,7 +88,7 @@ class DrawnPoints(Artist):
         self.set_zorder(picture.artist.get_zorder())
         picture.artist.set_visible(False)  # by this artist only
 
-    def draw(self, renderer: Any) -> None:
+    def draw(self, renderer: RendererBase) -> None:
         if not self.get_visible():
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
@@ -143,7 +145,7 @@ class Picture:
     def _apply_beyond(self, below: bool, above: bool) -> None:
         """Mark ends of the colour bar with values beyond."""
 
-    def _name_lengths(self, axis: Any, name: str) -> None:
+    def _name_lengths(self, axis: Axis, name: str) -> None:
         """Label an axis, with a power of 1000 if lengths are small or large."""
         size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
         if 0 < size < 1e-2 or size >= 1e5:
@@ -336,14 +338,14 @@ def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> 
     return kind(domain, size, dpi, options)
 
 
-def _number(value: float, _: Any = None) -> str:
+def _number(value: float, _: object = None) -> str:
     if value == 0 or 1e-4 <= abs(value) < 1e6:
         return f"{value:.8g}"
     short = np.format_float_scientific(value, precision=7, trim="-", exp_digits=1)
     return short.replace("+", "")  # 2.5e6
 
 
-def _power(value: float, _: Any = None) -> str:
+def _power(value: float, _: object = None) -> str:
     return _number(float(f"{10.0**value:.3g}"))
 
 

@@ -33,7 +33,7 @@ class Part(NamedTuple):
 
     block: Block
     rows: np.ndarray | None  # ascending; None: all points of the block
-    places: Any  # indices or a slice
+    places: np.ndarray | slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
         """Select these points from an array (..., k) over the block."""
@@ -106,9 +106,9 @@ class PointTable:
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
         self._rows = rows
-        self._cache: dict[str, Any] = {}
+        self._cache: dict[str, np.ndarray] = {}
 
-    def _cached(self, name: str, make: Callable[[Rows], Any]) -> Any:
+    def _cached(self, name: str, make: Callable[[Rows], np.ndarray]) -> np.ndarray:
         rows = self._rows  # clears the cache after a step
         if name not in self._cache:
             self._cache[name] = make(rows)
@@ -218,7 +218,7 @@ class PointTable:
         )
 
 
-def owners_of_fields(hub: Scene, contact: Any = None) -> list:
+def owners_of_fields(hub: Scene, contact: object = None) -> list:
     """Parts of a scene that may declare fields."""
     update, method = hub.update, hub.update.method
     heat = Conducting if update.thermal else None
@@ -305,7 +305,7 @@ def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.
     return gathered
 
 
-def _column_of_laws(name: str, laws: Any) -> Callable | None:
+def _column_of_laws(name: str, laws: NamedTuple) -> Callable | None:
     """Kernel that exports a column of laws; None if no law declares it."""
     number = columns_of(laws).get(name)
     return None if number is None else partial(export.export, number, False)

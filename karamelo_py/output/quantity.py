@@ -2,12 +2,11 @@
 
 import math
 import re
-from typing import Any
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError, meant, unknown
-from karamelo_py.script.expressions import POINT_SEEDS, Expression
+from karamelo_py.script.expressions import POINT_SEEDS, Expression, Value
 from karamelo_py.script.syntax import Raw, Source
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
@@ -22,7 +21,7 @@ class Quantity:
 
     words = False  # allow ``limit``, which is text
 
-    def __init__(self, hub: Scene, name: str, formula: Any = None):
+    def __init__(self, hub: Scene, name: str, formula: Value | None = None):
         self.hub = hub
         self.name = name
         self.formula = formula
@@ -76,8 +75,10 @@ class Quantity:
         if self.is_word:
             return self.hub.simulation.steps.ruling_limit
         source = self._source()
-        is_formula = isinstance(source, Expression)
-        number = float(source.evaluate(self.hub.values)) if is_formula else source
+        if isinstance(source, Expression):
+            number = float(source.evaluate(self.hub.values))
+        else:
+            number = source
         if math.isnan(number) and not self._reported_nan:
             self._reported_nan = True
             self.hub.warn(
@@ -87,7 +88,7 @@ class Quantity:
             )
         return number
 
-    def _source(self) -> Any:
+    def _source(self) -> float | Expression:
         """Current source: the script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
@@ -145,5 +146,5 @@ class Logged(Quantity):
     words = True
 
 
-def _variables(hub: Scene) -> dict[str, Any]:
+def _variables(hub: Scene) -> dict[str, Value]:
     return hub.interpreter.variables if hub.interpreter else {}

@@ -22,9 +22,10 @@ from karamelo_py.script.errors import Place, ScriptError
 
 SCHEMA = 1
 NAME = "run.json"
+Json = dict[str, Any]
 
 
-def surroundings() -> dict[str, Any]:
+def surroundings() -> Json:
     """Date, machine and versions of measurements."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
@@ -54,9 +55,9 @@ class RunRecord:
     def __init__(self) -> None:
         self.path: Path | None = None
         self.is_asked_for = False  # also for a script that ends before its first run
-        self.content: dict[str, Any] = {"schema": SCHEMA, "status": "running"}
-        self.runs: list[dict[str, Any]] = []
-        self.messages: list[dict[str, Any]] = []
+        self.content: Json = {"schema": SCHEMA, "status": "running"}
+        self.runs: list[Json] = []
+        self.messages: list[Json] = []
         self._written: tuple[str, int] | None = None  # status and number of messages
         self._begun = time.perf_counter()
 
@@ -77,13 +78,13 @@ class RunRecord:
         """Script file as written by the user; SCRIPT if none."""
         return str(self.content.get("script", {}).get("file", "SCRIPT"))
 
-    def begin(self, facts: Mapping[str, Any]) -> None:
+    def begin(self, facts: Mapping[str, object]) -> None:
         """Add a run, with facts known before its first step."""
         self.content["status"] = "running"
         self.runs.append(dict(facts))
         self._write()
 
-    def finish(self, facts: Mapping[str, Any]) -> None:
+    def finish(self, facts: Mapping[str, object]) -> None:
         """Add facts known at the end of the run."""
         self.runs[-1].update(facts)
         self._write()
@@ -107,7 +108,7 @@ class RunRecord:
             self._write()
 
     def _note(self, kind: str, text: str, place: Place | None, **optional: str | None) -> None:
-        note: dict[str, Any] = {"kind": kind, "text": text}
+        note: Json = {"kind": kind, "text": text}
         if place is not None:
             note["place"] = {"file": place.file, "line": place.line, "column": place.column}
         self.messages.append(note | {name: of for name, of in optional.items() if of})
@@ -127,7 +128,7 @@ class RunRecord:
             write_whole(self.path, json.dumps(_finite(whole), indent=1, ensure_ascii=False) + "\n")
 
 
-def _finite(value: Any) -> Any:
+def _finite(value: object) -> object:
     """Python numbers of NumPy's; None if not finite."""
     if isinstance(value, dict):
         return {name: _finite(of) for name, of in value.items()}

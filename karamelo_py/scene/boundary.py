@@ -8,7 +8,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried
 from karamelo_py.scene.solid import named
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
 
 
 def check(hub: Scene) -> None:
@@ -63,7 +63,7 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     return True
 
 
-def take_away(hub: Scene, ids: np.ndarray, place: Any) -> tuple[float, float]:
+def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, float]:
     """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
     simulation = hub.simulation
     if len(ids) == np.count_nonzero(simulation.present):

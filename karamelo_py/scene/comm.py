@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from karamelo_py.script.errors import ScriptError
+
+T = TypeVar("T")
 
 
 class SerialComm:
@@ -48,17 +50,17 @@ class SerialComm:
         """Words (size,) of all processes; None if one is late by `patience` seconds."""
         return np.array([word])
 
-    def bcast(self, thing: Any = None) -> Any:
+    def bcast(self, thing: T | None = None) -> Any:
         return thing
 
-    def gather(self, thing: Any) -> list | None:
+    def gather(self, thing: T) -> list[T] | None:
         """Objects of all processes at rank 0, else None."""
         return [thing]
 
-    def allgather(self, thing: Any) -> list:
+    def allgather(self, thing: T) -> list[T]:
         return [thing]
 
-    def everyone(self, request: str, thing: Any) -> list:
+    def everyone(self, request: str, thing: T) -> list[T]:
         """Gather objects of the same `request`, else raise ScriptError."""
         asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
@@ -70,7 +72,7 @@ class SerialComm:
             )
         return list(answers)
 
-    def at_first(self, make: Callable[[list], list], thing: Any) -> Any:
+    def at_first(self, make: Callable[[list[T]], list], thing: T) -> Any:
         """Let rank 0 answer all processes."""
         gathered = self.gather(thing)
         return self.scatter(None if gathered is None else make(gathered))
@@ -84,7 +86,7 @@ class SerialComm:
         assert things is not None
         return things[0]
 
-    def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
+    def exchange(self, things: dict[int, T]) -> dict[int, T]:
         """Exchange objects by rank; both sides must name each other."""
         return {}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.language import registry
@@ -49,7 +49,7 @@ class Catalogue(dict):
                 expected="another ID",
             )
 
-    def __missing__(self, ID: str) -> Any:
+    def __missing__(self, ID: str) -> NoReturn:
         names = [*["all"] * (self.kind == "group"), *self]
         other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
         below = line_below(self.hub.interpreter, self.kind, ID)

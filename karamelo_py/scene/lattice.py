@@ -127,7 +127,7 @@ def table(lattices: Sequence[Lattice], real: type) -> Grid:
     return Grid(*columns)
 
 
-def numbered(lattices: Sequence[Any]) -> list[Lattice]:
+def numbered(lattices: Sequence[Lattice]) -> list[Lattice]:
     first = first_cell = 0
     for lattice in lattices:
         lattice.first, lattice.first_cell = first, first_cell

@@ -37,7 +37,7 @@ from karamelo_py.points.laws import LawTraits, law_traits
 from karamelo_py.points.transfers import TransferTraits, updated_velocity
 from karamelo_py.scene.modify import Fix
 from karamelo_py.schemes.traits import SchemeTraits
-from karamelo_py.script.errors import FAILURES
+from karamelo_py.script.errors import FAILURES, Place
 from karamelo_py.script.values import in_a_row
 
 # Required class attributes.
@@ -184,7 +184,7 @@ def misfit(function: Callable, count: int) -> str:
     return ""
 
 
-def check_part(hub: Scene, name: str, part: Any) -> None:
+def check_part(hub: Scene, name: str, part: object) -> None:
     """Refuse an incomplete transfer, basis, method or scheme (`name`: ``basis smooth``)."""
     family, kind = name.partition(" ")[0], type(part)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
@@ -204,7 +204,7 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
     check_fields(hub, name, part, hub.place)
 
 
-def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
+def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
     if not isinstance(traits, wanted):
         return f"its traits are {traits!r}, and no {wanted.__name__}(...)"
     names = wanted._fields  # type: ignore[attr-defined]
@@ -215,7 +215,7 @@ def _wrong_traits(kind: type, traits: Any, wanted: type) -> str:
     return ""
 
 
-def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
+def check_fields(hub: Scene, name: str, owner: object, place: Place | None) -> None:
     """Refuse wrong declarations, and columns with another meaning."""
     for attribute in ("point_fields", "node_fields"):
         kinds = getattr(owner, attribute, ())
@@ -234,7 +234,7 @@ def check_fields(hub: Scene, name: str, owner: Any, place: Any) -> None:
                     raise faults.fault(name, error, place)
 
 
-def check_law(hub: Scene, name: str, law: Any) -> None:
+def check_law(hub: Scene, name: str, law: NamedTuple) -> None:
     """Refuse wrong traits, and columns with another meaning."""
     if is_foreign(type(law)) and (error := _wrong_traits(type(law), law_traits(law), LawTraits)):
         raise faults.fault(name, error, hub.place)
@@ -277,7 +277,7 @@ def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_field
     return "" if other in (None, kind) else f"one of the field {other.__name__}"
 
 
-def _shown(kind: Any) -> str:
+def _shown(kind: object) -> str:
     return kind.__name__ if isinstance(kind, type) else repr(kind)
 
 
@@ -289,7 +289,7 @@ class PartInUse(NamedTuple):
 
     name: str
     kind: type
-    place: Any
+    place: Place | None
 
 
 def is_foreign(kind: type) -> bool:

@@ -9,10 +9,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from karamelo_py.compiler.fields import field, name_of
 from karamelo_py.kernels import arrays
-from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.equations.heat import Supply, Temperature
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.move import VelocityBefore
@@ -56,7 +56,7 @@ class Shown:
     def _writable(self, view: "View") -> bool:
         return self.write is not None and self.name not in view._read_only
 
-    def __set__(self, view: "View", value: Any) -> None:
+    def __set__(self, view: "View", value: ArrayLike) -> None:
         if not self._writable(view):
             raise AttributeError(f"{self.name} is read-only")
         now = self.__get__(view, type(view))
@@ -85,7 +85,7 @@ class View:
         # By attribute or field class: array given to the hook, and a copy.
         self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
 
-    def _take_times(self, control: Any) -> None:
+    def _take_times(self, control: arrays.Control) -> None:
         self.dt = float(control.values[arrays.DT])
         self.kick = float(control.clock[0].kick)
         self.contact_dt = float(control.clock[0].contact_dt)
@@ -125,10 +125,10 @@ class View:
             raise self._no_column(kind)
         return self._handed(kind, lambda: self._get(kind))
 
-    def __setitem__(self, kind: type, value: Any) -> None:
+    def __setitem__(self, kind: type, value: ArrayLike) -> None:
         self[kind][...] = value
 
-    def _no_column(self, name: Any) -> KeyError:
+    def _no_column(self, name: object) -> KeyError:
         kind = type(self).__name__
         attribute, *k = _VECTORS.get(str(name), (str(name),))
         if attribute in self._shown:
@@ -187,7 +187,7 @@ class NodesView(View):
             members = group.nodes
         self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
-    def total(self, terms: Any) -> np.ndarray:
+    def total(self, terms: ArrayLike) -> np.ndarray:
         """Sum terms (n,) or (n, k) over the group's nodes of all processes."""
         terms = np.asarray(terms, float)
         local = slice(None) if self._foreign is None else self._foreign[self.index] == 0
@@ -289,7 +289,7 @@ class PointsView(View):
         numbers: np.ndarray | None = None,
         *,
         then: bool = False,
-        pieces: Sequence[tuple[Block, np.ndarray]] = (),
+        pieces: Sequence[tuple[arrays.Block, np.ndarray]] = (),
         in_steps: bool = True,
     ):
         super().__init__()
@@ -304,7 +304,7 @@ class PointsView(View):
         self._numbers = numbers  # from 0
         self.ids = numbers + 1  # as in dumps
 
-    def _take_local(self, pieces: Sequence[tuple[Block, np.ndarray]]) -> np.ndarray:
+    def _take_local(self, pieces: Sequence[tuple[arrays.Block, np.ndarray]]) -> np.ndarray:
         ids = [block.points.id[rows] for block, rows in pieces]
         numbers = np.concatenate(ids)
         spans = pairwise(np.cumsum([0, *map(len, ids)]).tolist())
@@ -314,7 +314,7 @@ class PointsView(View):
         self._read_only = ("position",)
         return numbers
 
-    def total(self, terms: Any) -> np.ndarray:
+    def total(self, terms: ArrayLike) -> np.ndarray:
         """Sum terms (n,) or (n, k) over the group's points, exactly rounded; collective."""
         if not self._in_steps:
             raise ValueError(
@@ -345,11 +345,11 @@ class PointsView(View):
     def _put(self, kind: type, value: np.ndarray) -> None:
         self._rows.put(_declared(kind, "point"), value)
 
-    def _places(self, points: Any) -> np.ndarray:
+    def _places(self, points: arrays.Points) -> np.ndarray:
         now = self._simulation.now
         return points.x[1 - now if self._then else now]
 
-    def _place(self, points: Any) -> np.ndarray:
+    def _place(self, points: arrays.Points) -> np.ndarray:
         return self._places(points)[: self._simulation.kin.dimension]
 
     @Shown
@@ -496,7 +496,7 @@ class PointsView(View):
 
 def set_columns(
     simulation: Any,
-    columns: Mapping[str, Any],
+    columns: Mapping[str, ArrayLike],
     ids: np.ndarray | None = None,
     place: Place | None = None,
 ) -> None:

@@ -5,6 +5,7 @@ manual).
 """
 
 import re
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -235,7 +236,8 @@ class _Deck:
         self.parts: dict[str, _Part] = {}
         self.instances: list[_Instance] = []
         self.whole = self.scope = _Part()
-        self.assembly: list[tuple[dict, str, str, list]] = []
+        # Sets of the assembly by numbers of an instance: nodes?, name, instance, items.
+        self.assembly: list[tuple[bool, str, str, list]] = []
         for keyword in _keywords(path):
             reads = _READ.get(keyword.name)
             if keyword.name in _REFUSED:
@@ -272,13 +274,13 @@ class _Deck:
         maps = {"R": lambda x: x, "C": _cylindrical, "S": _spherical}
         if kind not in maps:
             raise _wrong(keyword, f"has the system '{kind}'", "R, C or S")
-        numbers = table[:, 0].astype(np.int64)
-        self._add_nodes(numbers, self.scope.system(maps[kind](table[:, 1:])))
-        _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+        places = self.scope.system(maps[kind](table[:, 1:]))
+        self._add_nodes(keyword, table[:, 0].astype(np.int64), places)
 
-    def _add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
+    def _add_nodes(self, keyword: _Keyword, numbers: np.ndarray, places: np.ndarray) -> None:
         self.scope.numbers.append(numbers)
         self.scope.places.append(places)
+        _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
 
     def _ngen(self, keyword: _Keyword) -> None:
         if keyword.options.get("LINE", "").upper()[:1] in ("C", "P"):
@@ -287,8 +289,7 @@ class _Deck:
             numbers = np.arange(first, last + 1, step or 1)
             ends = self._places(keyword, np.array([first, last]))
             fraction = (numbers - first) / max(last - first, 1)
-            self._add_nodes(numbers, ends[0] + fraction[:, None] * (ends[1] - ends[0]))
-            _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+            self._add_nodes(keyword, numbers, ends[0] + fraction[:, None] * (ends[1] - ends[0]))
 
     def _nfill(self, keyword: _Keyword) -> None:
         if {"BIAS", "SINGULAR"} & keyword.options.keys():
@@ -299,9 +300,8 @@ class _Deck:
             b = self._numbers(self.scope.nodes, high)
             start, end = self._places(keyword, a), self._places(keyword, b)
             for k in range(1, int(count or 1)):
-                numbers = a + k * int(step or 1)
-                self._add_nodes(numbers, start + k / int(count) * (end - start))
-                _into(self.scope.nodes, keyword.options.get("NSET"), numbers)
+                places = start + k / int(count) * (end - start)
+                self._add_nodes(keyword, a + k * int(step or 1), places)
 
     def _places(self, keyword: _Keyword, numbers: np.ndarray) -> np.ndarray:
         defined, places = self.scope.table()
@@ -336,14 +336,9 @@ class _Deck:
             self.scope.elements.append(_Elements(type_, numbers[1:], nodes[1:]))
             _into(self.scope.groups, keyword.options.get("ELSET"), numbers)
 
-    def _nset(self, keyword: _Keyword) -> None:
-        self._set(keyword, self.scope.nodes, "NSET")
-
-    def _elset(self, keyword: _Keyword) -> None:
-        self._set(keyword, self.scope.groups, "ELSET")
-
-    def _set(self, keyword: _Keyword, sets: dict, option: str) -> None:
-        name = keyword.options.get(option, "")
+    def _set(self, keyword: _Keyword) -> None:
+        is_nodes = keyword.name == "NSET"
+        name = keyword.options.get(keyword.name, "")
         items: list[np.ndarray | str] = []
         if "GENERATE" in keyword.options:
             for first, last, step in _table(keyword, 2, 3).astype(np.int64):
@@ -353,11 +348,11 @@ class _Deck:
             items = [w.upper() for w in words if w and not w.lstrip("-").isdigit()]
             items.append(np.array([int(w) for w in words if w.lstrip("-").isdigit()], np.int64))
         instance = keyword.options.get("INSTANCE", "").upper()
-        if instance:  # in the assembly, by numbers of a part
-            self.assembly.append((sets, name.upper(), instance, items))
+        if instance:
+            self.assembly.append((is_nodes, name.upper(), instance, items))
             return
         for item in items:
-            _into(sets, name, item)
+            _into(self.scope.nodes if is_nodes else self.scope.groups, name, item)
 
     def _surface(self, keyword: _Keyword) -> None:
         name = keyword.options.get("NAME", "").upper()
@@ -384,156 +379,166 @@ class _Deck:
             elif item not in above:
                 yield from self._resolved(sets, item, (*above, name))
 
-    # ---- the mesh ----
-
     def mesh(self) -> Mesh:
         bodies = self.instances or [
             _Instance(name, part, lambda x: x) for name, part in self.parts.items()
         ]
+        whole = _Instance("", self.whole, lambda x: x)
         if self.whole.numbers or not bodies:
-            bodies = [*bodies, _Instance("", self.whole, lambda x: x)]
-        merged = _Found()
+            bodies = [*bodies, whole]
+        merged = _Merged(self.path)
         for body in bodies:
-            self._add(merged, body)
-        for sets, name, instance, items in self.assembly:
-            sets_merged = merged.nodes if sets is self.whole.nodes else merged.groups
-            numbered = merged.node_numbers if sets is self.whole.nodes else merged.numbers
-            table = numbered.get(instance, numbered[bodies[-1].name])
+            merged.add(body, self)
+        for is_nodes, name, instance, items in self.assembly:
+            sets = merged.nodes if is_nodes else merged.elements
+            numbering = sets.numbering.get(instance, sets.numbering[bodies[-1].name])
             for item in items:
-                said = sets_merged.get(f"{instance}.{item}", []) if isinstance(item, str) else [
-                    _looked_up(table, item)
-                ]  # fmt: skip
-                sets_merged.setdefault(name, []).extend(said)
+                if isinstance(item, str):
+                    sets.extend(name, f"{instance}.{item}")
+                else:
+                    sets.by_name[name].append(numbering.listed(item))
         if self.instances:  # assembly sets made of INSTANCE.SET and of each other
-            for sets, sets_merged in (
-                (self.whole.nodes, merged.nodes),
-                (self.whole.groups, merged.groups),
-            ):
-                for name, items in sets.items():
+            pairs = (self.whole.nodes, merged.nodes), (self.whole.groups, merged.elements)
+            for of_deck, sets in pairs:
+                for name, items in of_deck.items():
                     for item in items:
                         if isinstance(item, str):
-                            sets_merged.setdefault(name, []).extend(sets_merged.get(item, []))
-            self._add_surfaces(merged, _Instance("", self.whole, lambda x: x))
+                            sets.extend(name, item)
+            merged.add_surfaces(whole)
         return merged.mesh()
-
-    def _add(self, merged: "_Found", body: _Instance) -> None:
-        numbers, places = body.part.table()
-        table = numbers, np.arange(len(numbers)) + sum(map(len, merged.points))
-        merged.points.append(body.move(places))
-        merged.node_numbers[body.name] = table
-        for kind, count in body.part.skipped:
-            merged.skipped[kind] = merged.skipped.get(kind, 0) + count
-        made = [np.empty((2, 0), np.int64)]
-        for elements in body.part.elements:
-            nodes = _looked_up(table, elements.nodes.ravel(), keep=True)
-            nodes = nodes.reshape(elements.nodes.shape)
-            if (nodes < 0).any():
-                row, column = np.argwhere(nodes < 0)[0]
-                raise ScriptError(
-                    f"{self.path.name}: element {elements.numbers[row]} has the node "
-                    f"{elements.nodes[row, column]}, which is not defined",
-                    argument="file",
-                )
-            made.append(np.stack([elements.numbers, merged.count + np.arange(len(nodes))]))
-            merged.add(elements.type, nodes)
-        numbers = np.concatenate(made, axis=1)
-        numbers = numbers[:, np.argsort(numbers[0], kind="stable")]
-        merged.numbers[body.name] = numbers[0], numbers[1]
-        merged.groups.setdefault(body.name, []).append(numbers[1])
-        for sets, sets_merged, numbered in (
-            (body.part.nodes, merged.nodes, table),
-            (body.part.groups, merged.groups, merged.numbers[body.name]),
-        ):
-            for name in sets:
-                at = _looked_up(numbered, self._numbers(sets, name))
-                for key in {name, f"{body.name}.{name}"} if body.name else {name}:
-                    sets_merged.setdefault(key, []).append(at)
-        self._add_surfaces(merged, body)
-
-    def _add_surfaces(self, merged: "_Found", body: _Instance) -> None:
-        for name, items in body.part.surfaces.items():
-            for of, face in items:
-                if of.isdigit():
-                    elements = [_looked_up(merged.numbers[body.name], np.array([int(of)]))]
-                else:
-                    elements = merged.groups.get(f"{body.name}.{of}", merged.groups.get(of, []))
-                if re.fullmatch(r"S[1-6]", face) and elements:
-                    key = int(face[1]) - 1, np.concatenate(elements)
-                    for key_of_set in {name, f"{body.name}.{name}"} if body.name else {name}:
-                        merged.surfaces.setdefault(key_of_set, []).append(key)
 
 
 _READ: dict[str, Callable[[_Deck, _Keyword], None]] = {
     "PART": _Deck._part, "END PART": _Deck._end_part, "INSTANCE": _Deck._instance,
     "END INSTANCE": _Deck._end_part, "SYSTEM": _Deck._system, "NODE": _Deck._node,
     "NGEN": _Deck._ngen, "NFILL": _Deck._nfill, "ELEMENT": _Deck._element,
-    "ELGEN": _Deck._elgen, "NSET": _Deck._nset, "ELSET": _Deck._elset, "SURFACE": _Deck._surface,
+    "ELGEN": _Deck._elgen, "NSET": _Deck._set, "ELSET": _Deck._set, "SURFACE": _Deck._surface,
 }  # fmt: skip
 
 
-def _looked_up(table: tuple[np.ndarray, np.ndarray], of: np.ndarray, keep: bool = False):
-    """Numbers of the mesh for numbers (n,) of the deck; unknown ones are left out, or -1."""
-    numbers, stands = table
-    if not len(numbers):
-        return np.full(len(of), -1) if keep else np.empty(0, np.int64)
-    at = np.minimum(np.searchsorted(numbers, of), len(numbers) - 1)
-    is_listed = numbers[at] == of
-    return np.where(is_listed, stands[at], -1) if keep else stands[at[is_listed]]
+class _Numbering(NamedTuple):
+    deck: np.ndarray  # (n,) ascending
+    mesh: np.ndarray  # (n,)
+
+    def of(self, numbers: np.ndarray) -> np.ndarray:
+        """Numbers in the mesh (m,) of numbers in the deck, or -1."""
+        if not len(self.deck):
+            return np.full(len(numbers), -1)
+        at = np.minimum(np.searchsorted(self.deck, numbers), len(self.deck) - 1)
+        return np.where(self.deck[at] == numbers, self.mesh[at], -1)
+
+    def listed(self, numbers: np.ndarray) -> np.ndarray:
+        """Leave out unknown numbers."""
+        of_mesh = self.of(numbers)
+        return of_mesh[of_mesh >= 0]
 
 
-class _Found:
-    """Nodes, elements and sets of all bodies; elements are numbered from 0."""
+class _Sets:
+    """Sets of nodes or elements, by NAME and BODY.NAME, and the numbering of each body."""
 
     def __init__(self) -> None:
-        self.points: list[np.ndarray] = []
-        self.count = 0
-        self.blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {}  # by Abaqus type
-        self.nodes: dict[str, list[np.ndarray]] = {}
-        self.groups: dict[str, list[np.ndarray]] = {}
-        self.surfaces: dict[str, list[tuple[int, np.ndarray]]] = {}
-        self.skipped: dict[str, int] = {}
-        # By body: ascending numbers in the deck, and numbers in the mesh.
-        self.node_numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-        self.numbers: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self.by_name: dict[str, list[np.ndarray]] = defaultdict(list)
+        self.numbering: dict[str, _Numbering] = {}
 
-    def add(self, kind: str, nodes: np.ndarray) -> None:
-        numbers = self.count + np.arange(len(nodes))
-        self.blocks.setdefault(kind, []).append((numbers, nodes))
-        self.count += len(nodes)
+    def extend(self, name: str, other: str) -> None:
+        self.by_name[name] += list(self.by_name.get(other, ()))
+
+    def members(self, name: str) -> np.ndarray:
+        return np.concatenate([np.empty(0, np.int64), *self.by_name.get(name, ())])
+
+
+def _names(body: _Instance, name: str) -> set[str]:
+    return {name, f"{body.name}.{name}"} if body.name else {name}
+
+
+class _Merged:
+    """The mesh of all bodies; nodes and elements are numbered from 0."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.points: list[np.ndarray] = []
+        # By Abaqus type: numbers (n,) and nodes (n, c).
+        self.blocks: dict[str, list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
+        self.count = 0
+        self.nodes, self.elements = _Sets(), _Sets()
+        self.surfaces: dict[str, list[tuple[int, np.ndarray]]] = defaultdict(list)
+        self.skipped: Counter[str] = Counter()
+
+    def add(self, body: _Instance, deck: _Deck) -> None:
+        numbers, places = body.part.table()
+        table = _Numbering(numbers, np.arange(len(numbers)) + sum(map(len, self.points)))
+        self.nodes.numbering[body.name] = table
+        self.points.append(body.move(places))
+        for kind, count in body.part.skipped:
+            self.skipped[kind] += count
+        numbered = [np.empty((2, 0), np.int64)]
+        for kind, numbers, nodes in body.part.elements:
+            of_mesh = table.of(nodes.ravel()).reshape(nodes.shape)
+            if (of_mesh < 0).any():
+                row, column = np.argwhere(of_mesh < 0)[0]
+                raise ScriptError(
+                    f"{self.path.name}: element {numbers[row]} has the node "
+                    f"{nodes[row, column]}, which is not defined",
+                    argument="file",
+                )
+            own = self.count + np.arange(len(nodes))
+            self.blocks[kind].append((own, of_mesh))
+            self.count += len(nodes)
+            numbered.append(np.stack([numbers, own]))
+        pairs = np.concatenate(numbered, axis=1)
+        elements = _Numbering(*pairs[:, np.argsort(pairs[0], kind="stable")])
+        self.elements.numbering[body.name] = elements
+        self.elements.by_name[body.name].append(elements.mesh)
+        for of_part, sets in ((body.part.nodes, self.nodes), (body.part.groups, self.elements)):
+            for name in of_part:
+                members = sets.numbering[body.name].listed(deck._numbers(of_part, name))
+                for key in _names(body, name):
+                    sets.by_name[key].append(members)
+        self.add_surfaces(body)
+
+    def add_surfaces(self, body: _Instance) -> None:
+        for name, items in body.part.surfaces.items():
+            for of, face in items:
+                if of.isdigit():
+                    elements = self.elements.numbering[body.name].listed(np.array([int(of)]))
+                else:
+                    of_body = f"{body.name}.{of}"
+                    known = of_body in self.elements.by_name
+                    elements = self.elements.members(of_body if known else of)
+                if re.fullmatch(r"S[1-6]", face):
+                    for key in _names(body, name):
+                        self.surfaces[key].append((int(face[1]) - 1, elements))
 
     def mesh(self) -> Mesh:
         cells, numbers = [], []
         for label, parts in self.blocks.items():
             family, count = _kind(label) or ("", 0)
             name = family if count == len(SHAPES[family].corners) else f"{family}{count}"
-            numbers.append(np.concatenate([n for n, _ in parts]))
-            cells.append(
-                CellBlock(name, np.concatenate([nodes for _, nodes in parts]), label=label)
-            )
-        faces: dict[str, list[CellBlock]] = {}
+            of_block, nodes = map(np.concatenate, zip(*parts, strict=True))
+            numbers.append(of_block)
+            cells.append(CellBlock(name, nodes, label=label))
+        faces: dict[str, list[CellBlock]] = defaultdict(list)
         for name, items in self.surfaces.items():
-            for side, numbers_of_set in items:
-                for block, of in zip(cells, numbers, strict=True):
+            for side, elements in items:
+                for block, of_block in zip(cells, numbers, strict=True):
                     corners = _FACES.get(block.family, ())
-                    nodes = block.nodes[np.isin(of, numbers_of_set)]
+                    nodes = block.nodes[np.isin(of_block, elements)]
                     if side < len(corners) and len(nodes):
                         kind = FACE_TYPES[len(corners[side])]
-                        faces.setdefault(name, []).append(CellBlock(kind, nodes[:, corners[side]]))
+                        faces[name].append(CellBlock(kind, nodes[:, corners[side]]))
         every = [*cells, *(cell for parts in faces.values() for cell in parts)]
         none = [np.zeros(len(cell.nodes), bool) for cell in every]
         sets = {}
-        for name, numbers_of_set in self.groups.items():
-            if name:
-                of_set = np.concatenate([np.empty(0, np.int64), *numbers_of_set])
-                sets[name] = [np.isin(of, of_set) for of in numbers] + none[len(cells) :]
+        for name in filter(None, self.elements.by_name):
+            members = self.elements.members(name)
+            sets[name] = [np.isin(of_block, members) for of_block in numbers] + none[len(cells) :]
         for name, parts in faces.items():
             mine = {id(cell) for cell in parts}
             sets[name] = [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
         points = np.concatenate(self.points)
-        node_sets = {}
-        for name, numbers_of_set in self.nodes.items():
-            node_sets[name] = np.zeros(len(points), bool)
-            node_sets[name][np.concatenate([np.empty(0, np.int64), *numbers_of_set])] = True
+        node_sets = {name: np.zeros(len(points), bool) for name in self.nodes.by_name}
+        for name, mask in node_sets.items():
+            mask[self.nodes.members(name)] = True
         return Mesh(points, every, sets, node_sets, self.skipped)
 
 

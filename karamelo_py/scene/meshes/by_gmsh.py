@@ -7,7 +7,7 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
@@ -24,7 +24,7 @@ class NoGmsh(Exception):
 
 
 @contextlib.contextmanager
-def _model(path: Path) -> Iterator[Any]:
+def _model(path: Path) -> Iterator[ModuleType]:
     """Open a file in Gmsh; other models of the process stay open."""
     try:
         import gmsh
@@ -44,7 +44,7 @@ def _model(path: Path) -> Iterator[Any]:
             gmsh.finalize()
 
 
-def begin(gmsh: Any) -> None:
+def begin(gmsh: ModuleType) -> None:
     """Initialize Gmsh, which resets SIGPIPE: a closed pipe or live page would end the program."""
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
@@ -141,7 +141,7 @@ class _Header:
             self.groups = {int(row[0]): int(row[at]) for row in rows if len(row) > at}
 
 
-def _taken(gmsh: Any, only_groups: bool = False, of_file: _Header | None = None) -> Mesh:
+def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None = None) -> Mesh:
     tags, points, _ = gmsh.model.mesh.getNodes()
     order = np.argsort(tags)
     ascending = tags[order]
