@@ -62,8 +62,6 @@ class Console:
             self._terminal = interactive and os.environ.get("TERM") != "dumb"
         return self._terminal
 
-    # Lines
-
     def say(self, text: str = "", style: str | None = None) -> None:
         """Write lines; on a terminal in a Rich style."""
         if self.quiet or self._broken:
@@ -117,8 +115,6 @@ class Console:
     def leave(self) -> None:
         """Stop writing to a terminal that is gone."""
         self._broken, self._progress = True, None
-
-    # Progress
 
     def begin_run(self, step: int = 0, fraction: float = 0.0) -> None:
         """Measure progress from `step`."""
@@ -176,8 +172,6 @@ class Console:
             if fraction > share:
                 parts.append(f"{duration(elapsed * (1 - fraction) / (fraction - share))} left")
         return ", ".join(parts)
-
-    # Helpers
 
     def _release(self) -> None:
         if self._waiting:

@@ -41,9 +41,7 @@ class PointGroup(Protocol):
     """A group of points, or all; see `scene.group`."""
 
     all: bool
-
-    @property
-    def ids(self) -> np.ndarray: ...
+    ids: np.ndarray
 
     def has(self, ids: np.ndarray) -> np.ndarray: ...
 
@@ -377,9 +375,6 @@ class ShownColumn(ColumnFormula):
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         word = argument.word()
         return word if word is not None and word.isidentifier() else cls(hub, argument)
-
-
-# ---- columns by name ----
 
 
 def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:

@@ -154,8 +154,6 @@ COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     **{f"ntype{axis}": partial(kind_of_node, k) for k, axis in enumerate(AXES)},
 }
 
-# --- sums over points, computed on request ---
-
 LOADS = "post_particles_to_grid"
 
 

@@ -1,6 +1,7 @@
 """Plots of logged quantities at the end of a run; the style of all plots."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import floor, log10
 from pathlib import Path
 from typing import Any
@@ -8,29 +9,27 @@ from typing import Any
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.files import savefig
 from karamelo_py.output.quantity import Quantity
-from karamelo_py.output.rhythm import Rhythmic
+from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import Place
 
 
+@dataclass(eq=False)
 class PlottedCurve(Rhythmic):
     """`y` against `x`; `side` left or right, `scale` linear or log, `label` of the y axis."""
 
     remembers = ("points",)
 
-    def __init__(
-        self, every: int, x: Quantity, y: Quantity, side: str = "left", scale: str = "linear",
-        label: str | None = None,
-    ):  # fmt: skip
-        self.every = every
-        self.x = x
-        self.y = y
-        self.side = side
-        self.scale = scale
-        self.label = label
+    every: int | ByTime
+    x: Quantity
+    y: Quantity
+    side: str = "left"
+    scale: str = "linear"
+    label: str | None = None
+
+    def __post_init__(self) -> None:
         self.points: list[tuple[float, float]] = []
-        self.last_step: int | None = None
-        self.id = y.name
+        self.id = self.y.name
 
     def write(self) -> None:
         self.points.append((float(self.x.read()), float(self.y.read())))
@@ -102,9 +101,6 @@ def _over_one_axis(
     if any(curve.scale == "log" for curve in curves):
         axes.set_yscale("log", nonpositive="mask")
     return lines
-
-
-# ---- style ----
 
 
 def blank_figure(width: float, height: float) -> Any:

@@ -281,9 +281,6 @@ def _shown(kind: object) -> str:
     return kind.__name__ if isinstance(kind, type) else repr(kind)
 
 
-# ---- attribution ----
-
-
 class PartInUse(NamedTuple):
     """A style in use, such as ``fix drag``, its class and its place in the script."""
 

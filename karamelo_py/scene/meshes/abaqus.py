@@ -247,8 +247,6 @@ class _Deck:
             if reads:
                 reads(self, keyword)
 
-    # ---- keywords ----
-
     def _part(self, keyword: _Keyword) -> None:
         self.scope = self.parts.setdefault(keyword.options.get("NAME", "").upper(), _Part())
 
@@ -363,8 +361,6 @@ class _Deck:
         for line in keyword.lines:
             of, face = (word.strip().upper() for word in (line + ",").split(",")[:2])
             self.scope.surfaces.setdefault(name, []).append((of, face))
-
-    # ---- sets by numbers ----
 
     def _numbers(self, sets: dict, name: str) -> np.ndarray:
         """(n,) in a set, or the number that `name` is."""

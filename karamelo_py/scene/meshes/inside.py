@@ -51,9 +51,6 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
     return np.linalg.det(local) / (1, 2, 6)[d - 1]
 
 
-# --- meshes ---
-
-
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
     """Faces (m, d, d) of one element only, oriented outwards; in 1D in pairs, the lower one first.
 
@@ -103,9 +100,6 @@ def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
     order = (np.argmin(rank, axis=1)[:, None] + np.arange(4)) % 4
     turned = np.take_along_axis(corners, order[:, :, None], axis=1)
     return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
-
-
-# --- shells from files ---
 
 
 def triangles_of(mesh: Mesh) -> np.ndarray:
