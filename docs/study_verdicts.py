@@ -49,7 +49,7 @@ KNOWN = {
         "noise of points that cross cells, a floor"),
     "bar": Scene(
         "inputs/in.vibrating_bar", f"-var refine=0.25,0.5,1,2,4 {KINDS}", "err_history",
-        (0.02, 4e-3), "errors turn round"),
+        (0.02, 4e-3), "errors change sign"),
     "disk": Scene(
         "inputs/in.spinning_disk", "-var refine=0.5,1,2 -var transfer=PIC,APIC -var basis=linear",
         "lost=abs((Ek + Es)/(first:Ek + first:Es) - 1)", (0.1,), "damping by the transfer"),
@@ -114,7 +114,7 @@ AFTER = {
 UNSEEN = {
     "plastic_wave": Scene(
         "docs/verdicts/in.plastic_wave", f"-var refine=0.5,1,2,4 {TWO}", "err", (0.05, 0.02),
-        "a plastic wave behind an elastic one"),
+        "a plastic wave after an elastic wave"),
     "organ": Scene(
         "docs/verdicts/in.organ", f"-var refine=0.5,1,2,4 {TWO},cubic-spline", "err_history",
         (0.05, 5e-3), "sound in a gas"),

@@ -12,9 +12,10 @@ from walked import MODULES, PACKAGE, walked
 
 pytestmark = pytest.mark.xdist_group("house")
 ROOT = Path(__file__).parent.parent
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-PAGES += [*sorted((ROOT / "docs" / "howto").glob("*.md"))]
-PAGES += [*sorted((ROOT / "docs" / "house").glob("*.md"))]
+MADE = {"_build", "generated"}
+PAGES = [path for path in sorted((ROOT / "docs").rglob("*.md")) if not MADE & {*path.parts}]
+PAGES.append(ROOT / "README.md")
+SCENES = sorted((ROOT / "inputs").rglob("in.*"))
 CODE = re.compile(r"^ *```.*?^ *```|`[^`\n]+`|\]\([^)]*\)", re.S | re.M)
 
 CODE_IN_TEXT = re.compile(r"``[^`]+``|`[^`\n]+`")
@@ -69,6 +70,10 @@ def sentences(module):
 def texts():
     """Lists of (file, line, text): of pages, and of the package."""
     pages = [(page.relative_to(ROOT), 1, prose(page)) for page in PAGES]
+    for scene in SCENES:
+        heads = re.sub(r"^[^#\n]*", "", scene.read_text("utf-8"), flags=re.M)
+        heads = re.sub(r"-var cure", "", CODE.sub("", heads))
+        pages.append((scene.relative_to(ROOT), 1, heads))
     package = [
         (module.relative_to(ROOT), line, text)
         for module in MODULES
