@@ -28,7 +28,8 @@ from karamelo_py.script.parser import parse
 
 ROOT = Path(__file__).parent.parent
 ROOMS = [ROOT / "docs" / "house.md", *sorted((ROOT / "docs" / "house").glob("*.md"))]
-SITE = [page for room in ("howto", "studies", "plugins") for page in (ROOT / "docs" / room).glob("*.md")]
+FOLDERS = "howto", "studies", "plugins"
+SITE = [page for folder in FOLDERS for page in (ROOT / "docs" / folder).glob("*.md")]
 SITE += [ROOT / "docs" / "messages" / "index.md", ROOT / "docs" / "tutorials" / "index.md"]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *ROOMS[1:], *sorted(SITE)]
 STYLES = [(f, n) for f in catalogue.families() for n in registry.names(f)]
