@@ -438,7 +438,9 @@ BOX = """
     material(water, eos-strength, e, s)
     solid(box, region, box, 2, steel, h)
     solid(water, region, heap, 2, water, h)
+    group(box, particles, region, hull, solid, box)
     fix(w, body_force, all, 9.81*s, -9.81*c)
+    fix(shake, velocity_particles, box, SPEED*cos(2*PI*time), SPEED/2*sin(2*PI*time))
     log_modify(custom, step, time, ContactForce_box_x, ContactForce_box_y)
     dump(p, all, particle, 100000, p.*.LAMMPS, x, y, type)
     set_output(time(0.1))
@@ -448,30 +450,37 @@ BOX = """
 
 @pytest.mark.xdist_group("contact")
 @pytest.mark.parametrize(
-    "transfer, theta",
+    "transfer, theta, speed",
     parameters(
-        [("FLIP, linear, 0.99", 0)],
+        [("FLIP, linear, 0.99", 0, 0)],
         [
-            ("FLIP, linear, 0.99", 0.3),
-            ("FLIP, linear, 1", 0),
-            ("APIC, linear", 0),
-            ("APIC, quadratic-spline", 0.5),
+            ("FLIP, linear, 0.99", 0.3, 0),
+            ("FLIP, linear, 1", 0, 0),
+            ("APIC, linear", 0, 0),
+            ("APIC, quadratic-spline", 0.5, 0),
+            ("FLIP, quadratic-spline, 0.99", 0.3, 0.2),
         ],
     ),
 )
-def test_water_stays_in_a_box_with_walls_of_one_cell(run_script, transfer, theta):
-    """It left the box at 1.6 s through the corners, whose two faces counted as one that leans.
+def test_water_stays_in_a_box_with_walls_of_one_cell(run_script, transfer, theta, speed):
+    """Water rests in a box, or sloshes in a box that moves, and does not sink into its walls.
 
-    A quarter of a cell is allowed: gaps are known from mean places of points out of order.
+    Points begin 0.25 cells in front of the walls. They sank 0.3 cells and went on: an impulse in a
+    corner left a part of the approach, and gaps are known from mean positions of points only.
     """
-    result = run_script(BOX.replace("TRANSFER", transfer).replace("THETA", str(theta)))
+    text = BOX.replace("TRANSFER", transfer).replace("THETA", str(theta))
+    result = run_script(text.replace("SPEED", str(speed)))
     steps = sorted(result.folder.glob("p.*.LAMMPS"), key=lambda p: int(p.name.split(".")[1]))
     points = read_dump(steps[-1])[-1]
+    begin = read_dump(steps[0])[-1]
     water = points.type == 2
-    x, y = points.x[water] - 0.5, points.y[water] - 0.5
+    x, y = (
+        points[axis][water] - 0.5 - (points[axis] - begin[axis])[~water].mean() for axis in "xy"
+    )
     across, up = x * np.cos(theta) + y * np.sin(theta), y * np.cos(theta) - x * np.sin(theta)
-    assert np.abs(across).max() < 0.16 + 0.02 / 4
-    assert up.min() > -0.16 - 0.02 / 4
+    depth = -0.1 if theta == 0 else 0.1  # of a centre behind the face, in cells
+    assert np.abs(across).max() < 0.16 + depth * 0.02
+    assert up.min() > -0.16 - depth * 0.02
     log = result.log
     down = log.ContactForce_box_x * np.sin(theta) - log.ContactForce_box_y * np.cos(theta)
-    assert down[10:].mean() == pytest.approx(9.81 * 1000 * 0.32 * 0.2, rel=0.05)
+    assert down[10:].mean() == pytest.approx(9.81 * 1000 * 0.32 * 0.2, rel=0.05 + speed)

@@ -17,11 +17,13 @@ body around a node (`karamelo_py.points.basis.surface`). Bodies may approach unt
 at the end of the step. Convex bodies are apart if they are apart along one direction: the grid axes
 are tried too, since normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or of granular material: each time it seemed
-to leave a gap, points would sink a little into a wall, permanently. So where contact with a body of
-prescribed velocity acted in the last step, bodies may separate but not approach. Such a wall may be
-one cell thick and have corners that other bodies fill: only its faces towards the other body count,
-and in a hollow corner none of them may be entered.
+The mean position is not the lowest point of a liquid or of granular material: each time that it
+seems to leave a gap, points would sink a little into a wall, permanently. So where contact with a
+body of prescribed velocity acted in the last step, others may separate but not approach. For bodies
+that hold no shape this lasts for 100 steps, as their points leave a wall for some steps at a time,
+and it includes the nodes that a moving wall reaches. Such a wall may be one cell thick and have
+corners that other bodies fill: only its faces towards the other body count, and in a hollow corner
+none of them may be entered.
 """
 
 from math import sqrt
@@ -45,6 +47,7 @@ from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
 SCATTER = 0.003  # accuracy of the direction of a plane face
 EDGE = 0.03  # above it, a face ends or is round
 FACING = 0.3  # cosine of the angle at which two faces face each other
+MEMORY = 100  # steps after a contact in which bodies that hold no shape may not approach a wall
 REPEATS = 16  # iterations if more than two fields meet; each at least halves the remainder
 
 
@@ -69,6 +72,7 @@ class SeparateFields(NamedTuple):
     forces: np.ndarray  # number of slots of all forces and torques, and these
     rigid: np.ndarray  # (F,) bool: whether contact does not move a field
     torque: np.ndarray  # (F,) slot of the published torque on each field
+    memory: np.ndarray  # (F,) steps after a contact in which a body may not approach a wall
     surface: np.ndarray  # (F, k) distance of the surface by the mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a position
     partners: np.ndarray  # (F,) int64 scratch: number of contacts of each of them
@@ -212,9 +216,12 @@ def _is_hollow(contact, kin, nodes, n, normal, other):
 
 
 @noinline
-def _entering(contact, kin, nodes, n, other, velocity):
-    """Return the largest part of a velocity that enters a face towards the `other` body."""
-    most, part = 0.0, zero_vector(kin, 0.0)
+def _entering(contact, kin, nodes, n, other, velocity, least):
+    """Return the largest part of a velocity, above `least`, that enters a face around a node.
+
+    Only faces towards the `other` body count.
+    """
+    most, part = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
         face = _face(contact, kin, nodes, beside if inside else n)
@@ -225,13 +232,26 @@ def _entering(contact, kin, nodes, n, other, velocity):
     return part
 
 
+def _across(direction, other):
+    """Return the part of a vector that is perpendicular to another one."""
+    square = dot(other, other)
+    return direction - (dot(direction, other) / square if square > 0 else 0.0) * other
+
+
 @noinline
 def _entering_corner(contact, kin, nodes, n, other, velocity):
-    """Return the part of a velocity to remove so that no face of a hollow corner is entered."""
-    left = velocity
-    for _ in range(2 * kin.dimension):
-        left = left - _entering(contact, kin, nodes, n, other, left)
-    return velocity - left
+    """Return the part of a velocity to remove so that no face of a hollow corner is entered.
+
+    The remainder slides along one face, then along the edge of two, or is 0. It is perpendicular
+    to what is removed: one impulse along that direction removes all of it.
+    """
+    least = 1e-6 * sqrt(dot(velocity, velocity))
+    first = _entering(contact, kin, nodes, n, other, velocity, least)
+    left = velocity - first
+    second = _across(_entering(contact, kin, nodes, n, other, left, least), first)
+    left = _across(left, second)
+    third = _entering(contact, kin, nodes, n, other, left, least)
+    return velocity - _across(left, _across(_across(third, first), second))
 
 
 @noinline
@@ -330,6 +350,24 @@ def _directions(contact, kin, nodes, pair):
 
 
 @noinline
+def _last_contact(contact, kin, nodes, pair, spreads):
+    """Return the last step of contact between two bodies at their nodes, 0 for none.
+
+    If it `spreads`, contact at the nodes that a moving rigid wall comes from counts as well.
+    """
+    other = pair.m // contact.stride
+    last = abs(contact.touched[pair.n, other])
+    led = pair.n if contact.rigid[pair.n // contact.stride] else pair.m
+    for k in range(kin.dimension):
+        speed = nodes.update[led, k]
+        way = -1 if speed > 0 else 1
+        inside = 0 <= _place(contact, led, k) + way < contact.beside[k, 1]
+        if spreads and contact.rigid[led // contact.stride] and speed != 0 and inside:
+            last = max(last, abs(contact.touched[pair.n + way * contact.beside[k, 0], other]))
+    return last
+
+
+@noinline
 def _excess_of(contact, kin, nodes, pair, where):
     """Return the excess of the approach velocity over the one that closes the gap in a step.
 
@@ -341,6 +379,12 @@ def _excess_of(contact, kin, nodes, pair, where):
     approach = dot(pair.outward, pair.relative)
     if not approach > 0:
         return 0.0
+    memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
+    last = _last_contact(contact, kin, nodes, pair, memory > 1)
+    # Where three bodies meet, a pair is looked at again in the step that has touched already.
+    lasts = pair.wall and last > 0 and last >= where.step - memory
+    if lasts and memory > 1:
+        return approach / size
     for direction in _directions(contact, kin, nodes, pair):
         length = sqrt(dot(direction, direction))
         if length > 0:

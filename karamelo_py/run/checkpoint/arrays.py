@@ -58,16 +58,27 @@ def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarr
 
 
 def touched(simulation: Any) -> dict[str, np.ndarray]:
-    spans = simulation.setup.spans
-    memory = remembered_at(simulation, used(spans)[1:])
-    if not memory:
+    """List the nodes where contact acted lately, and what it remembers of them.
+
+    Liquids may return to nodes that are not in use now. Processes list the nodes in use.
+    """
+    spans = used(simulation.setup.spans)[1:]
+    if not remembered_at(simulation, spans[:1]):
         return {}
-    rows = np.concatenate(memory)
-    # What touched before the last step is of no use.
-    rows = np.where(np.abs(rows) == simulation.step, rows, 0)
-    nodes = numbers(spans)
-    there = np.flatnonzero(rows.any(axis=1) & np.isin(nodes, simulation.nodes.counted()))
-    return {"touched/nodes": nodes[there], "touched/rows": rows[there]}
+    steps = simulation.setup.contact.memory.max()
+    if steps > 1 and simulation.subdomain is None:
+        begin = np.arange(0, simulation.hub.fields.node_count, PIECE)
+        spans = np.stack([begin, begin + PIECE], axis=1)
+    found = []
+    for first, rows in zip(spans[:, 0], remembered_at(simulation, spans), strict=True):
+        recent = (rows != 0) & (np.abs(rows) > simulation.step - steps)
+        there = np.flatnonzero(recent.any(axis=1))
+        found.append((first + there, np.where(recent[there], rows[there], 0)))
+    nodes, rows = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    if simulation.subdomain is not None:
+        counted = np.isin(nodes, simulation.nodes.counted())
+        nodes, rows = nodes[counted], rows[counted]
+    return {"touched/nodes": nodes, "touched/rows": rows}
 
 
 def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:

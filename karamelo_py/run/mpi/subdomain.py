@@ -116,7 +116,8 @@ class Subdomain(WholeDomain):
         own, step, contact = self.counted(), self.simulation.step, self.contact_memory()
         self.share_kept()
         if contact:
-            touched = [(np.abs(one[own]) == step).any(axis=1) for one in contact]
+            last = max(step - self.simulation.setup.contact.memory.max(), 0)
+            touched = [(np.abs(one[own]) > last).any(axis=1) for one in contact]
             self._share(own[np.any(touched, axis=0)], contact)
 
     def share_kept(self) -> None:
