@@ -66,7 +66,7 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
     if not remembered_at(simulation, spans[:1]):
         return {}
     steps = simulation.setup.contact.memory.max()
-    if steps > 1 and simulation.subdomain is None:
+    if steps > 1 and not simulation.domain.parted:
         begin = np.arange(0, simulation.hub.fields.node_count, PIECE)
         spans = np.stack([begin, begin + PIECE], axis=1)
     found = []
@@ -75,7 +75,7 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
         there = np.flatnonzero(recent.any(axis=1))
         found.append((first + there, np.where(recent[there], rows[there], 0)))
     nodes, rows = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    if simulation.subdomain is not None:
+    if simulation.domain.parted:
         counted = np.isin(nodes, simulation.nodes.counted())
         nodes, rows = nodes[counted], rows[counted]
     return {"touched/nodes": nodes, "touched/rows": rows}
