@@ -79,14 +79,12 @@ class FrictionMemory(NamedTuple):
 def rub(mu, load, memory, stop):
     """Coulomb friction with memory: the force, and the memory after the step.
 
-    A free point is stopped by `stop`, m v/dt. A point that carries others would creep, because it
-    is loaded again in each step. Therefore a spring along the surface, as stiff as the normal
-    contact, is stretched by the slip; its force `hold` is returned to the friction cone (Wriggers
-    2006, "Computational Contact Mechanics", chapter 5).
-
-    The load comes in pulses, because points bounce on a stiff contact: a step may use friction left
-    `unused` in earlier steps, up to mu times the `mean` load. A point that slides all the time has
-    mu times the load of each step.
+    `stop`, m v/dt, stops a free point. A point that carries others, loaded again in each step,
+    would creep. Therefore a spring along the surface, as stiff as the normal contact, is stretched
+    by the slip; its force `hold` is returned to the friction cone (Wriggers 2006, "Computational
+    Contact Mechanics", chapter 5). The load comes in pulses, because points bounce on a stiff
+    contact: a step may use friction left `unused` in earlier steps, up to mu times the `mean` load.
+    A point that slides all the time has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)

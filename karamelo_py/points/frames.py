@@ -1,7 +1,7 @@
 """Frames: weights and gradients at present (``Updated``) or reference positions (``Total``).
 
-``Updated`` uses spatial gradients and the Kirchhoff stress. ``Total`` uses gradients with respect
-to reference positions and the first Piola-Kirchhoff stress, and needs the deformation gradient F.
+``Updated`` has spatial gradients and the Kirchhoff stress; ``Total`` reference gradients, the first
+Piola-Kirchhoff stress and the deformation gradient F.
 """
 
 from typing import Any, NamedTuple
@@ -34,13 +34,13 @@ class Total(NamedTuple):
 
 
 def spatial_increment(frame, kin, dl, f):
-    """dt grad v in space from `dl`, dt times the velocity gradient in the frame, and the old F."""
+    """dt grad v in space from `dl` of the frame and the old F."""
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
     return dl if frame.moves else dl @ inv(f)
 
 
 def of_places_before(frame, kin, dl):
-    """`dl` with respect to positions before a motion, from `dl` with respect to those after it."""
+    """`dl` for positions before a motion, from `dl` for positions after it."""
     # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
     # it is accurate for small dl. Gradients of the total frame belong to the reference.
     return dl @ inv(I - dl) if frame.moves else dl
@@ -56,10 +56,7 @@ def force_stress(frame, kin, tau, f):
 
 
 def pulled_back(frame, kin, g, f):
-    """Direction of a flux down the gradient `g`, pulled back to the frame.
-
-    Per deformed volume: g in space, and C^-1 g = F^-1 F^-T g for reference positions.
-    """
+    """Flux direction C^-1 g = F^-1 F^-T g for reference positions; the gradient g in space."""
     return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 

@@ -1,11 +1,9 @@
 """Bases: the nodes in a point's stencil, with weights and gradients. One file each.
 
-A basis is a NamedTuple of its parameters, often empty (its class is the tag), with `traits` and the
-point functions declared here. `grid` is the :class:`~karamelo_py.points.grid.Grid` of the point;
-`place` a flat tuple of its position and the stored shape of its domain (nothing, half sizes,
-corners ...); `stencil` the result of `locate`.
-
-A product of one function per direction only needs `along` and
+A basis is a NamedTuple of parameters (its class is the tag), with `traits` and the point functions
+declared here. `grid` is the :class:`~karamelo_py.points.grid.Grid` of the point; `place` a flat
+tuple of its position and the stored shape of its domain (nothing, half sizes, corners ...);
+`stencil` the result of `locate`. A product of one function per direction only needs `along` and
 :func:`karamelo_py.points.basis.product.register`. A basis with corners has an `element`
 (:class:`~karamelo_py.points.basis.cpdi.Element`).
 """

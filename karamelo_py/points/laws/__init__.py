@@ -1,19 +1,18 @@
 """Constitutive laws of one point, one file each: the style for scripts, and the point functions.
 
-A law is a NamedTuple of parameters (its class is the tag). Its state is a NamedTuple of numbers and
-tensors, which kernels load, pass on and store. Tensors have the components of the kinematics `kin`
-(`karamelo_py.points.kinematics`); `j` = det F is the volume over the reference volume. A law may
-consist of parts, NamedTuples among its parameters (`eos_strength`).
+A law is a NamedTuple of parameters (its class is the tag), perhaps with parts, NamedTuples among
+its parameters (`eos_strength`). Its state is a NamedTuple of numbers and tensors with the
+components of the kinematics `kin` (`karamelo_py.points.kinematics`). `j` = det F is the volume over
+the reference volume.
 
-The class is also the style: its docstring is the manual, and its annotated fields are the
-arguments. If a script gives other parameters than the law uses, a classmethod `given` takes the
-arguments and returns the law. `checked` refuses values that annotations cannot, and returns the law
-or an equivalent simpler one.
+The docstring of the class is the manual, its annotated fields are the arguments of the style, or
+the parameters of a classmethod `given`, which returns the law. `checked` refuses values that
+annotations cannot, and returns the law or an equivalent simpler one. Unusual traits are a class
+attribute ``traits`` (:class:`LawTraits`). `column` declares output columns.
 
 A law with ``in_lanes``, which all its parts need, is computed for several points at once. Its point
-functions do not branch on numbers of a point, except with `where`; those that do are listed in
-``scalarised``. Laws and parts with unusual traits have a class attribute ``traits``
-(:class:`LawTraits`). Output columns are declared with `column`.
+functions branch on numbers of a point only with `where`; those that do otherwise are listed in
+``scalarised``.
 """
 
 from __future__ import annotations
@@ -70,10 +69,7 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
 def column(part: type, name: str, source: Callable | NamedTuple) -> None:
-    """Declare an output column of laws with `part`, the class of a law or of a part.
-
-    `source` is a point function of the whole law (`number`), or a tag of `shown`.
-    """
+    """Declare an output column of a law or part, by a `number` or a tag of `shown`."""
     _columns.setdefault(part, {})[name] = source if isinstance(source, tuple) else source.tag
 
 
@@ -96,9 +92,9 @@ def shown(tag, law, kin, state):
 
 
 def number(function: Callable) -> Callable:
-    """Make a point function of (law, kin, state) an output column, with a tag for kernels.
+    """Make a point function of (law, kin, state) an output column.
 
-    The class of the tag is stored in the module of the function: cached kernels import it.
+    The class of its tag is stored in the module of the function: cached kernels import it.
     """
     name = f"{function.__name__}_tag"
     tag_class = namedtuple(name, (), module=function.__module__)

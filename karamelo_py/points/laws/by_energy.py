@@ -1,10 +1,9 @@
 """Hyperelastic laws given by their stored energy, a formula.
 
-The formula is differentiated once, when a script defines the material. Its structure belongs to the
+The formula is differentiated once, when a script defines the material. Its structure is in the
 class of the law, so kernels contain it as code; its numbers are parameters. Laws that differ only
-in numbers have the same kernels, unless some of these are equal or small whole exponents. Formulas
-of invariants need no principal directions and are computed in lanes; formulas of principal
-stretches take points one by one.
+in numbers share kernels, unless some of these are equal or small whole exponents. Formulas of
+invariants are computed in lanes; formulas of principal stretches take points one by one.
 """
 
 from collections import namedtuple
@@ -149,14 +148,10 @@ class ByEnergy(OfDeformation):
 
 
 class OfInvariants(ByEnergy):
-    """The energy depends on I1, I2 and J."""
-
     __slots__ = ()
 
 
 class OfStretches(ByEnergy):
-    """The energy depends on the principal stretches."""
-
     __slots__ = ()
     scalarised = ("kirchhoff_stress", "wave_speed_squared", "shear_part", "energy_density")
 

@@ -72,11 +72,6 @@ def _advance_of_deformation(law, kin, state, dl, dt):
     return State(state.F.after(dl))
 
 
-@laws.elastic_strain.on(OfDeformation)
-def _green_lagrange_strain(law, kin, state):
-    return 0.5 * state.F.right_cauchy_green() - 0.5 * I
-
-
 @laws.cauchy_stress.on(OfDeformation)
 def _cauchy_stress_of_deformation(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / det(state.F)

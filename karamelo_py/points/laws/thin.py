@@ -1,10 +1,9 @@
 """Laws of thin bodies: plane stress in 2D, uniaxial stress in 1D.
 
-The wrapped law sees all three directions, with the tensors of `Axisymmetric`: xx, xy, yx, yy and
-zz. The strain increment q across the body is found such that the stress across it vanishes; in 1D
-it is the same in y and z. A secant method takes a fixed number of trials, so that points in lanes
-need no branches. The remaining stress enters the next step (de Borst 1991; Klinkel & Govindjee
-2002).
+The wrapped law has the tensors of `Axisymmetric`: xx, xy, yx, yy and zz. A secant method finds the
+strain increment q across the body without stress across it, in 1D the same in y and z, by a fixed
+number of trials, so that points in lanes need no branches. The remaining stress enters the next
+step (de Borst 1991; Klinkel & Govindjee 2002).
 """
 
 from typing import Any, NamedTuple

@@ -1,7 +1,7 @@
 """Artificial viscosity of one point, which spreads shocks over a few cells.
 
-A part of a composed law (`karamelo_py.points.laws.eos_strength`), added by an equation of state.
-Its memory is (q,), the viscous pressure.
+A part of a composed law (`karamelo_py.points.laws.eos_strength`), added by an equation of state;
+its memory is (q,), the viscous pressure.
 """
 
 from math import sqrt
@@ -24,7 +24,6 @@ def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
 
 
 def viscous_pressure(viscosity, rate, density, sound):
-    """Viscous pressure for a rate of volume change, positive in compression."""
     closing = max(-rate, 0)
     h = viscosity.cell_size
     return density * h * closing * (viscosity.Q1 * h * closing + viscosity.Q2 * sound)

@@ -1,13 +1,10 @@
 """Transfers: mapping of velocity from points to nodes and back. One file for each family.
 
-A transfer is a NamedTuple of its parameters (its class is the tag). It defines what a point stores
-in addition to its velocity (nothing, or a tensor such as the affine moment B, in `point_fields`),
-and the velocity update from v_pic = sum_I N_I v*_I, the updated nodal velocity at the point, and dv
-= sum_I N_I (v*_I - v_I), its change during the step.
-
-Functions of a node get a view of it: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and
-`kin` (:mod:`karamelo_py.kernels.views`). The default for undefined functions is PIC: nothing is
-stored, only v is mapped.
+A transfer is a NamedTuple of parameters (its class is the tag). It defines what a point stores in
+addition to its velocity (nothing, or a tensor such as the affine moment B, in `point_fields`), and
+the velocity update from v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node
+get a view: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin`
+(:mod:`karamelo_py.kernels.views`). The default is PIC: nothing is stored, only v is mapped.
 """
 
 from typing import NamedTuple

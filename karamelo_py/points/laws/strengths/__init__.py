@@ -1,10 +1,9 @@
 """Strengths: deviatoric stress of a point from its strain. One file each.
 
 A strength is a NamedTuple of parameters (its class is the tag) and a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory (plastic strain and the like) is declared by
-`remembers`. `heat` is the temperature (`Warm`), or () if the law has none. Strengths that depend on
-pressure and change the volume define `pressure_response` instead of `shear_response`. The defaults
-are for an elastic strength with a shear modulus ``G`` and no memory.
+(`karamelo_py.points.laws.eos_strength`). `heat` is the temperature (`Warm`), or () if the law has
+none. Strengths that depend on pressure and change the volume define `pressure_response` instead of
+`shear_response`. The defaults are for an elastic strength with a shear modulus ``G`` and no memory.
 """
 
 import sys
@@ -25,7 +24,7 @@ class StrainStep(NamedTuple):
 
 
 class FrictionTrial(NamedTuple):
-    """Stress after a step that is assumed to be elastic."""
+    """Stress after a step assumed elastic."""
 
     s: Any  # deviatoric
     p: Any
@@ -39,15 +38,10 @@ class Remembered(NamedTuple):
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare the memory of `strength`, a NamedTuple of numbers.
+    """Declare the memory of a strength: names of numbers, also dump columns, and initial values.
 
-    Parameters
-    ----------
-    strength
-        The class.
-    **numbers
-        Name of each number, also its dump column, and its initial value: a number, or the name of a
-        parameter. ``ep``, the equivalent plastic strain, comes first.
+    An initial value is a number or the name of a parameter. ``ep``, the equivalent plastic strain,
+    comes first.
     """
     name = f"{strength.__name__}Memory"
     memory_class = namedtuple(name, numbers, module=strength.__module__)

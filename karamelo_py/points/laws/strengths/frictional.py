@@ -1,11 +1,11 @@
 """Base of pressure-dependent strengths: cohesion and friction, optional softening; memory.
 
 The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and the volume ratio Js
-of separation. Beyond the largest sustainable tension, points separate: the volume gained is not
-bulk, and is closed before they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum
-modelling and simulation of granular flows through their many phases", J. Fluid Mech. 779, section
-3.3; Tampubolon et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM
-Trans. Graph. 36(4), section 4.3.4). The volume gained by plastic shear (dilatancy) remains.
+of separation. Beyond the largest sustainable tension, points separate: the volume gained is closed
+before they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of
+granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017,
+"Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section
+4.3.4). The volume gained by plastic shear (dilatancy) remains.
 """
 
 from collections.abc import Callable
@@ -232,8 +232,8 @@ class Soil(NamedTuple):
 def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
     """Cohesion, friction, dilation at the peak; residual cohesion and friction; softening.
 
-    `surface_of` gives cohesion and friction of the yield surface, from the cohesion and the
-    friction angle (in radians) of a soil.
+    `surface_of` gives cohesion and friction of the yield surface from cohesion and friction angle
+    (radians).
     """
     cohesion, phi, psi, residual_cohesion, residual_phi, softening = soil
     if not 0 <= phi < 90:
