@@ -46,12 +46,10 @@ class Console:
 
     @property
     def out(self) -> TextIO:
-        """Ordinary lines."""
         return self._out or sys.stdout
 
     @property
     def err(self) -> TextIO:
-        """Warnings and errors."""
         return self._err or sys.stderr
 
     @property
@@ -92,7 +90,6 @@ class Console:
                 self._release()
 
     def banner(self, title: str, facts: Mapping[str, object]) -> None:
-        """Write a title and facts, one per line."""
         names = max(map(len, facts), default=0)
         rows = [f"  {name.ljust(names)}  {show(value)}" for name, value in facts.items()]
         self.say(title, "bold")
@@ -117,7 +114,6 @@ class Console:
         self._broken, self._progress = True, None
 
     def begin_run(self, step: int = 0, fraction: float = 0.0) -> None:
-        """Measure progress from `step`."""
         self._shown = time.perf_counter()
         self._begin = self._shown, step, fraction
         self._running = True

@@ -83,7 +83,6 @@ class Fields(PointTable):
         return self.rows()
 
     def rows(self) -> Rows:
-        """All points, by id."""
         simulation = self.simulation
         setup, present = simulation.setup, simulation.present
         parts = [Part(block, None, block.points.id) for block in setup.blocks]
@@ -212,7 +211,6 @@ class Fields(PointTable):
             yield PointTable(self.hub, Rows(s, parts, ids, present[first:end]))
 
     def particle_names(self) -> list[str]:
-        """Names for `particle`."""
         of_scene = [*sorted(self.columns_of_laws()), *declared_columns(self.hub, "point_fields")]
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
@@ -221,7 +219,6 @@ class Fields(PointTable):
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
-        """Names for `node`."""
         of_scene = declared_columns(self.hub, "node_fields")
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 

@@ -157,7 +157,6 @@ class Frames:
         self._frames.append(file.getvalue())
 
     def save(self, path: Path) -> None:
-        """Write the movie if there are new frames."""
         if len(self._frames) == self._saved:
             return
         with whole(path) as file:

@@ -325,10 +325,9 @@ def _zoomed(domain: Any, window: Window) -> Any:
     if not window:
         return domain
     lo, hi = np.array(domain.lo, float), np.array(domain.hi, float)
-    for k, ends in zip(range(len(lo)), window, strict=False):
-        lo[k], hi[k] = (
-            end if limit is None else limit for end, limit in zip((lo[k], hi[k]), ends, strict=True)
-        )
+    for k, (low, high) in zip(range(len(lo)), window, strict=False):
+        lo[k] = lo[k] if low is None else low
+        hi[k] = hi[k] if high is None else high
     return SimpleNamespace(dimension=domain.dimension, lo=lo, hi=hi)
 
 

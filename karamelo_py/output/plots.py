@@ -50,7 +50,6 @@ class Plots(dict[str, PlottedCurve]):
         self[ID] = curve
 
     def finish(self) -> None:
-        """Draw all curves with points."""
         curves = [curve for curve in self.values() if curve.points]
         if self.file is not None and curves:
             draw(curves, self.hub.folder / self.file, self._labelled)

@@ -42,7 +42,6 @@ class Part(NamedTuple):
 
     @property
     def points(self) -> Points:
-        """Arrays of these points."""
         return self.block.points if self.rows is None else some_of(self.block, self.rows).points
 
 
@@ -79,7 +78,7 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """Gather a declared field (n, components), with its start where laws lack it; else None."""
+        """Gather a declared field (n, components) or None; initial values where laws lack it."""
         arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
         if all(array is None for _, array in arrays):
             return None

@@ -39,7 +39,6 @@ def surroundings() -> Json:
 
 
 def processor() -> str:
-    """Name of the processor."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.lower().startswith("model name"):
@@ -85,7 +84,6 @@ class RunRecord:
         self._write()
 
     def finish(self, facts: Mapping[str, object]) -> None:
-        """Add facts known at the end of the run."""
         self.runs[-1].update(facts)
         self._write()
 

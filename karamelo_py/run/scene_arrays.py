@@ -168,7 +168,7 @@ class SceneArrays:
     def taken_along(self, ids: np.ndarray) -> tuple[float, float, float]:
         """Count the energy of points as work; return mass, kinetic and stored energy."""
         group = ParticleGroup(self.hub)
-        group.add_numbers(ids)
+        group.take([ids])
         mass, kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG)
         stored = sum(inner)
         if self.comm.leads:

@@ -80,7 +80,7 @@ class ParticleGroup(AnyGroup):
     def of(cls, hub: Scene, solid: Solid) -> "ParticleGroup":
         group = cls(hub)
         group.id = solid.id
-        group._take(_numbers_of(solid))
+        group.take(_numbers_of(solid))
         return group
 
     def __len__(self) -> int:
@@ -119,12 +119,10 @@ class ParticleGroup(AnyGroup):
         return whole
 
     def add(self, region: Region, solids: Sequence[Solid] | None) -> int:
-        return self._take(self._found(region, solids))
+        return self.take(self._found(region, solids))
 
-    def add_numbers(self, ids: np.ndarray) -> None:
-        self._take([ids])
-
-    def _take(self, pieces: Iterable[np.ndarray]) -> int:
+    def take(self, pieces: Iterable[np.ndarray]) -> int:
+        """Add ascending pieces of numbers; return how many."""
         bits, count = self.bits(self.total() + 64), 0
         for ids in pieces:
             if len(ids):

@@ -37,7 +37,8 @@ class Placement(NamedTuple):
 
 
 class Filled:
-    """Selected positions (n, d) in a box of cells, stored as a bit per candidate, or none."""
+    """Selected positions (n, d) in a box of cells, computed on request; stores a bit per candidate.
+    """
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
                  places: np.ndarray):  # fmt: skip

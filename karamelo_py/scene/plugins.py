@@ -248,7 +248,7 @@ def _wrong_field(kind: Any) -> str:
         return " is not a NamedTuple class"
     if kind._fields != ("array",):
         return " has to have one member, array: Any"
-    if not callable(getattr(kind, "shape", None)):
+    if not (hasattr(kind, "shape") and callable(kind.shape)):
         return " has no shape: scalar, vector, tensor or planar"
     columns = columns_of(kind)
     if not isinstance(columns, tuple):

@@ -59,7 +59,9 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Read columns named by the first row (or "1", "2", ...); # begins a comment line."""
+    """Read columns named by the first row (or "1", "2", ...), separated by commas, semicolons or
+    blanks; # begins a comment line.
+    """
     rows = []
     try:
         lines = read_text(path).splitlines()

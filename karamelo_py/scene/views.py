@@ -442,7 +442,7 @@ class PointsView(View):
                 impose_stress(s.kin, points, block.laws, chosen, flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
-        """Set temperatures (n,) where materials have one."""
+        """Set temperatures (n,)."""
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             points = arrays.known_to_laws(block.points)
@@ -500,7 +500,10 @@ def set_columns(
     ids: np.ndarray | None = None,
     place: Place | None = None,
 ) -> None:
-    """Set columns of points (ids from 0; default all) between steps, to numbers or (n,)."""
+    """Set columns of points (ids from 0; default all) between steps, to numbers or (n,).
+
+    Raises ScriptError for derived columns, wrong shapes and values that are not finite.
+    """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids
     view = PointsView(simulation, ids[present[ids]])

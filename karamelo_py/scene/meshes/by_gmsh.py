@@ -55,7 +55,8 @@ def begin(gmsh: ModuleType) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[Path]:
-    """Yield a link (or copy) in an empty folder: Gmsh also reads options, which may act."""
+    """Yield a link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may run programs.
+    """
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name
         try:

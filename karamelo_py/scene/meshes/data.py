@@ -39,7 +39,9 @@ class Mesh(NamedTuple):
     left_out: dict[str, int]  # counts of elements that are no solids, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of a set of elements, outer faces of a set of nodes, or all."""
+        """Cells of an element set, outer faces of a node set, or all; ScriptError if unknown or
+        empty.
+        """
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
         else:
@@ -66,12 +68,12 @@ class Mesh(NamedTuple):
             raise unknown(message, group, named, argument="group")
         masks = self.sets.get(name) or [self.node_sets[name]]
         if not any(mask.any() for mask in masks):
-            raise unknown(
-                f"the physical group '{name}' of the mesh is empty",
-                group,
-                [n for n, masks in self.sets.items() if any(m.any() for m in masks)],
-                argument="group",
+            filled = [n for n, masks in self.sets.items() if any(mask.any() for mask in masks)]
+            error = unknown(
+                f"the physical group '{name}' of the mesh is empty", group, filled, argument="group"
             )
+            error.expected = error.expected if filled else "no group: the whole mesh"
+            raise error
         return name
 
 

@@ -63,7 +63,8 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Refuse a geometry that does more than describe a shape (`trusted`: ends the program)."""
+    """Refuse a geometry that does more than describe a shape (`trusted`: that ends this program).
+    """
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
     if not trusted:

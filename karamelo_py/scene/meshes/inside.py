@@ -238,7 +238,7 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Shells (m,) of triangles with edges (3 m,), connected there (not `sided`: by two only)."""
+    """Number the shells (m,) of triangles by common edges (3 m,); not `sided`: by edges of two."""
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2

@@ -47,7 +47,10 @@ class MeshFile(InputFile):
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
-    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`."""
+    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`.
+
+    A `trusted` geometry may run system commands and write files.
+    """
     status = path.stat()
     if not status.st_size:
         raise ScriptError(
