@@ -70,6 +70,18 @@ def test_what_follows_from_a_refused_setting_or_deletion_is_not_told(run_interpr
     assert [line - HEAD for line, _ in places(err)] == [1, 3, 6]
 
 
+def test_what_follows_in_an_included_script_is_not_told(run_interpreted, tmp_path):
+    inner = tmp_path / "walls.mpm"
+    inner.write_text("fix(walls, velocity_nodes, all, speed, 0)\nfix(base, velocity_node, all, 0)\n")
+    lines = [
+        "speed = 1/0",  # 1: wrong, and a line of the included script follows
+        f'include("{inner}")',
+        "fix(top, velocity_nodes, al, 0, 0)",  # 3: wrong
+    ]
+    found = places(run_interpreted(block(2, *lines), status=1).err)
+    assert [line for line, _ in found] == [HEAD + 1, HEAD + 3, 2]
+
+
 @pytest.mark.parametrize(
     ("unknown", "wrong"),
     [

@@ -57,7 +57,7 @@ class Dependents:
         self.lacks_columns |= name in _COLUMNS
         if name.startswith("delete_"):
             self.undeleted.add(name.removeprefix("delete_"))
-        if name in _SCENE or name == "scheme":
+        if name in _SCENE or name in ("scheme", "set_dt"):
             self.names |= _RUNS
         if name == "scheme":
             self.names.update(table()["implicit"].split())
@@ -79,9 +79,12 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Tell if a statement uses a missing name, such as F or F_x of a fix F."""
-        words = re.findall(r"\w+", statement.raw.code)
-        return any(w in self.names or w.rpartition("_")[0] in self.names for w in words)
+        """Tell if a statement uses a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
+        for word in re.findall(r"\w+", statement.raw.code):
+            ID = word.rpartition("_")[0]
+            if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
+                return True
+        return False
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
@@ -113,6 +116,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
             seen[one.message] = one
         error.others = []
 
+    interpreter.by_statement = True
     wrong = interpreter.statement
     while wrong is not None and len(errors) < MOST:
         if not dependents.note(wrong):

@@ -50,6 +50,7 @@ class Interpreter:
         self.files: list[Path] = []  # files read
         self.files_ahead: list[Path] = []  # files read by a rehearsal
         self.frames: list[_Frame] = []
+        self.by_statement = False  # `next_statement` leads into included scripts
         self.statement: syntax.Statement | None = None  # last one started
         self.record = Record()  # executed statements, for restart files
         # Until the script has reached the state of an earlier run.
@@ -94,8 +95,9 @@ class Interpreter:
             error.included = self._including(len(self.frames))
             raise
         self.frames.append(_Frame(statements, path))
-        self._go_on(self.frames[-1])
-        self.frames.pop()
+        if not self.by_statement:
+            self._go_on(self.frames[-1])
+            self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
         """Return the file meant by ``include(name)`` in a script in `folder`."""
