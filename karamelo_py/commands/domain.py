@@ -58,11 +58,9 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     _refuse_second(hub)
     count = number(hub, dimensions, "the number of dimensions")
     if count not in DIMENSION.names:
-        raise ScriptError(
-            f"the number of dimensions must be 1, 2 or 3, not {count:g}",
-            place=dimensions.place,
-            expected=" or ".join(DIMENSION.line(d) for d in DIMENSION.names),
-        )
+        message = f"the number of dimensions must be 1, 2 or 3, not {count:g}"
+        expected = " or ".join(DIMENSION.line(d) for d in DIMENSION.names)
+        raise ScriptError(message, place=dimensions.place, expected=expected)
     if bounds:
         hub.domain = _domain(hub, DIMENSION, bounds, int(count))
     else:
@@ -134,24 +132,16 @@ def axisymmetric(hub: Hub, active: bool) -> None:
             expected="dimension(2, ...) before axisymmetric(true)",
         )
     if active and domain.lo[0] < 0:
-        raise ScriptError(
-            f"the domain begins at x = {domain.lo[0]:g}, and x is a radius",
-            argument="active",
-            expected="dimension(2, 0, ...), or more than 0 instead of 0",
-        )
+        message = f"the domain begins at x = {domain.lo[0]:g}, and x is a radius"
+        expected = "dimension(2, 0, ...), or more than 0 instead of 0"
+        raise ScriptError(message, argument="active", expected=expected)
     if active and domain.thin:
-        raise ScriptError(
-            "the scene has plane stress, which has no stress around an axis",
-            argument="active",
-            expected="plane_stress(false)",
-        )
+        message = "the scene has plane stress, which has no stress around an axis"
+        raise ScriptError(message, argument="active", expected="plane_stress(false)")
     if hub.solids and active != domain.axisymmetric:
-        raise ScriptError(
-            "the points of solids are made already",
-            argument="active",
-            expected="axisymmetric(true) before the first solid",
-            code="too-late",
-        )
+        message = "the points of solids are made already"
+        expected = "axisymmetric(true) before the first solid"
+        raise ScriptError(message, argument="active", expected=expected, code="too-late")
     domain.axisymmetric = active
 
 
@@ -242,18 +232,12 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
     hi = [values[name] for name in _BOUNDS[1 : 2 * count : 2]]
     for low, high in zip(_BOUNDS[::2], _BOUNDS[1 : 2 * count : 2], strict=False):
         if values[high] <= values[low]:
-            raise ScriptError(
-                f"{high} = {values[high]:g} must be above {low} = {values[low]:g}",
-                place=places[high],
-                expected=forms.line(count),
-            )
+            message = f"{high} = {values[high]:g} must be above {low} = {values[low]:g}"
+            raise ScriptError(message, place=places[high], expected=forms.line(count))
     h = values.get("h")
     if h is not None and h <= 0:
-        raise ScriptError(
-            f"the cell size h = {h:g} must be above 0",
-            place=places["h"],
-            expected=forms.line(count),
-        )
+        message = f"the cell size h = {h:g} must be above 0"
+        raise ScriptError(message, place=places["h"], expected=forms.line(count))
     try:
         domain = Domain(count, lo, hi, h)
     except ScriptError as error:
@@ -314,12 +298,9 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
             _refuse_counts(hub, ID, arguments)
             kind = "region"
         elif hint := filled(hub.interpreter.statement):
-            raise ScriptError(
-                f"unknown solid style '{kind}'",
-                argument="kind",
-                expected="one of " + ", ".join(registry.names("solid")),
-                hint=hint,
-            )
+            message = f"unknown solid style '{kind}'"
+            expected = "one of " + ", ".join(registry.names("solid"))
+            raise ScriptError(message, argument="kind", expected=expected, hint=hint)
     new = style_of(hub, "solid", ID, kind, arguments)
     warn_of_coinciding(hub, new, ID)
     hub.solids.add(ID, new)
@@ -382,23 +363,14 @@ def group(
     region, fix, compute
     """
     if ID == ALL:
-        raise ScriptError(
-            "'all' is the group of everything and cannot be changed",
-            argument="ID",
-            expected="another name",
-        )
+        message, expected = "'all' is the group of everything and cannot be changed", "another name"
+        raise ScriptError(message, argument="ID", expected=expected)
+    form = f"group({ID}, {kind}, region, {region.id}"
     if of == "solid" and not solids:
-        raise ScriptError(
-            "no solid is named",
-            argument="of",
-            expected=f"group({ID}, {kind}, region, {region.id}, solid, solidID, ...)",
-        )
+        expected = f"{form}, solid, solidID, ...)"
+        raise ScriptError("no solid is named", argument="of", expected=expected)
     if of == "all" and solids:
-        raise ScriptError(
-            "nothing can follow 'all'",
-            argument="solids",
-            expected=f"group({ID}, {kind}, region, {region.id}, all)",
-        )
+        raise ScriptError("nothing can follow 'all'", argument="solids", expected=f"{form}, all)")
     if ID in hub.groups:
         members = hub.groups[ID]
         if members.kind != kind:

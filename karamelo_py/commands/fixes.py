@@ -96,11 +96,9 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     with signature.in_new_words(kind, ID, style, arguments):
         target = registry.called(kind, ID, style)
     if ID in others and set(others[ID].published) & set(target.published):
-        raise ScriptError(
-            f"'{ID}' is a {others.kind} already (line {others[ID].place.line})",
-            argument="ID",
-            expected=f"another ID: {ID}_x and the like would mean two things",
-        )
+        message = f"'{ID}' is a {others.kind} already (line {others[ID].place.line})"
+        expected = f"another ID: {ID}_x and the like would mean two things"
+        raise ScriptError(message, argument="ID", expected=expected)
     check_ID(kind, ID)
     _check_names(hub, kind, ID, target)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
@@ -129,11 +127,9 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
         return
     third = arguments[0].word() if arguments else None
     if third and registry.knows(kind, third):
-        raise ScriptError(
-            f"'{third}' is a style, and the style comes before the group",
-            place=arguments[0].place,
-            expected=f"{kind}({ID}, {third}, {style}, ...)",
-        )
+        message = f"'{third}' is a style, and the style comes before the group"
+        expected = f"{kind}({ID}, {third}, {style}, ...)"
+        raise ScriptError(message, place=arguments[0].place, expected=expected)
     if third and instead(kind, third):
         registry.find(kind, third)  # its error suggests the name
 

@@ -57,12 +57,10 @@ def judge(hub: Hub, made: Material) -> None:
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:
     def command(hub: Hub, ID: str, style: StyleOf(kind), *arguments: Argument) -> None:
         if (kind, style) == ("strength", "JC") and not registry.knows(kind, style):
-            raise ScriptError(
-                "unknown strength style 'JC'",
-                argument="style",
-                expected="the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm",
-                hint=longer("strength johnson_cook", arguments),
-            )
+            message = "unknown strength style 'JC'"
+            expected = "the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm"
+            hint = longer("strength johnson_cook", arguments)
+            raise ScriptError(message, argument="style", expected=expected, hint=hint)
         define(hub, hub.parts[kind], ID, style, arguments)
 
     command.__doc__ = f"""{summary}
@@ -181,11 +179,8 @@ def load_path(
     shear = [name for name, value in angles.items() if value is not None]
     for name in shear:
         if strains[name] is not None:
-            raise ScriptError(
-                f"g{name} and e{name} are the same strain, with and without rotation",
-                argument=f"g{name}",
-                expected="one of them",
-            )
+            message = f"g{name} and e{name} are the same strain, with and without rotation"
+            raise ScriptError(message, argument=f"g{name}", expected="one of them")
         strains[name] = angles[name] / 2
     prescribed = *strains.values(), *stresses.values(), volumetric, duration
     if not turn and all(value is None for value in prescribed):
@@ -269,11 +264,8 @@ def element(
     """
     check_ID("element", ID)
     if can(material.law, constrained_velocity):
-        raise ScriptError(
-            f"material '{material.id}' is rigid: it has no strain and no stress",
-            argument="material",
-            expected="a material that deforms",
-        )
+        message = f"material '{material.id}' is rigid: it has no strain and no stress"
+        raise ScriptError(message, argument="material", expected="a material that deforms")
     law, kin = material.whole, KINEMATICS.get(kinematics)
     if kin is None:
         law = ThinInLargeIncrements(law)
@@ -330,26 +322,20 @@ def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> No
 
 def _check_components(path: LoadPath, point: Point, kinematics: str, number: int) -> None:
     """Refuse strains that the kinematics lacks, and stresses that need them."""
+    subject, argument = f"load path '{path.id}'", 2 + number
     for kind, names in (("e", path.strain), ("s", path.stress)):
         for name in names:
             if name not in point.free:
                 raise ScriptError(
-                    f"load path '{path.id}' prescribes {kind}{name}, and {kinematics} has no "
-                    f"strain e{name}",
-                    argument=2 + number,
+                    f"{subject} prescribes {kind}{name}, and {kinematics} has no strain e{name}",
+                    argument=argument,
                     expected="components of " + " ".join(point.free),
                     hint="kinematics=3D",
                 )
     if path.volumetric is not None and set(NORMAL) & set(point.free) <= set(path.strain):
-        raise ScriptError(
-            f"load path '{path.id}' prescribes every normal strain that {kinematics} has, and "
-            "volumetric as well",
-            argument=2 + number,
-            hint="leave out volumetric, or one of the strains",
-        )
+        message = f"{subject} prescribes volumetric and every normal strain that {kinematics} has"
+        hint = "leave out volumetric, or one of the strains"
+        raise ScriptError(message, argument=argument, hint=hint)
     if path.turn and "xy" not in point.free:
-        raise ScriptError(
-            f"load path '{path.id}' rotates the point, and {kinematics} cannot rotate",
-            argument=2 + number,
-            hint="kinematics=3D",
-        )
+        message = f"{subject} rotates the point, and {kinematics} cannot rotate"
+        raise ScriptError(message, argument=argument, hint="kinematics=3D")

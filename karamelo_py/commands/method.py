@@ -66,12 +66,10 @@ def method(
     call = _Call(hub, {"method": kind, "transfer": transfer, "basis": basis}, options)
     parts = call.parts()
     if hub.solids:
-        raise ScriptError(
-            "the method cannot change once there are solids",
-            expected="method(...) before the first solid",
-            hint=f"move it above line {next(iter(hub.solids.values())).place.line}",
-            code="too-late",
-        )
+        message = "the method cannot change once there are solids"
+        expected = "method(...) before the first solid"
+        hint = f"move it above line {next(iter(hub.solids.values())).place.line}"
+        raise ScriptError(message, expected=expected, hint=hint, code="too-late")
     before = hub.update.method
     if before is not None:
         hub.warn(
@@ -134,11 +132,8 @@ def scheme(
             hub.values.publish(name)
         raise
     if start == "half" and chosen.traits.implicit:
-        raise ScriptError(
-            "implicit steps take velocities at their ends",
-            argument="start",
-            expected="an explicit scheme, or no start",
-        )
+        message = "implicit steps take velocities at their ends"
+        raise ScriptError(message, argument="start", expected="an explicit scheme, or no start")
     update, runs = hub.update, len(hub.runs)
     update.half_start = start == "half"
     if update.scheme_place is not None and update.scheme_behind == runs:
@@ -171,11 +166,8 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
     precision(single)
     """
     if hub.has_run:
-        raise ScriptError(
-            "the precision cannot change after the first run",
-            expected="precision(...) before the first run",
-            code="too-late",
-        )
+        message = "the precision cannot change after the first run"
+        raise ScriptError(message, expected="precision(...) before the first run", code="too-late")
     hub.settings.precision = kind
 
 
@@ -234,11 +226,9 @@ class _Call:
         if basis in self.shapes:
             shape = basis if basis in self.fit or not self.fit else self.fit[0]
             instead = self.instead(shape, basis="linear")
-            raise ScriptError(
-                f"'{basis}' is the shape of the domains, not a basis",
-                argument="basis",
-                expected=f"linear, and the shape at the end: {instead}",
-            )
+            message = f"'{basis}' is the shape of the domains, not a basis"
+            expected = f"linear, and the shape at the end: {instead}"
+            raise ScriptError(message, argument="basis", expected=expected)
         self.styles["basis"] = registry.find("basis", basis)
         self.variants["basis"] = self.shapes or variants_of(self.styles["basis"])
 
@@ -299,11 +289,8 @@ class _Call:
         """Refuse basis functions without domains, and shapes for another dimension."""
         kind, fit = self.names["method"], self.fit
         if self.names["basis"] != "linear":
-            raise ScriptError(
-                f"method {kind} maps the corners of domains with a linear basis only",
-                argument="basis",
-                expected="linear",
-            )
+            message = f"method {kind} maps the corners of domains with a linear basis only"
+            raise ScriptError(message, argument="basis", expected="linear")
         if not fit:
             raise ScriptError(
                 f"method {kind} has no domains for {self.dimension} dimension",

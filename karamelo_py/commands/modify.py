@@ -131,11 +131,8 @@ def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument,
             )
         kin = Space()
         if law_kind(after.law) != law_kind(before.law):
-            raise ScriptError(
-                f"{names} would give the points of material '{after.id}' another law",
-                place=numbers[0].place,
-                expected="numbers of the same law",
-            )
+            message = f"{names} would give the points of material '{after.id}' another law"
+            raise ScriptError(message, place=numbers[0].place, expected="numbers of the same law")
         if initial_state(after.law, kin, 1.0) != initial_state(before.law, kin, 1.0):
             raise ScriptError(
                 f"the state of the points of material '{after.id}' began from {names}, which "

@@ -67,12 +67,10 @@ def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
     variable = hub.interpreter.variables.get(first.text, "")
     word = first.word() if isinstance(variable, str) else None
     if word and (re.search(r"[.*/]", word) or NUMBER.fullmatch(second.text)):
-        raise ScriptError(
-            "argument 1 'every' must be a whole number; the file comes second",
-            place=first.place,
-            expected="the steps between two snapshots, then the file",
-            hint=f"{second.text}, {first.text}" if NUMBER.fullmatch(second.text) else None,
-        )
+        message = "argument 1 'every' must be a whole number; the file comes second"
+        expected = "the steps between two snapshots, then the file"
+        hint = f"{second.text}, {first.text}" if NUMBER.fullmatch(second.text) else None
+        raise ScriptError(message, place=first.place, expected=expected, hint=hint)
 
 
 dump.syntax = "ID, all, style, every, file[, ...]"  # the style defines the rest
@@ -122,12 +120,9 @@ def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> N
     hub.output.log.every = every
     if form == "csv" and hub.output.log.file.suffix != ".csv":
         if hub.begun:
-            raise ScriptError(
-                "the form of the log cannot change after the first run",
-                argument="form",
-                expected="set_output(..., csv) before the first run",
-                code="too-late",
-            )
+            message = "the form of the log cannot change after the first run"
+            expected = "set_output(..., csv) before the first run"
+            raise ScriptError(message, argument="form", expected=expected, code="too-late")
         hub.output.log.file = hub.output.log.file.with_suffix(".csv")
 
 
@@ -176,16 +171,12 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
     set_output
     """
     if style == "default" and keys:
-        raise ScriptError(
-            "default takes no columns",
-            argument="keys",
-            expected="log_modify(default) or log_modify(custom, step, ...)",
-        )
+        message = "default takes no columns"
+        expected = "log_modify(default) or log_modify(custom, step, ...)"
+        raise ScriptError(message, argument="keys", expected=expected)
     if style == "custom" and not keys:
-        raise ScriptError(
-            "custom needs at least one column",
-            expected="log_modify(custom, step, dt, time, ...)",
-        )
+        message = "custom needs at least one column"
+        raise ScriptError(message, expected="log_modify(custom, step, dt, time, ...)")
     hub.output.log.columns = list(keys)
 
 

@@ -81,22 +81,18 @@ def delete_particles(
     for solid, inside in members.items():
         refuse_chosen(hub, solid, "delete_particles")
         if inside.all():
-            raise ScriptError(
-                f"no point of solid '{solid.id}' would be left",
-                argument="chosen",
-                hint="leave out the solid, and delete_particles",
-            )
+            message = f"no point of solid '{solid.id}' would be left"
+            hint = "leave out the solid, and delete_particles"
+            raise ScriptError(message, argument="chosen", hint=hint)
     for solid, inside in members.items():
         replace_points(hub, solid, _chosen(solid, ~inside))
 
 
 def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
     if not hub.has_run:
-        raise ScriptError(
-            "points have no such columns before the first run",
-            argument="by",
-            expected="delete_particles(solids, region, regionID), or a run before",
-        )
+        message = "points have no such columns before the first run"
+        expected = "delete_particles(solids, region, regionID), or a run before"
+        raise ScriptError(message, argument="by", expected=expected)
     if hub.rehearsing or hub.interpreter.replay is not None:
         return
     numbers, fields = {solid.index for solid in solids}, hub.fields
@@ -150,13 +146,10 @@ def translate_particles(
     """
     formulas = per_direction(hub, "d", shift)
     if hub.has_run:
-        raise ScriptError(
-            "the points have been in a run, which they would not have come out of",
-            argument="solids",
-            expected="translate_particles before the first run",
-            hint="fix(ID, velocity_particles, ...) moves points in a run",
-            code="too-late",
-        )
+        message = "the points have been in a run, which they would not have come out of"
+        expected = "translate_particles before the first run"
+        hint = "fix(ID, velocity_particles, ...) moves points in a run"
+        raise ScriptError(message, argument="solids", expected=expected, hint=hint, code="too-late")
     for solid in solids:
         inside = region.inside(solid.x0)
         x = solid.x0[inside]
@@ -169,11 +162,9 @@ def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
     moved = _chosen(solid, np.ones(solid.count, np.bool_))
     x0 = moved.x0 + step
     if not hub.domain.contains(x0).all():
-        raise ScriptError(
-            f"points of solid '{solid.id}' would leave the domain",
-            argument="shift",
-            expected="a shift that leaves the points inside the domain",
-        )
+        message = f"points of solid '{solid.id}' would leave the domain"
+        expected = "a shift that leaves the points inside the domain"
+        raise ScriptError(message, argument="shift", expected=expected)
     if len(step) and (step == step[0]).all():
         lo, hi = moved.lo + step[0], moved.hi + step[0]
     else:
@@ -206,11 +197,9 @@ def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
             affected.append(("group", "chosen from", group))
     if affected:
         kind, made, item = affected[0]
-        raise ScriptError(
-            f"{kind} '{item.id}' was {made} points that would be replaced or renumbered",
-            argument="solid",
-            expected=f"{kind}({item.id}, ...) after {command}",
-        )
+        message = f"{kind} '{item.id}' was {made} points that would be replaced or renumbered"
+        expected = f"{kind}({item.id}, ...) after {command}"
+        raise ScriptError(message, argument="solid", expected=expected)
 
 
 def replace_points(
@@ -274,12 +263,9 @@ def populate_cylindrical_coordinates(
     solid, region
     """
     if hub.has_run:
-        raise ScriptError(
-            f"the points of solid '{solid.id}' have been in a run",
-            argument="solid",
-            expected="populate_cylindrical_coordinates before the first run",
-            code="too-late",
-        )
+        message = f"the points of solid '{solid.id}' have been in a run"
+        expected = "populate_cylindrical_coordinates before the first run"
+        raise ScriptError(message, argument="solid", expected=expected, code="too-late")
     refuse_chosen(hub, solid, "populate_cylindrical_coordinates")
     values = FORMS.read(hub, lattice, require_domain(hub).dimension)
     placed = _polar(values, dict(zip(values, (a.place for a in lattice), strict=True)))

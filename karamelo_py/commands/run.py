@@ -222,20 +222,16 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
 
 def _check(command: str, condition: Expression) -> None:
     if per_point := condition.names & set(POINT_SEEDS):
-        raise ScriptError(
-            f"the condition depends on {min(per_point)}, which differs from point to point",
-            argument="condition",
-            expected="a formula of time, timestep, dt and values of fixes and computes",
-        )
+        message = f"the condition depends on {min(per_point)}, which differs from point to point"
+        expected = "a formula of time, timestep, dt and values of fixes and computes"
+        raise ScriptError(message, argument="condition", expected=expected)
     if condition.is_constant:
         compare = ">=" if command == "run_until" else "<"
         number = 1.0 if isnan(condition.constant) else condition.constant
-        raise ScriptError(
-            "the condition never changes",
-            argument="condition",
-            expected="a formula of time, timestep, dt or values of fixes and computes",
-            hint=f"{command}(time {compare} {number:g}), or run_time({number:g})",
-        )
+        message = "the condition never changes"
+        expected = "a formula of time, timestep, dt or values of fixes and computes"
+        hint = f"{command}(time {compare} {number:g}), or run_time({number:g})"
+        raise ScriptError(message, argument="condition", expected=expected, hint=hint)
 
 
 class EveryOrNever(Every):

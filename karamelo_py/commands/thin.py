@@ -73,33 +73,22 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float) -> None:
     domain = require_domain(hub)
     if domain.dimension != dimension:
-        raise ScriptError(
-            f"the scene has {domain.dimension} dimensions, not {dimension}",
-            argument="active",
-            expected=f"dimension({dimension}, ...) before {command}(true)",
-            hint={1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension),
-        )
+        message = f"the scene has {domain.dimension} dimensions, not {dimension}"
+        expected = f"dimension({dimension}, ...) before {command}(true)"
+        hint = {1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
+        raise ScriptError(message, argument="active", expected=expected, hint=hint)
     if active and domain.axisymmetric:
-        raise ScriptError(
-            "the scene is axisymmetric, which has stress around the axis",
-            argument="active",
-            expected="axisymmetric(false)",
-        )
+        message = "the scene is axisymmetric, which has stress around the axis"
+        raise ScriptError(message, argument="active", expected="axisymmetric(false)")
     if hub.materials and active != domain.thin:
         first = next(iter(hub.materials))
-        raise ScriptError(
-            f"material '{first}' is defined already",
-            argument="active",
-            expected=f"{command}({'true' if active else 'false'}) before the first material",
-            code="too-late",
-        )
+        message = f"material '{first}' is defined already"
+        expected = f"{command}({'true' if active else 'false'}) before the first material"
+        raise ScriptError(message, argument="active", expected=expected, code="too-late")
     if hub.solids:
-        raise ScriptError(
-            "the points of solids have their masses already",
-            argument="active",
-            expected=f"{command} before the first solid",
-            code="too-late",
-        )
+        message = "the points of solids have their masses already"
+        expected = f"{command} before the first solid"
+        raise ScriptError(message, argument="active", expected=expected, code="too-late")
     domain.thin, domain.thickness = active, float(thickness) if active else 1.0
 
 
@@ -109,11 +98,9 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
         return
     parts = law_parts(material.whole)
     if any(law_traits(part).flows and not parameter(part, "cohesion") > 0 for part in parts):
-        raise ScriptError(
-            "without stress across the body this material has no strength",
-            argument="style",
-            expected="a solid that sustains tension, or plane strain",
-        )
+        message = "without stress across the body this material has no strength"
+        expected = "a solid that sustains tension, or plane strain"
+        raise ScriptError(message, argument="style", expected=expected)
     if hub.domain.dimension == 1 and not is_round(material.whole):
         raise ScriptError(
             "the material is not the same in y and z, so that a bar of it would bend or flatten",

@@ -84,11 +84,9 @@ class Argument:
             raise ScriptError(f"{self.text} is not a text", place=self.place)
         if re.search(r"\s", self.text):
             first, second = self.text.split()[:2]
-            raise ScriptError(
-                f"'{self.text}' is more than one word",
-                place=self.place,
-                hint=f'is a comma missing: "{first}, {second}"? A name with blanks needs quotes',
-            )
+            message = f"'{self.text}' is more than one word"
+            hint = f'is a comma missing: "{first}, {second}"? A name with blanks needs quotes'
+            raise ScriptError(message, place=self.place, hint=hint)
         return self.text
 
     def value(self, hub: Scene | None) -> Value:

@@ -130,28 +130,20 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
     A number that only a run can give is NaN in a rehearsal, and accepted.
     """
     value = argument.value(hub)
-    kind, hint = "number", None
+    if isinstance(value, float):
+        return finite(hub, value, name, argument)
+    wanted, hint = f"a number, not the text '{value}'", None
     if isinstance(value, Expression):
-        kind, got, hint = (
-            "constant number",
-            "a formula",
-            f"value({argument.text}) is its present value",
-        )
-    elif isinstance(value, str):
-        got = f"the text '{value}'"
-    else:
-        return finite(hub, float(value), name, argument)
-    raise ScriptError(
-        f"{name} must be a {kind}, not {got}", place=argument.place, expected=expected, hint=hint
-    )
+        wanted = "a constant number, not a formula"
+        hint = f"value({argument.text}) is its present value"
+    message, place = f"{name} must be {wanted}", argument.place
+    raise ScriptError(message, place=place, expected=expected, hint=hint)
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
     """Return `value`; refuse NaN and infinity (NaN is accepted in a rehearsal)."""
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
-    raise ScriptError(
-        f"{name} must be a finite number, not {value}",
-        place=argument.place if argument is not None else None,
-        argument=None if argument is not None else name,
-    )
+    message = f"{name} must be a finite number, not {value}"
+    place = argument.place if argument is not None else None
+    raise ScriptError(message, place=place, argument=None if argument is not None else name)

@@ -78,11 +78,9 @@ class Interpreter:
         path = self.included(name, self.folder)
         exists = path.exists()
         if any(exists and frame.path and frame.path.samefile(path) for frame in self.frames):
-            raise ScriptError(
-                f"{name} includes itself",
-                expected="a script that is not in progress already",
-                argument="file",
-            )
+            message = f"{name} includes itself"
+            expected = "a script that is not in progress already"
+            raise ScriptError(message, expected=expected, argument="file")
         try:
             text = read_script(path)
         except ScriptError as error:
@@ -263,11 +261,9 @@ class Interpreter:
         compares = isinstance(node, syntax.BinaryOperation) and node.operator == "=="
         if compares and isinstance(node.left, syntax.Name):
             right = statement.raw.code[node.right.start : node.right.end]
-            raise ScriptError(
-                "this compares and does nothing with the result",
-                place=statement.place,
-                hint=f"an assignment has one =: {node.left.name} = {right}",
-            )
+            message = "this compares and does nothing with the result"
+            hint = f"an assignment has one =: {node.left.name} = {right}"
+            raise ScriptError(message, place=statement.place, hint=hint)
         self.evaluate(node, statement.raw)
 
     # -- assignments ------------------------------------------------------------------------------

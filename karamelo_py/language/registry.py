@@ -131,12 +131,9 @@ def find(family: str, name: str) -> Any:
     if of_module or key not in _loaded:
         entries = _entries(family, name)
         if len(entries) > 1:
-            raise ScriptError(
-                f"{family} '{name}' is offered by two packages: {origin(family, name)}",
-                name=name,
-                expected="one package for each style",
-                hint="uninstall one of them (pip uninstall ...)",
-            )
+            message = f"{family} '{name}' is offered by two packages: {origin(family, name)}"
+            hint = "uninstall one of them (pip uninstall ...)"
+            raise ScriptError(message, name=name, expected="one package for each style", hint=hint)
         (entry,) = entries
         try:
             _loaded[key] = entry.load()
@@ -157,11 +154,8 @@ def find(family: str, name: str) -> Any:
 def called(family: str, ID: str, name: str) -> Any:
     """As `find`, for a statement whose first argument is an ID, not the style."""
     if not knows(family, name) and knows(family, ID):
-        raise ScriptError(
-            f"'{ID}' is a style, and the ID comes first",
-            argument="ID",
-            expected=f"{family}(ID, {ID}, {name}, ...)",
-        )
+        message = f"'{ID}' is a style, and the ID comes first"
+        raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")
     return find(family, name)
 
 

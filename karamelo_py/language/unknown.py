@@ -215,13 +215,10 @@ def check_name(name: str) -> None:
         return
     free = f"another name, such as {name}_1 or my_{name}"
     other = f"{name}(...) calls it" if meaning == "a command" else instead("command", name)
-    raise ScriptError(
-        f"'{name}' is {meaning} and cannot be assigned",
-        code="taken-name",
-        name=name,
-        expected="a name that is free",
-        hint=f"{other}; or choose {free}" if other else f"choose {free}",
-    )
+    message = f"'{name}' is {meaning} and cannot be assigned"
+    expected = "a name that is free"
+    hint = f"{other}; or choose {free}" if other else f"choose {free}"
+    raise ScriptError(message, code="taken-name", name=name, expected=expected, hint=hint)
 
 
 def check_ID(kind: str, ID: str) -> None:
@@ -230,12 +227,9 @@ def check_ID(kind: str, ID: str) -> None:
         return
     better = re.sub(r"\W", "_", ID)
     better = better if better.isidentifier() and better != ID else f"{kind[0]}{better}"
-    raise ScriptError(
-        f"formulas could not name the values of {kind} '{ID}'",
-        argument="ID",
-        expected="letters, digits and _, beginning with a letter",
-        hint=f"such as {better}",
-    )
+    message = f"formulas could not name the values of {kind} '{ID}'"
+    expected = "letters, digits and _, beginning with a letter"
+    raise ScriptError(message, argument="ID", expected=expected, hint=f"such as {better}")
 
 
 def listed(names: Iterable[str]) -> str:

@@ -66,11 +66,9 @@ def _texts(node: syntax.BinaryOperation, left: Value, right: Value, raw: syntax.
         if node.operator in ("==", "!="):
             return float((left == right) == (node.operator == "=="))
     guilty, text = (node.left, left) if isinstance(left, str) else (node.right, right)
-    raise ScriptError(
-        f"'{text}' is text, and '{node.operator}' needs numbers",
-        place=mark(raw, guilty),
-        expected="a number; texts can be joined with + and compared with == and !=",
-    )
+    message = f"'{text}' is text, and '{node.operator}' needs numbers"
+    expected = "a number; texts can be joined with + and compared with == and !="
+    raise ScriptError(message, place=mark(raw, guilty), expected=expected)
 
 
 def _numeric(node: syntax.Node, raw: syntax.Raw, scope: NameScope, user: str) -> float | Expression:

@@ -87,11 +87,9 @@ class Expression:
         """Return its present number; ValueError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
-            raise ScriptError(
-                f"'{self.text}' depends on {min(needed)}, which differs from point to point",
-                name=self.text,
-                expected="a formula of time and of values of fixes and computes",
-            )
+            message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
+            expected = "a formula of time and of values of fixes and computes"
+            raise ScriptError(message, name=self.text, expected=expected)
         return _evaluate(self._term, values)
 
     def program(self, values: Values) -> formula.Program:

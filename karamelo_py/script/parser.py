@@ -38,11 +38,8 @@ def read_script(path: Path) -> str:
         ) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise ScriptError(
-            f"{path} cannot be read: {reason}",
-            expected="a script, which is a text file",
-            code="file",
-        ) from None
+        message = f"{path} cannot be read: {reason}"
+        raise ScriptError(message, expected="a script, which is a text file", code="file") from None
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
@@ -118,13 +115,10 @@ def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> s
     begin, stop = parts
     right = syntax.Raw(source, begin, max(stop, begin))
     if not right.code.strip():
-        raise ScriptError(
-            f"nothing is assigned to '{name}'",
-            code="syntax",
-            place=whole.place,
-            expected="a number, a text in quotes or an expression after the =",
-            hint=f"{name} = 1",
-        )
+        message = f"nothing is assigned to '{name}'"
+        expected = "a number, a text in quotes or an expression after the ="
+        hint = f"{name} = 1"
+        raise ScriptError(message, code="syntax", place=whole.place, expected=expected, hint=hint)
     return syntax.Assignment(place, whole, name, right, parse_expression(right))
 
 

@@ -177,11 +177,9 @@ class STL(Enclosed):
 
     def __init__(self, hub: Hub, file: MeshFile, exterior: Literal["exterior"] | None = None):
         if require_domain(hub).dimension != 3:
-            raise ScriptError(
-                "a surface encloses space in 3D only",
-                expected="dimension(3, ...)",
-                hint="in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals",
-            )
+            message = "a surface encloses space in 3D only"
+            hint = "in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals"
+            raise ScriptError(message, expected="dimension(3, ...)", hint=hint)
         mesh = read(file, 2, hub.settings.trusts)
         triangles = triangles_of(mesh)
         if not len(triangles):

@@ -233,11 +233,8 @@ class Plane(Primitive):
         self.middle, normal = values[:d], values[d:]
         length = np.linalg.norm(normal)
         if length == 0:
-            raise ScriptError(
-                "the direction across the plane has no length",
-                place=numbers[d].place,
-                expected="a direction that is not 0",
-            )
+            message = "the direction across the plane has no length"
+            raise ScriptError(message, place=numbers[d].place, expected="a direction that is not 0")
         self.normal = normal / (length or 1)
         super().__init__(hub, np.full(d, -np.inf), np.full(d, np.inf), exterior=exterior)
         self.unknown |= bool(np.isnan(values).any())

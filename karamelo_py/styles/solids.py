@@ -101,11 +101,9 @@ class RegionSolid(Solid):
         if points is None and hub.update.method.regular_points:
             points = "regular"
         if self.cut and corners:
-            raise ScriptError(
-                "domains of cpdi tile a body, which cut points do not",
-                argument="points",
-                hint="points=regular, a solid from a mesh, or another basis",
-            )
+            message = "domains of cpdi tile a body, which cut points do not"
+            hint = "points=regular, a solid from a mesh, or another basis"
+            raise ScriptError(message, argument="points", hint=hint)
         if ppc > MANY:
             hub.warn(
                 f"{ppc} points per cell and direction are {ppc**domain.dimension:.3g} in each cell",
@@ -220,11 +218,9 @@ class PointsSolid(Solid):
         missing = [name for name in (*AXES[:d], "volume") if name not in columns]
         if missing or len(lengths) > 1 or len(next(iter(lengths), ())) != 1:
             problem = f"has no column {missing[0]}" if missing else "has columns of several lengths"
-            raise ScriptError(
-                f"{self.table} {problem}",
-                argument="table",
-                expected=f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., T, s11 ...",
-            )
+            message = f"{self.table} {problem}"
+            expected = f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., T, s11 ..."
+            raise ScriptError(message, argument="table", expected=expected)
         x = np.column_stack([columns.pop(axis) for axis in AXES[:d]])
         volume = columns.pop("volume")
         wrong = ~(np.isfinite(x).all(axis=1) & (volume > 0) & np.isfinite(volume))

@@ -140,11 +140,8 @@ def refuse_absent(hub: Any, columns: tuple[str, ...]) -> None:
     """Refuse a column that no material has: comparing it is a mistake."""
     absent = [name for name in columns if name in hub.fields.absent_at_points()]
     if absent and hub.materials:
-        raise ScriptError(
-            f"'{absent[0]}' is 0 because no material of the scene has it",
-            argument="field",
-            expected="a column that the points have",
-        )
+        message = f"'{absent[0]}' is 0 because no material of the scene has it"
+        raise ScriptError(message, argument="field", expected="a column that the points have")
 
 
 class Error(Compared, Compute):

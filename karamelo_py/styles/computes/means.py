@@ -319,11 +319,8 @@ class Probe(Mean):
         self.published = ("",) if len(self.columns) == 1 else self.columns
         count = sum(solid.count for solid in hub.solids.values())
         if point is not None and all(s.count for s in hub.solids.values()) and 0 < count < point:
-            raise ScriptError(
-                f"there is no point {point} yet",
-                argument="point",
-                expected=f"an id from 1 to {count}",
-            )
+            message = f"there is no point {point} yet"
+            raise ScriptError(message, argument="point", expected=f"an id from 1 to {count}")
 
     def refresh(self) -> None:
         if self.point is None and not self.at:

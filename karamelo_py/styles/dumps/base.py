@@ -98,12 +98,10 @@ class TableDump(Dump):
     def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         columns_available = [*LEADING, *self.names(hub)]
         if str(file) in columns_available:
-            raise ScriptError(
-                f"'{file}' is a column, not a file",
-                argument="file",
-                expected="the file name in front of the columns",
-                hint=f"dump_*.LAMMPS, {file}",
-            )
+            message = f"'{file}' is a column, not a file"
+            expected = "the file name in front of the columns"
+            hint = f"dump_*.LAMMPS, {file}"
+            raise ScriptError(message, argument="file", expected=expected, hint=hint)
         check_columns(columns, columns_available, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
         # A viewer needs all three positions; those not requested come first.

@@ -282,24 +282,15 @@ def look_of(
     for ends, low, high in (((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)):
         if None not in ends and ends[0] >= ends[1]:
             range_of = "colours" if low == "vmin" else "picture"
-            raise ScriptError(
-                f"the {range_of} cannot go from {ends[0]:g} to {ends[1]:g}",
-                argument=high,
-                expected=f"a number above {low}",
-            )
+            message = f"the {range_of} cannot go from {ends[0]:g} to {ends[1]:g}"
+            raise ScriptError(message, argument=high, expected=f"a number above {low}")
     if outlines and dimension == 1:
-        raise ScriptError(
-            "outlines are drawn in 2D and 3D, and this scene is 1D",
-            argument="outlines",
-            expected="false",
-        )
+        message = "outlines are drawn in 2D and 3D, and this scene is 1D"
+        raise ScriptError(message, argument="outlines", expected="false")
     log = scale == "log"
     if log and min((end for end in (vmin, vmax) if end is not None), default=1.0) <= 0:
-        raise ScriptError(
-            "a logarithm has no colours for 0 and less",
-            argument="vmin",
-            expected="ends of the colours above 0",
-        )
+        message = "a logarithm has no colours for 0 and less"
+        raise ScriptError(message, argument="vmin", expected="ends of the colours above 0")
     signed = SIGNED.fullmatch(column) is not None and not log
     if cmap is not None:
         from matplotlib import colormaps

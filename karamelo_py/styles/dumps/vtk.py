@@ -31,12 +31,10 @@ class VtkDump(TableDump):
         super().__init__(hub, every, file, *columns)
         if not self.one_file_per_step or self.file.suffix != ".vtu":
             stem = self.file.name.replace("*", "").partition(".")[0]
-            raise ScriptError(
-                f"{file} is no name for a series of files",
-                argument="file",
-                expected="a file name with a * and the ending .vtu",
-                hint=f"{stem or 'points'}.*.vtu",
-            )
+            message = f"{file} is no name for a series of files"
+            expected = "a file name with a * and the ending .vtu"
+            hint = f"{stem or 'points'}.*.vtu"
+            raise ScriptError(message, argument="file", expected=expected, hint=hint)
         if self.index.is_file() and b"VTKFile" not in self.index.read_bytes()[:200]:
             raise ScriptError(
                 f"{self.index.name}, which would list the snapshots, is there and no such list",

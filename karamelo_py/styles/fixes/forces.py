@@ -146,11 +146,9 @@ class PointForces(Fix):
         self.rigid = [s for s, r in zip(solids, rigid, strict=True) if r and group.touches(s)]
         soft = (s for s, r in zip(solids, rigid, strict=True) if not r)
         if self.rigid and not any(map(group.touches, soft)):
-            raise ScriptError(
-                f"solid '{self.rigid[0].id}' is rigid: forces do not move it",
-                argument="group",
-                expected="points of other solids; fix velocity_particles moves rigid ones",
-            )
+            message = f"solid '{self.rigid[0].id}' is rigid: forces do not move it"
+            expected = "points of other solids; fix velocity_particles moves rigid ones"
+            raise ScriptError(message, argument="group", expected=expected)
 
     def forces(self, points: PointsView) -> np.ndarray:
         """Return the forces (n, d) on the points."""

@@ -28,11 +28,8 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
             expected=wanted + " (NULL leaves a component alone)" * (not all_given),
         )
     if len(formulas) > 3:
-        raise ScriptError(
-            f"{len(formulas)} components, and space has 3 directions",
-            argument=3 - len(formulas),
-            expected=wanted,
-        )
+        message = f"{len(formulas)} components, and space has 3 directions"
+        raise ScriptError(message, argument=3 - len(formulas), expected=wanted)
     for extra in formulas[d:]:
         if extra is not None and not (extra.is_constant and extra.constant == 0):
             raise ScriptError(

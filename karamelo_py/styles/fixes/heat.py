@@ -53,11 +53,9 @@ class HeatFix(Fix):
 
 def check_coefficient(h: Expression) -> None:
     if h.is_constant and not h.constant >= 0:
-        raise ScriptError(
-            f"the heat transfer coefficient is {h.constant:g}",
-            argument="h",
-            expected="a number of at least 0; whether it heats or cools follows from T_inf",
-        )
+        message = f"the heat transfer coefficient is {h.constant:g}"
+        expected = "a number of at least 0; whether it heats or cools follows from T_inf"
+        raise ScriptError(message, argument="h", expected=expected)
 
 
 MANY = 1_000_000  # points of a solid, above which the check is skipped

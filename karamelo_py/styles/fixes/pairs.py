@@ -29,11 +29,8 @@ SENT = 350  # bytes per point that are sent to the process that searches for pai
 
 def check_pair(solid1: Solid, solid2: Solid) -> None:
     if solid1 is solid2:
-        raise ScriptError(
-            f"'{solid2.id}' is named twice",
-            argument="solid2",
-            expected="another solid than the first",
-        )
+        message = f"'{solid2.id}' is named twice"
+        raise ScriptError(message, argument="solid2", expected="another solid than the first")
 
 
 class PairContact(Gripping):
@@ -232,11 +229,9 @@ def plane_modulus(solid: Solid, argument: str) -> float:
     law = elastic_law(solid.material.whole)
     G, lam = parameter(law, "G", None), parameter(law, "lam", None)
     if G is None or lam is None or not G > 0:
-        raise ScriptError(
-            f"material '{solid.material.id}' of solid '{solid.id}' has no elastic moduli",
-            argument=argument,
-            expected="a solid of a material with Young's modulus and Poisson's ratio",
-        )
+        message = f"material '{solid.material.id}' of solid '{solid.id}' has no elastic moduli"
+        expected = "a solid of a material with Young's modulus and Poisson's ratio"
+        raise ScriptError(message, argument=argument, expected=expected)
     return 4 * G * (lam + G) / (lam + 2 * G)
 
 
@@ -332,10 +327,8 @@ class ContactFriction(Fix):
             )
         a, b = (method.lattice_of(hub, solid) for solid in (solid1, solid2))
         if a == b:
-            raise ScriptError(
-                f"solids '{solid1.id}' and '{solid2.id}' are glued together: they never slide",
-                argument="solid2",
-            )
+            message = f"solids '{solid1.id}' and '{solid2.id}' are glued together: they never slide"
+            raise ScriptError(message, argument="solid2")
         self.solids = (solid1, solid2)
         self.friction = inf if mu == "no-slip" else float(mu)
         if mu != "no-slip":

@@ -46,11 +46,9 @@ class PythonFunction:
         )
         folder = hub.interpreter.folder.absolute()
         if not module:
-            raise ScriptError(
-                f"'{name}' names no module",
-                place=argument.place,
-                expected="module.function, of a module next to the script or an installed one",
-            )
+            message = f"'{name}' names no module"
+            expected = "module.function, of a module next to the script or an installed one"
+            raise ScriptError(message, place=argument.place, expected=expected)
         try:
             exists = forget_other(module.partition(".")[0])
             imported = import_module(module)
@@ -64,11 +62,9 @@ class PythonFunction:
         if not callable(getattr(imported, function, None)):
             functions = [key for key, value in vars(imported).items() if callable(value)]
             close = nearest(function, functions)
-            raise ScriptError(
-                f"the module {module} has no function '{function}'",
-                place=argument.place,
-                hint=no_file or (f"did you mean '{module}.{close}'?" if close else None),
-            )
+            message = f"the module {module} has no function '{function}'"
+            hint = no_file or (f"did you mean '{module}.{close}'?" if close else None)
+            raise ScriptError(message, place=argument.place, hint=hint)
         return getattr(imported, function)
 
 
@@ -140,11 +136,9 @@ class Python(Fix):
                 expected=f"one of {', '.join(fit)}",
             )
         if wrong := misfit(function, 1):
-            raise ScriptError(
-                f"{_name(function)} cannot be called with one argument: {wrong}",
-                argument="function",
-                expected="a function of one argument, the points or nodes of the group",
-            )
+            message = f"{_name(function)} cannot be called with one argument: {wrong}"
+            expected = "a function of one argument, the points or nodes of the group"
+            raise ScriptError(message, argument="function", expected=expected)
         super().__init__(hub, group)
         self.function = function
         self.keeper = Keeper(function)
@@ -232,11 +226,9 @@ class Keeper:
         self.owner, self.function = owner, function
         for name in self.names:
             if not hasattr(owner, name):
-                raise ScriptError(
-                    f"{self.place} remembers '{name}', which it does not have",
-                    argument="function",
-                    expected="a name that has its first value when the fix is made",
-                )
+                message = f"{self.place} remembers '{name}', which it does not have"
+                expected = "a name that has its first value when the fix is made"
+                raise ScriptError(message, argument="function", expected=expected)
         self.seen = self._look()
 
     def forgotten(self) -> list[str]:

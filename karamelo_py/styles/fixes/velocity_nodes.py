@@ -149,11 +149,9 @@ class VelocityNodes(Fix):
         if mu is not None and mu.is_constant:
             judge_friction(hub, mu.constant)
         if mu is not None and None not in self.formulas:
-            raise ScriptError(
-                "nodes that are held in all directions cannot rub",
-                argument="mu",
-                expected="NULL for the directions along the wall, or no mu",
-            )
+            message = "nodes that are held in all directions cannot rub"
+            expected = "NULL for the directions along the wall, or no mu"
+            raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
         # A wall that moves in all of its directions drags material along; one at rest, or one that
         # leaves a direction free, is a clamp, a roller or a plane of symmetry.
@@ -179,19 +177,15 @@ class VelocityNodes(Fix):
     def _one_bound(self) -> str:
         bounds = dict.fromkeys(v.bound for v in self.formulas if v is not None)
         if len(bounds) > 1:
-            lines = []
-            for k, one in enumerate(bounds, 1):
-                components = (
-                    one + v.text if v and v.bound == one else "NULL" for v in self.formulas
-                )
-                lines.append(
-                    f"fix(ID{k}, velocity_nodes, {self.group.id}, {', '.join(components)})"
-                )
-            raise ScriptError(
-                "a fix has bounds of one kind: leq, geq, or none",
-                argument="velocity",
-                hint="fixes with different IDs: " + " and ".join(lines),
-            )
+            lines = [
+                f"fix(ID{k}, velocity_nodes, {self.group.id}, "
+                + ", ".join(b + v.text if v and v.bound == b else "NULL" for v in self.formulas)
+                + ")"
+                for k, b in enumerate(bounds, 1)
+            ]
+            message = "a fix has bounds of one kind: leq, geq, or none"
+            hint = "fixes with different IDs: " + " and ".join(lines)
+            raise ScriptError(message, argument="velocity", hint=hint)
         return next(iter(bounds), "")
 
     def defined(self) -> None:

@@ -25,12 +25,9 @@ class Radius(Expression):
         if radius.is_constant and not radius.constant > 0:
             ID, style, group, kind, K, *centre, R = words_of(argument.statement)
             line = ", ".join([ID, style, group, kind, K, R, *centre])
-            raise ScriptError(
-                f"the radius is {radius.constant:g}",
-                place=argument.place,
-                expected="a number above 0",
-                hint=f"with the radius in front of the centre: fix({line})",
-            )
+            message = f"the radius is {radius.constant:g}"
+            hint = f"with the radius in front of the centre: fix({line})"
+            raise ScriptError(message, place=argument.place, expected="a number above 0", hint=hint)
         return radius
 
 
