@@ -72,7 +72,8 @@ def test_what_follows_from_a_refused_setting_or_deletion_is_not_told(run_interpr
 
 def test_what_follows_in_an_included_script_is_not_told(run_interpreted, tmp_path):
     inner = tmp_path / "walls.mpm"
-    inner.write_text("fix(walls, velocity_nodes, all, speed, 0)\nfix(base, velocity_node, all, 0)\n")
+    follows = "fix(walls, velocity_nodes, all, speed, 0)"
+    inner.write_text(f"{follows}\nfix(base, velocity_node, all, 0)\n")
     lines = [
         "speed = 1/0",  # 1: wrong, and a line of the included script follows
         f'include("{inner}")',
