@@ -99,10 +99,10 @@ class CPGIMPStretch(_Following):
 class CPGIMPCorners(_Following):
     """Boxes as warn_of_many_nodes as the mean distance of their corners, which the grid moves.
 
-    l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c. s_ci = -1 or
-    1 is the side of the corner in direction i (after Coombs et al. 2020, "On Lagrangian mechanics
-    and the implicit material point method for large deformation elasto-plasticity"). Beyond a wall
-    the velocity of the last cell is extrapolated.
+    l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c and their
+    sides s_ci = -1 or 1 in direction i (after Coombs et al. 2020, "On Lagrangian mechanics and the
+    implicit material point method for large deformation elasto-plasticity"). Beyond a wall the
+    velocity of the last cell is extrapolated.
 
     Example
     -------
@@ -116,9 +116,9 @@ class CPGIMP(_Box):
     """Contiguous-particle GIMP: each point has a box that deforms with it.
 
     Like ugimp, but the box follows the deformation (Bardenhagen & Kober 2004): ``det`` (its
-    volume), ``diagonal`` (F_ii; a rotation by 90 degrees makes the box vanish), ``stretch`` (U_ii
-    of the right stretch, the default) or ``corners`` (its corners move with the grid). Boxes stay
-    aligned with the axes. For large shear, the cpdi methods have parallelograms and quadrilaterals.
+    volume), ``diagonal`` (F_ii; vanishes in a rotation by 90 degrees), ``stretch`` (U_ii of the
+    right stretch, the default) or ``corners`` (which move with the grid). Boxes stay aligned with
+    the axes; for large shear use a cpdi method.
 
     Weights use half sizes between 0.001 and 1 cell; beyond, the body fractures numerically. In
     total Lagrangian methods no box deforms, and cpgimp equals ugimp.

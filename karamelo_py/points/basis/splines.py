@@ -45,9 +45,9 @@ def hats(grid, a, cell, first, count):
 class QuadraticSpline(NamedTuple):
     """Quadratic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    Gradients are continuous, so there is no cell-crossing error. In 2D they have a bit more than
-    twice as many nodes as a linear basis. At a wall, values are extrapolated linearly to the node
-    beyond: phi(-1) = 2 phi(0) - phi(1). Within half a cell of a wall this gives linear hats.
+    Continuous gradients: no cell-crossing error. Nine nodes in 2D, linear has four. At a wall,
+    values are extrapolated linearly to the node beyond: phi(-1) = 2 phi(0) - phi(1). Within half a
+    cell of a wall this gives linear hats.
 
     Example
     -------

@@ -62,10 +62,10 @@ class CamClay(NamedTuple):
     strain ep, and pc. A stress from fix initial_stress outside the surface raises pc. There is no
     tension.
 
-    At a free surface a load must balance p0, or the first step releases p0. Hold the other sides
+    At a free surface a load must balance p0, or the first step releases it. Hold the other sides
     and write ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or
-    ``fix(cell, edge_pressure, all, b, 100e3)`` all around. b is the region of the solid. If fix
-    initial_stress gives another stress, the load is its normal component.
+    ``fix(cell, edge_pressure, all, b, 100e3)`` all around. b is the region of the solid. With fix
+    initial_stress, the load is its normal component.
 
     See Also
     --------

@@ -54,10 +54,9 @@ class HyperelasticFormula(OfInvariants, _Fields):
     rho
         Density before deformation.
     energy
-        Stored energy per reference volume: a formula of the invariants I1 = tr C, I2 = (I1^2 - tr
-        C^2)/2 and J = det F, with C = F^T F, or of the principal stretches l1, l2 and l3 (and of
-        I1, I2, J besides). Variables of the script are numbers in it. At rest, I1 = I2 = 3 and J =
-        l1 = l2 = l3 = 1.
+        Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, J = det
+        F, with C = F^T F, and/or of the principal stretches l1, l2, l3. Variables of the script are
+        numbers in it. At rest, I1 = I2 = 3 and J = l1 = l2 = l3 = 1.
 
     Example
     -------

@@ -45,7 +45,7 @@ class Orthotropic(NamedTuple):
     E1, E2, E3
         Young's moduli along the three axes of the material.
     nu12, nu13, nu23
-        Poisson's ratios: nu12 is the contraction along 2 over the stretch along 1.
+        Poisson's ratios; nu12: contraction along 2 over stretch along 1.
     G12, G13, G23
         Shear moduli.
     angle, tilt, spin
@@ -118,9 +118,8 @@ class Transverse(NamedTuple):
     G3
         Shear modulus of planes with the direction.
     angle, tilt
-        Rotation of the direction in degrees. It is z without them; `tilt` rotates it about x, then
-        `angle` about z. The normal of bedding that dips by 30 degrees about z has
-        angle 30 and tilt 90.
+        Rotation of the direction from z, in degrees: by `tilt` about x, then by `angle` about z.
+        The normal of bedding that dips by 30 degrees about z has angle 30 and tilt 90.
 
     Example
     -------

@@ -58,14 +58,14 @@ class PlasticWork(NamedTuple):
     cp
         Heat capacity per mass.
     kappa
-        Conductivity, for heat flow with ``method(..., thermo-mechanical)``; otherwise heat stays
-        where it is generated.
+        Conductivity, for heat flow with ``method(..., thermo-mechanical)``; otherwise heat stays in
+        place.
     alpha
         Pressure per kelvin: 3 K times the coefficient of linear expansion, with the bulk modulus K.
     T0
-        Temperature without thermal pressure, and initial temperature unless the solid has another.
+        Temperature without thermal pressure, and initial temperature unless the solid sets it.
     Tm
-        Melting temperature, from which there is no heating.
+        Melting temperature; no heating above.
 
     Example
     -------

@@ -66,17 +66,17 @@ class AFLIP(NamedTuple):
 class ASFLIP(NamedTuple):
     """AFLIP with point velocities that differ from the grid where the material separates.
 
-    For granular flow and splashes: points that the grid holds together separate sooner (Fei et al.
-    2021, section 5). If the material is compressed by more than 0.1 % of its volume, points move
-    with the grid and retain their order.
+    For granular flow and splashes: points separate sooner (Fei et al. 2021, section 5). If the
+    material is compressed by more than 0.1 % of its volume, points move with the grid and retain
+    their order.
 
     Parameters
     ----------
     alpha
         FLIP coefficient.
     beta
-        Strength of separation: the fraction of a point's velocity relative to the grid that also
-        moves it, if the material is not compressed. 0 is AFLIP.
+        Strength of separation: fraction of a point's velocity relative to the grid that also moves
+        it, unless compressed. 0 is AFLIP.
 
     Example
     -------

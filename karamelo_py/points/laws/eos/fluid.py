@@ -158,12 +158,11 @@ class IdealGas(NamedTuple):
     Notes
     -----
     p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. Along an adiabat e grows as
-    rho^(gamma - 1), which each step follows exactly. The gas is heated by viscous work, and by the
-    kinetic energy that PIC, FLIP, APIC, MLS and TPIC dissipate. With shocks, Q1 = 2 and Q2 = 0.2
-    are usual.
+    rho^(gamma - 1), exactly in each step. Viscous work heats the gas, as does the kinetic energy
+    that PIC, FLIP, APIC, MLS and TPIC dissipate. With shocks, Q1 = 2 and Q2 = 0.2 are usual.
 
-    The gas has pressure from the first step, so a free surface expands. Fix initial_stress sets the
-    pressure through the energy, at constant volume.
+    The gas has pressure from the first step: a free surface expands. Fix initial_stress changes the
+    energy, at constant volume.
 
     See Also
     --------

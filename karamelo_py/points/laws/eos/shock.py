@@ -28,12 +28,11 @@ class Shock(NamedTuple):
     rho0
         Density before deformation.
     K
-        Bulk modulus, for compatibility with Karamelo; unused. The initial stiffness is taken from
-        the Hugoniot curve, rho0 c0^2.
+        Bulk modulus; unused, for compatibility with Karamelo. The initial stiffness is rho0 c0^2.
     c0
         Speed of sound without shear, at zero pressure.
     S
-        Slope of the shock speed U = c0 + S u over the speed u of the material after the shock.
+        Slope of the shock speed U = c0 + S u over the material speed u after the shock.
     Gamma
         Grueneisen parameter, at the density before deformation.
     cv
@@ -43,7 +42,7 @@ class Shock(NamedTuple):
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
     tension
-        Tension that the material sustains before it spalls (0: none); default: from the formula.
+        Tension at which the material spalls (0: none); default: from the formula.
 
     Example
     -------
@@ -63,9 +62,9 @@ class Shock(NamedTuple):
     tension/(rho0 c0), in the acoustic approximation (Antoun et al. 2003, Spall Fracture, section
     4.2). The remaining tension slows the spalled layer further; a damage releases it.
 
-    If the volume decreases at a rate d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d) is added
-    (von Neumann & Richtmyer 1950; Landshoff 1955). h is the cell size and c the speed of sound. It
-    spreads a shock over a few cells, and shortens the time step.
+    In compression, at a rate of volume change d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d)
+    is added, with the cell size h and the speed of sound c (von Neumann & Richtmyer 1950; Landshoff
+    1955). It spreads a shock over a few cells, and shortens the time step.
 
     See Also
     --------

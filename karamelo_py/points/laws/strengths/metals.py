@@ -40,9 +40,9 @@ class JohnsonCook(NamedTuple):
     m
         Exponent of thermal softening; 0 for none.
     Tr
-        Reference temperature, up to which there is no softening.
+        Reference temperature; no softening below.
     Tm
-        Melting temperature, from which there is no strength.
+        Melting temperature; no strength above.
 
     Example
     -------
@@ -256,7 +256,7 @@ class ZerilliArmstrong(NamedTuple):
     G
         Shear modulus.
     C0
-        Athermal, constant part of the flow stress (impurities, grain size).
+        Constant, athermal part of the flow stress (impurities, grain size).
     C1
         Coefficient of the thermal term (bcc metals).
     C2
@@ -268,7 +268,7 @@ class ZerilliArmstrong(NamedTuple):
     C5, n
         Hardening C5 ep^n that depends on strain alone (bcc metals).
     epsdot0
-        Unit of the plastic strain rate: 1/s in the units of the script.
+        Unit of the plastic strain rate: 1/s in script units.
     T
         Absolute temperature, if neither the material nor its solid has one.
 
