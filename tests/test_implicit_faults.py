@@ -248,7 +248,7 @@ def test_points_that_go_wrong_are_told_apart(h, told):
         s=SimpleNamespace(kin=PlaneStrain()), blocks=[block], parts=[(None, response)]
     )
     reason = Newton._wrong(SimpleNamespace(equations=equations), np.zeros((2, 2)))
-    assert told in str(reason) and "point 8" in str(reason) and reason.point == 8
+    assert told in str(reason) and "point 8" in str(reason) and reason.at == 8
 
 
 def test_initial_velocities_of_points_are_told():

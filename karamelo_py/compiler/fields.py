@@ -79,6 +79,11 @@ class Field(NamedTuple):
     start = 0.0
     columns = ()
 
+    @staticmethod
+    def needed(tag: Any) -> bool:
+        """Return True if points of a law, or nodes of a basis, have this field."""
+        return True
+
 
 class StepField(Field):
     """A field that does not outlive a step."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from karamelo_py.output.fields import Fields, ranges
 from karamelo_py.output.node_columns import BROUGHT, NodeTable, brought, loaded, places_of
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes, rows_at
+from karamelo_py.scene.group import NodeGroup
 
 
 class NodesByNumber:
@@ -45,20 +45,19 @@ class NodesByNumber:
         nodes = numbers(self.simulation.setup.spans)
         used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
         own = {name: np.zeros((end - first, 2)) for name in sums}
-        for there, given in gather((used, [of[used] for of in sums.values()])) or ():
-            for total, of in zip(own.values(), given, strict=True):
+        for there, parts in gather((used, [of[used] for of in sums.values()])) or ():
+            for total, of in zip(own.values(), parts, strict=True):
                 total[there - first] += of
         return own
 
     def counted(self) -> np.ndarray:
-        """Return the nodes in use, each on one process only."""
         return self.simulation.domain.counted()
 
     def with_mass(self) -> np.ndarray:
         nodes = self.counted()
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
-    def mass_of(self, group: Any) -> np.ndarray:
+    def mass_of(self, group: NodeGroup) -> np.ndarray:
         """Return the nodal mass of a group and its first moments (4,); rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
@@ -68,9 +67,8 @@ class NodesByNumber:
         return self.points.summed(mass[:, None] * places)
 
     def occupied(self) -> tuple[int, int]:
-        """Return the number of nodes with mass, and the last of them."""
         self.simulation.show_on_nodes()
-        there, comm = self.with_mass(), self.points.comm
-        count = comm.allreduce(np.array([len(there)]))
-        last = comm.allreduce_max(np.array([there.max(initial=-1)], float))
+        nodes, comm = self.with_mass(), self.points.comm
+        count = comm.allreduce(np.array([len(nodes)]))
+        last = comm.allreduce_max(np.array([nodes.max(initial=-1)], float))
         return int(count[0]), int(last[0])

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import unique
 
 
@@ -24,7 +25,6 @@ class BodyMotion(NamedTuple):
 
     @property
     def size(self) -> float:
-        """Half of the longest side of its bounding box."""
         return float((self.high - self.low).max()) / 2
 
     def drift(self, axisymmetric: bool) -> np.ndarray:
@@ -60,7 +60,7 @@ class BodyMotion(NamedTuple):
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 
 
-def motions(simulation: Any) -> list[BodyMotion]:
+def motions(simulation: Backend) -> list[BodyMotion]:
     """Measure the motion of all solids with points, over all processes; sums are exact."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
@@ -73,20 +73,20 @@ def motions(simulation: Any) -> list[BodyMotion]:
         ends[k] = np.maximum(ends[k], np.concatenate([xv.max(axis=1), -xv.min(axis=1)]))
     comm = simulation.comm
     limbs, ends = comm.allreduce(limbs), comm.allreduce_max(ends)
-    found = []
-    for k, (own, end) in enumerate(zip(limbs, ends, strict=True)):
-        mass, *sums = map(rounded, own)
+    bodies = []
+    for k, (sums_of_solid, end) in enumerate(zip(limbs, ends, strict=True)):
+        mass, *sums = map(rounded, sums_of_solid)
         if not mass > 0:
             continue
         mean = np.array(sums[: 2 * d]) / mass
         moments = np.array(sums[2 * d :]).reshape(d, 2 * d) - mass * np.outer(mean[:d], mean)
         high, fast, low, slow = end.reshape(4, d) * [[1], [1], [-1], [-1]]
         about_centre = mean[:d], mean[d:], moments[:, :d], moments[:, d:]
-        found.append(BodyMotion(k, mass, *about_centre, low, high, slow, fast))
-    return found
+        bodies.append(BodyMotion(k, mass, *about_centre, low, high, slow, fast))
+    return bodies
 
 
-def _pieces(simulation: Any, d: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+def _pieces(simulation: Backend, d: int) -> Iterator[tuple]:
     """Yield solid number, masses (n,), positions and velocities (d, n), block by block."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
     for block, rows in simulation.points.rows_of(None):

@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import forget_array
-from karamelo_py.compiler.fields import records
-from karamelo_py.kernels.arrays import Buffers, Nodes, Setup
+from karamelo_py.compiler.fields import SummedField, records
+from karamelo_py.kernels.arrays import Buffers, Nodes, Setup, Tag
+from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.heat import Conducting
 
-SPAN = 256  # nodes of a span at most
+SPAN = 256  # maximum nodes of a span
 
 
 class Boxes(NamedTuple):
@@ -35,9 +36,9 @@ class Reached(NamedTuple):
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the first nodes of the rows of boxes (see `Buffers`), and the ends of the rows."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
-    own = boxes[row]
-    begin = own[:, 0] + left // own[:, 3] * own[:, 5] + left % own[:, 3] * own[:, 6]
-    return begin, begin + own[:, 4]
+    rows = boxes[row]
+    begin = rows[:, 0] + left // rows[:, 3] * rows[:, 5] + left % rows[:, 3] * rows[:, 6]
+    return begin, begin + rows[:, 4]
 
 
 def joined_spans(boxes: np.ndarray) -> np.ndarray:
@@ -82,8 +83,8 @@ def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
     steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
     order = np.argsort(edges, kind="stable")
     edges, covered = edges[order], np.cumsum(steps[order])
-    found = np.stack([edges[:-1], edges[1:]], axis=1)[covered[:-1] == 1]
-    return found[found[:, 0] < found[:, 1]]
+    parts = np.stack([edges[:-1], edges[1:]], axis=1)[covered[:-1] == 1]
+    return parts[parts[:, 0] < parts[:, 1]]
 
 
 def numbers(spans: np.ndarray) -> np.ndarray:
@@ -135,8 +136,13 @@ def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
     """Return the arrays that points scatter to."""
-    own = [one.array for one in nodes.fields if getattr(type(one), "summed", False)]
-    return [nodes.sums, nodes.velocity, *own]
+    declared = [one.array for one in nodes.fields if isinstance(one, SummedField)]
+    return [nodes.sums, nodes.velocity, *declared]
+
+
+def beyond(contact: Tag) -> int:
+    """Return the number of cells beyond the nodes of points whose sums contact reads."""
+    return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 
 def room_of(rows: int, like: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ class LoadPath(Named):
     stress: Mapping[str, float]
     shear: Sequence[str] = ()  # components of `strain` that are simple shear, not pure
     volumetric: float | None = None  # sum of normal strains, reached by those that are not named
-    turn: float = 0.0  # angle about z by which the point rotates
+    turn: float = 0.0  # angle about z
 
     catalogue = "load_paths"
 
@@ -93,10 +93,10 @@ FREE = {
 SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
-HALVINGS = 8  # of a Newton step that leads away
+HALVINGS = 8  # of a diverging Newton step
 DIVISIONS = 8  # of an increment that does not converge, into halves
 TOLERANCE = 1e-10  # of the stress, or of what an increment would change in an elastic material
-ROUNDING = 1e-13  # stress that cannot be resolved, over the modulus
+ROUNDING = 1e-13  # unresolved stress, over the modulus
 
 
 class Unreachable(Exception):
@@ -134,11 +134,10 @@ class Point:
         return self._stress(self.state)
 
     def _stress(self, state: tuple) -> np.ndarray:
-        found = laws.cauchy_stress(self.law, self.kin, state)
-        return np.pad(found, (0, 6 - len(found)))
+        stress = laws.cauchy_stress(self.law, self.kin, state)
+        return np.pad(stress, (0, 6 - len(stress)))
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
-        """Go along a path; call `observe` after every increment."""
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
         motion = Loading(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
@@ -149,14 +148,14 @@ class Point:
             end=np.array([path.stress[COMPONENTS[k]] for k in prescribed]),
         )
         begun = self.time
-        rate = np.zeros(len(prescribed))  # of the strains that are looked for, in paths
+        rate = np.zeros(len(prescribed))  # of the unknown strains, per path
         marks = np.arange(path.increments + 1) / path.increments
         for number, (a, b) in enumerate(pairwise(marks), 1):
             try:
                 rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
             except Unreachable as error:
                 raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
-            # Not the sum of many small steps, so that tables have round numbers.
+            # Not a sum of increments, so that tables have round numbers.
             self.time = begun + b * path.duration
             observe()
 
@@ -165,14 +164,14 @@ class Point:
     ) -> np.ndarray:
         """Go from fraction `a` of a path to fraction `b`, in halves if an increment fails."""
         try:
-            found = self._solve(motion, (b - a) * duration, a, b, rate)
+            solution = self._solve(motion, (b - a) * duration, a, b, rate)
         except Unreachable:
             middle = (a + b) / 2
             if divisions == 0 or not len(motion.prescribed):
                 raise
             rate = self._go(motion, duration, a, middle, rate, divisions - 1)
             return self._go(motion, duration, middle, b, rate, divisions - 1)
-        return found / (b - a)
+        return solution / (b - a)
 
     def _solve(
         self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
@@ -191,14 +190,14 @@ class Point:
                 if laws.jacobian(self.law, self.kin, state) > 0:
                     return state, self._stress(state)
             except (ArithmeticError, ValueError):
-                pass  # a logarithm of what is turned inside out, an overflow
+                pass  # logarithm of a negative stretch, overflow
             return None
 
         def misfit(unknown: np.ndarray) -> np.ndarray:
-            found = after(unknown)
-            return (
-                np.full(len(prescribed), np.inf) if found is None else found[1][prescribed] - target
-            )
+            state = after(unknown)
+            if state is None:
+                return np.full(len(prescribed), np.inf)
+            return state[1][prescribed] - target
 
         def slopes(unknown: np.ndarray) -> np.ndarray:
             increment[prescribed] = unknown
@@ -230,8 +229,8 @@ class Point:
         """Return derivatives (6, w) of the stress after `dl` by w changes (3, 3) of it."""
         places = GRADIENT[type(self.kin)]
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
-        found = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
-        rows = [slopes_of(x, len(ways)) for x in found]
+        stress = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
+        rows = [slopes_of(x, len(ways)) for x in stress]
         return np.pad(np.array(rows, float), ((0, 6 - len(rows)), (0, 0)))
 
     def _newton(
@@ -246,12 +245,12 @@ class Point:
             return guess
         volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
         modulus = laws.wave_speed_squared(self.law, self.kin, self.state) / volume
-        unknown, found = guess, misfit(guess)
-        if not np.isfinite(found).all():
+        unknown, residual = guess, misfit(guess)
+        if not np.isfinite(residual).all():
             unknown = np.zeros(len(guess))
-            found = misfit(unknown)
+            residual = misfit(unknown)
         for _ in range(ITERATIONS):
-            size = np.linalg.norm(found)
+            size = np.linalg.norm(residual)
             largest = float(np.abs(increment).max())
             stresses = [modulus * largest, *np.abs(target), *np.abs(self.stress)]
             if size <= TOLERANCE * max(stresses) + ROUNDING * modulus:
@@ -261,8 +260,8 @@ class Point:
             tangent = slopes(unknown)
             if not np.isfinite(tangent).all():
                 break
-            # Least squares: a component that no stiffness holds is left where it is.
-            step = np.linalg.lstsq(tangent, -found, rcond=1e-12)[0]
+            # Least squares: a component without stiffness does not move.
+            step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
             for halving in range(HALVINGS):
                 trial = unknown + step / 2**halving
                 there = misfit(trial)
@@ -270,7 +269,7 @@ class Point:
                     break
             else:
                 break
-            unknown, found = trial, there
+            unknown, residual = trial, there
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
@@ -320,7 +319,7 @@ class Point:
             self.strain[self.kin.dimension : 3] = np.log(across)
 
 
-WIDTH = 17  # as many as a number of ten digits, its sign and its exponent take, and a blank
+WIDTH = 17  # ten digits, sign, exponent and a blank
 
 
 def shown(point: Point) -> dict[str, float]:
@@ -371,7 +370,7 @@ class Response:
         largest = max(float(np.abs(table[name]).max()) for name in stresses)
         figure = blank_figure(9.6, 4.0)
         left, right = figure.subplots(1, 2)
-        # Dashes let a curve show that lies under another.
+        # Dashes show a curve under another.
         for name, dashes in zip(stresses, ("-", "--", ":") * 2, strict=False):
             if np.abs(table[name]).max() > 1e-6 * largest:
                 left.plot(table[driven], table[name], dashes, label=name, linewidth=1.4)

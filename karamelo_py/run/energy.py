@@ -132,7 +132,6 @@ class EnergyWatch:
         self.told_of_loss = True
 
     def has_grown(self) -> bool:
-        """Judge, by looks at it, that energy shows a spurious gain."""
         clock = self.clock
         return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 

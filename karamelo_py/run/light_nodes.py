@@ -6,13 +6,15 @@ their points follow any linear field. The step is stable below 2 / w, where w^2 
 eigenvalue of M^-1 K with lumped masses. In the total frame it is known at set-up.
 """
 
+from collections.abc import Callable
 from itertools import product
 from math import floor, inf, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.basis.product import along
 from karamelo_py.points.kinematics import Axisymmetric
@@ -28,8 +30,8 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
-LIGHT = 0.9  # of the mass of a node within the body, below which nodes are looked at
-MANY = 100_000  # pairs of points and nodes that are looked at, or a few times that
+LIGHT = 0.9  # fraction of an inner node's mass, below which nodes count as light
+MANY = 100_000  # target number of point-node pairs
 STEPS = 24  # of the iteration: within 1 % of the highest frequency
 
 
@@ -47,8 +49,8 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
     if not along.defined(type(hub.update.method.basis)):
         return inf
     solids = [s for s in hub.solids.values() if not can(s.material.law, constrained_velocity)]
-    found = [_stable_share(hub, solid, grids) for solid in solids if solid.count]
-    least = min(found, default=inf)
+    limits = [_stable_share(hub, solid, grids) for solid in solids if solid.count]
+    least = min(limits, default=inf)
     return floor(1e4 * least) / 1e4 if least < inf else inf
 
 
@@ -80,7 +82,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     limit = LIGHT * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
-        for _ in range(2):  # their points, and all other points of the nodes of these
+        for _ in range(2):  # their points, and the points of those points' nodes
             near = np.any([seen[nodes(k)] for k in pairs], axis=0)
             seen = np.zeros(count, bool)
             for k in pairs:
@@ -122,20 +124,20 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     return 2 / (sqrt(_largest(stiffness, (len(root), kin.dimension))) * solid.h)
 
 
-def _line(basis: Any, kin: Any, grid: Any, places: np.ndarray, direction: int) -> _Line:
+def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -> _Line:
     d = kin.dimension
-    own = places[:, direction::d] if places.shape[1] > d else places[:, direction, None]
-    _, first, back = np.unique(own, axis=0, return_index=True, return_inverse=True)
-    found = [along(basis, kin, grid, tuple(place), direction) for place in places[first]]
+    coordinates = places[:, direction::d] if places.shape[1] > d else places[:, direction, None]
+    _, first, back = np.unique(coordinates, axis=0, return_index=True, return_inverse=True)
+    lines = [along(basis, kin, grid, tuple(place), direction) for place in places[first]]
     back = back.ravel()
     return _Line(
-        np.array([int(one.first) for one in found])[back],
-        np.array([one.weights for one in found], float)[back],
-        np.array([one.gradients for one in found], float)[back],
+        np.array([int(one.first) for one in lines])[back],
+        np.array([one.weights for one in lines], float)[back],
+        np.array([one.gradients for one in lines], float)[back],
     )
 
 
-def _shear_share(law: Any, kin: Any) -> float:
+def _shear_share(law: Tag, kin: Tag) -> float:
     """Return the shear modulus over the P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
@@ -143,7 +145,7 @@ def _shear_share(law: Any, kin: Any) -> float:
     return min(float(G / stiffness), 0.5)
 
 
-def _largest(operator: Any, shape: tuple[int, int]) -> float:
+def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> float:
     """Return the largest eigenvalue of a symmetric operator by Lanczos iteration (1950)."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())

@@ -1,5 +1,6 @@
 """Events of a run, and the base of what listens to them."""
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from karamelo_py.script.errors import Place
@@ -20,7 +21,7 @@ def when(simulation: Any, later: int = 0) -> str:
     return f"step {simulation.step + later}, t = {simulation.time:.6g}"
 
 
-def where(x: Any) -> str:
+def where(x: Iterable[float]) -> str:
     """Format a position."""
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 

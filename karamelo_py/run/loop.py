@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field
 from math import inf, isfinite, isnan
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
 
-PATIENCE = 0.3  # seconds between two looks, about: for Ctrl-C and the progress bar
+PATIENCE = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
@@ -42,7 +43,7 @@ class RunLoop:
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
-    signal = 0  # that this process has been sent
+    signal = 0  # received by this process
     interrupted = 0  # the signal that all processes end with
 
     def __post_init__(self, halve: bool) -> None:
@@ -51,7 +52,6 @@ class RunLoop:
         self.timings = Timings(self.hub)
 
     def tell(self, event: Callable[[Listener], Any]) -> Any:
-        """Send an event to all listeners; return the first answer."""
         answers = [event(listener) for listener in (*self.hub.listeners, self.advice)]
         return next((answer for answer in answers if answer is not None), None)
 
@@ -91,7 +91,7 @@ class RunLoop:
                 with counted("output"):
                     hub.console.end_run()
                     if self.interrupted:
-                        # Before the last state of this run is written, which a longer one has not.
+                        # Before the final state, which a longer run would not have.
                         hub.output.write_last()
                     hub.output.end()
                 self._agree(simulation)  # a signal may have come meanwhile: no further run begins
@@ -114,7 +114,7 @@ class RunLoop:
         self.ruined = not watched and simulation.step > self.first_step
         simulation.go_on(self.end_time, self.rollback.point.halvings)
         self.tell(lambda to: to.begun(self, simulation, resumed=True))
-        # It may hold the end of this run already, or later states.
+        # The file may hold the end of this run, or a later state.
         step, time, last_step = simulation.step, simulation.time, self.last_step
         holds = f"{file} holds step {step}, time {time:.6g}"
         hint = "a longer run, or a file from before its end"
@@ -144,7 +144,7 @@ class RunLoop:
             end = min([end, *((step // every + 1) * every for every in rhythms)])
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step, between)
-            self._agree(simulation)  # what is written shows steps that no process has failed in
+            self._agree(simulation)  # outputs show steps that succeeded on all processes
             if not rollback.after(status):
                 length = 1
                 continue
@@ -166,7 +166,7 @@ class RunLoop:
             self._agree(simulation)
             return not self.interrupted
         if simulation.step == self.first_step:
-            # A comparison that was forgotten, or turned round, ends a run at once.
+            # A forgotten or reversed comparison ends a run at once.
             holds = "holds" if self.until else "does not hold"
             self.hub.warn(
                 f"the condition {holds} before the first step of this run: it takes none",
@@ -212,7 +212,7 @@ class RunLoop:
             console.begin_run(simulation.step, fraction or 0.0)
         console.progress(simulation.step, simulation.time, fraction, within)
 
-    def _note(self, number: int, _: Any = None) -> None:
+    def _note(self, number: int, _: FrameType | None = None) -> None:
         """End the run after the present chunk; a second signal ends it at once."""
         if self.signal:
             raise KeyboardInterrupt

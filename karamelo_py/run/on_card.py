@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import NoHooks, Setup
+from karamelo_py.kernels.arrays import NoHooks, Setup, Tag
 from karamelo_py.kernels.step import DONE, STOPPED
 from karamelo_py.run.access import NodesByNumber
 from karamelo_py.run.gpu import StepsOnCard, arrays_in, there
@@ -16,7 +15,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
 
-def alike(hooks: Any, others: Any) -> bool:
+def alike(hooks: Tag, others: Tag) -> bool:
     if type(hooks) is not type(others) or isinstance(hooks, NoHooks):
         return type(hooks) is type(others)
     tables = ("table", "programs", "members", "code", "constants", "x0")
@@ -34,13 +33,13 @@ class SimulationOnCard(Simulation):
     GPU, and tiles are out of date: users of tiles sort first.
     """
 
-    states_every = 1000  # what is kept has to be brought back
+    states_every = 1000  # states must be fetched
     notes_temperatures = False
     _steps: StepsOnCard | None = None
-    _known: Sequence = ()  # the arrays and hooks that these are for
-    _ahead = False  # steps on the card are not in the arrays here
-    _nodes_ahead = False  # nor what they show at nodes
-    _sent = False  # the card has what the arrays here show
+    _known: Sequence = ()  # arrays and hooks of these steps
+    _ahead = False  # the arrays here lack steps on the card
+    _nodes_ahead = False  # the nodes here lack them
+    _sent = False  # the card has the present arrays
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         check_room_there(hub)
@@ -78,7 +77,7 @@ class SimulationOnCard(Simulation):
         self._nodes = nodes
 
     @property
-    def kin(self) -> Any:
+    def kin(self) -> Tag:
         return self._setup.kin
 
     def _fetch(self) -> None:
@@ -102,7 +101,7 @@ class SimulationOnCard(Simulation):
         self._sent = False
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
-        self._ahead = self._nodes_ahead = False  # what the card has is of no use any more
+        self._ahead = self._nodes_ahead = False  # the state of the card is obsolete
         super().restore(snapshot)
 
     # --- what needs points that are sorted: sums by tile, which nodes are in use
@@ -136,7 +135,6 @@ class SimulationOnCard(Simulation):
             self._sent = False
 
     def compile(self) -> None:
-        """Compile the steps and allocate the arrays on the card."""
         self.launches()
 
     def launches(self) -> StepsOnCard:
@@ -157,7 +155,7 @@ class SimulationOnCard(Simulation):
 
     def _advance_to(self, target: int) -> int:
         if self._first is not None:
-            # Fixes of the first step act in it from Python.
+            # Fixes of the first step act from Python.
             self._sent = False
             status = super()._advance_to(self.step + 1)
             if status != DONE or self.step >= target:

@@ -20,7 +20,7 @@ HALVINGS = 5  # at most, in a run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
 RETURNS = 2  # at most, to one state before an energy gain: two halvings without effect are enough
 LAST_GOOD = "last_good.*.h5"
-FAR = 100  # steps, more of which are not taken once more for the last rows of log and dumps
+FAR = 100  # maximum steps repeated for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
@@ -64,7 +64,7 @@ class RollBack:
         if self.point.step == self.begun_at and self.simulation.steps.too_large:
             return  # only the first state is good, and its rows are not rewound
         step = self.simulation.step
-        # When states are stored must not depend on the speed of steps: runs return to them.
+        # The schedule must not depend on the speed of steps: runs return to these states.
         often = step % self.simulation.states_every == 0 or step == self.first_step + 1
         often |= not self.simulation.repeats_steps
         if often and step != self.point.step and self.simulation.energy_watch.grown_little():
@@ -90,7 +90,6 @@ class RollBack:
         return choice == CONTINUE
 
     def act_between_steps(self) -> None:
-        """Call the fixes that act after the present step; deletions are permanent."""
         step = self.simulation.step
         due = [fix for fix in self.hub.fixes.values() if fix.every and step % fix.every == 0]
         if sum(fix.between_steps() for fix in due):
@@ -102,8 +101,8 @@ class RollBack:
 
     def _halve_step(self, status: int) -> None:
         simulation, point = self.simulation, self.point
-        found = self._explained(status)
-        # Rows of log and dumps written since are removed with their states.
+        trouble = self._explained(status)
+        # Later rows of log and dumps are removed.
         point.return_to(simulation, cut=True)
         while point.halvings < HALVINGS:
             point.halvings += 1
@@ -111,18 +110,19 @@ class RollBack:
             if not simulation.steps.above_limit():  # steps above it would fail again
                 break
         self.hub.warn(
-            f"{found.message}. Back to {when(simulation)}, with 1/{2**point.halvings} of the step",
+            f"{trouble.message}. Back to {when(simulation)}, "
+            f"with 1/{2**point.halvings} of the step",
             place=self.place,
-            code=found.code,
-            cause=found.cause,
+            code=trouble.code,
+            cause=trouble.cause,
         )
         if status == DONE:
             point.returns += 1
             simulation.energy_watch.forget_growth()
 
     def _explained(self, status: int, too_large: bool = False) -> Trouble:
-        found = self.tell(lambda to: to.wrong(self.simulation, status, too_large))
-        return found or Trouble(
+        answer = self.tell(lambda to: to.wrong(self.simulation, status, too_large))
+        return answer or Trouble(
             f"a step failed ({when(self.simulation)})", self.simulation.remedy, "point"
         )
 
@@ -149,17 +149,18 @@ class RollBack:
         is good.
         """
         too_large = self.too_large and self.simulation.steps.too_large
-        found = self._explained(status, too_large)
+        trouble = self._explained(status, too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):
-            resume = self._keep_start(status) if too_large else self._keep_good(status, found.code)
+            keep = self._keep_start if too_large else self._keep_good
+            resume = keep(status, trouble.code)
             kind = Stopped
-        error = kind(found.message, place=found.place or self.place, hint=found.fix)
-        error.code, error.cause, error.resume = found.code, found.cause, resume
-        error.complete = found.place is not None
+        error = kind(trouble.message, place=trouble.place or self.place, hint=trouble.fix)
+        error.code, error.cause, error.resume = trouble.code, trouble.cause, resume
+        error.complete = trouble.place is not None
         raise error
 
-    def _keep_start(self, status: int) -> str:
+    def _keep_start(self, status: int, _: str) -> str:
         """Write the initial state of the run, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
@@ -199,7 +200,7 @@ class RollBack:
             before = watch.energy()
             good.again(simulation.advance, step)
             if path is None and watch.growth_since(before) > WITHIN:
-                # The watch averages over a hundred steps, and has not seen it yet.
+                # The watch averages over a hundred steps, and is late.
                 grown, path = True, self._write_before_growth(step)
                 good.again(simulation.advance, step)
         path = path or self._write_last_good()

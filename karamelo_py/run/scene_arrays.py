@@ -30,7 +30,7 @@ from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
-from karamelo_py.run.step_size import LastSteps
+from karamelo_py.run.step_size import CARRIED
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -107,7 +107,6 @@ class SceneArrays:
 
     @property
     def now(self) -> int:
-        """Index of the present one of the two position arrays."""
         return int(self.control.clock[0].now)
 
     @property
@@ -123,17 +122,16 @@ class SceneArrays:
         return int(self.control.values[TIMESTEP])
 
     def state(self) -> State:
-        """Return what a new lowering takes over."""
         self.domain.share_memory()
         laws, all_points = {}, self.points.rows()
         for block in self.setup.blocks:
             state = block.points.state
             rows = np.zeros((len(state), self.count), state.dtype)
-            for ids, own in all_points.of_all([(block.points.id, state)]):
-                rows[:, ids] = own
+            for ids, values in all_points.of_all([(block.points.id, state)]):
+                rows[:, ids] = values
             laws[without_rate(law_kind(block.laws))] = rows
-        found = (type(one) for block in self.setup.blocks for one in block.points.fields)
-        kept = [kind for kind in dict.fromkeys(found) if fields.is_kept(kind)]
+        kinds = (type(one) for block in self.setup.blocks for one in block.points.fields)
+        kept = [kind for kind in dict.fromkeys(kinds) if fields.is_kept(kind)]
         return State(
             self.count,
             self.present,
@@ -144,14 +142,14 @@ class SceneArrays:
             self.setup.grids,
             {type(one): one.array for one in self.setup.nodes.fields if fields.is_kept(type(one))},
             self.setup.contact,
-            LastSteps.of(self.control),
+            {name: float(self.control.clock[0][name]) for name in CARRIED},
         )
 
     def leaving(self) -> np.ndarray:
-        """Return the ids (0-based, ascending) of points whose new positions are outside."""
+        """Return the ids (ascending) of points whose new positions are outside."""
         s, then = self.setup, 1 - self.now
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
-        found = []
+        outside = []
         for block in s.blocks:
             points = block.points
             beyond, finite = np.zeros((2, points.id.size), np.bool_)
@@ -162,8 +160,8 @@ class SceneArrays:
                 a = (y - lower) * inv_h
                 beyond |= (a < -slack) | (a > size + slack)
                 finite &= np.isfinite(y)
-            found.append(points.id[beyond & finite])
-        return np.sort(np.concatenate(self.comm.allgather(np.concatenate(found))))
+            outside.append(points.id[beyond & finite])
+        return np.sort(np.concatenate(self.comm.allgather(np.concatenate(outside))))
 
     def taken_along(self, ids: np.ndarray) -> tuple[float, float, float]:
         """Count the energy of points as work; return mass, kinetic and stored energy."""

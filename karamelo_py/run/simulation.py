@@ -9,6 +9,7 @@ import numpy as np
 from numba import config
 
 from karamelo_py.kernels.arrays import Hooks, NoHooks, Setup, Tag
+from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, StepKind, advance, run_steps
 from karamelo_py.run.energy import EnergyWatch
 from karamelo_py.run.light_nodes import stable_share
@@ -76,7 +77,6 @@ class Simulation(SceneArrays):
         return self.hub.update.scheme.traits.inertia
 
     def begin(self, end_time: float) -> None:
-        """Start a run that ends at `end_time` at the latest: set initial values, choose dt."""
         self.steps.begin(end_time)
         begun_before = len(self.begun)
         self._make_ready()
@@ -92,19 +92,19 @@ class Simulation(SceneArrays):
         self.steps.measured = self.energy_watch.followed = False
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
-        """Return the largest velocity component of all points, relative to a common velocity."""
+        """Return the largest velocity component, relative to a common velocity."""
         velocities = (block.points.v for block in self.setup.blocks)
         # No copy of them: there may be millions.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
-        own = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
-        return float(self.comm.allreduce_max(np.array([own], float))[0])
+        largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
+        return float(self.comm.allreduce_max(np.array([largest], float))[0])
 
     def in_tiles(self) -> bool:
         """Return True if all points are in the ranges of their tiles: were sorted."""
-        own = 0
+        unsorted = 0
         for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
-            own += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
-        return not self.comm.allreduce(np.array([own]))[0]
+            unsorted += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
+        return not self.comm.allreduce(np.array([unsorted]))[0]
 
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
         """Delete points (ascending ids); the ids of the others stay. Return their mass and energy.
@@ -188,7 +188,6 @@ class Simulation(SceneArrays):
         """Refuse a scene that cannot run here: none."""
 
     def compile(self) -> None:
-        """Compile the loop over the steps now, rather than in the middle of a log."""
         hooks = self._acting
         if config.DISABLE_JIT or isinstance(hooks, ActingFixes):
             return
@@ -198,7 +197,8 @@ class Simulation(SceneArrays):
         self.fixes = FixesOfRun.of(self)
         lasting = self.fixes.lasting
         self.hooks, self._called = lasting.compiled, self._hooks_to_call()
-        self.visits = Staged() if lasting.staged else Fused()
+        names = {name for fix in lasting.fixes for name in fix.hooks()}
+        self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
             # Nothing precedes this hook in a step: the output shows its state from the start.
             self._set_initial(fix)

@@ -190,7 +190,6 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
 
 def fastest_wave(simulation: Backend) -> float:
-    """Return the fastest wave speed of the undeformed materials, without viscosity."""
     return max(elastic_speed(simulation, solid)[0] for solid in simulation.hub.solids.values())
 
 

@@ -29,17 +29,8 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.traits import USUAL
 from karamelo_py.script.errors import ScriptError
 
+CARRIED = ("last_dt", "last_contact_dt", "path")  # from one lowering to the next
 FAR = 1e9  # cells, further than points ever move
-
-
-class LastSteps(NamedTuple):
-    last_dt: float
-    last_contact_dt: float
-    path: float  # of the points, in cells
-
-    @classmethod
-    def of(cls, control: Control) -> LastSteps:
-        return cls(*(float(control.clock[0][name]) for name in cls._fields))
 
 
 class StepPolicy(NamedTuple):
@@ -76,11 +67,11 @@ class StepPolicy(NamedTuple):
         }
 
 
-def set_up(control: Control, hub: Hub, transfer: Tag, last: LastSteps | None) -> None:
+def set_up(control: Control, hub: Hub, transfer: Tag, last: dict[str, float]) -> None:
     """Set the clock of new arrays, which continues after the `last` steps."""
     clock = control.clock[0]
-    if last is not None:
-        clock.last_dt, clock.last_contact_dt, clock.path = last
+    for name, value in last.items():
+        clock[name] = value
     clock.spacing = min(lattice.h for lattice in hub.lattices)
     clock.heat_limit = clock.heat_reference = stable_conduction(hub)
     clock.kept = flip_coefficient(transfer)
@@ -98,7 +89,6 @@ class StepSize:
         self.measured = False  # clock.rate belongs to the present state
 
     def begin(self, end_time: float) -> None:
-        """Choose a first step, which initial values may use; the run ends at `end_time`."""
         self.policy = StepPolicy.of(self.simulation.hub)
         self._ask(0)
         self.clock.end_time = end_time
@@ -106,13 +96,7 @@ class StepSize:
         self._choose()
 
     def begun(self) -> None:
-        """Choose the first step again: initial values may have changed the fastest point.
-
-        Raises
-        ------
-        ScriptError
-            If nothing limits the step, or a velocity is not finite.
-        """
+        """Choose the first step again: initial values may have changed the fastest point."""
         simulation, clock = self.simulation, self.clock
         in_hundred_steps = 100 * simulation.fastest() * clock.courant * clock.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * clock.rate:

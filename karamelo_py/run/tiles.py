@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from math import inf
-from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import addresses_of_rows
+from karamelo_py.compiler.fields import SummedField, addresses_of_rows
 from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.compiler.threads import Serial, Threaded
 from karamelo_py.kernels import arrays as kernel_arrays
 from karamelo_py.kernels import sorting
+from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import first_node, shape_size
@@ -25,7 +25,7 @@ NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # times, along the rows of nodes in 3D, if cells have one point: otherwise boxes have
 #             more nodes than points, and many tiles have few points
 SHARES = 64  # parts of the points of a block, nearly equal, divided among threads
-# Times the nodes: boxes that cannot have more rows are allocated at once, aligned with cache lines;
+# Limit over the nodes: boxes with fewer rows are allocated at once, aligned with cache lines;
 # untouched pages cost no memory. Larger ones grow.
 AT_ONCE = 8
 DIRECT_UP_TO = 2000  # points; clearing and summing boxes costs more than threads save
@@ -45,7 +45,7 @@ class Tiles:
     threads = 1  # for sums at nodes and for sorting
     mode: Serial | Threaded = Serial()
 
-    def __init__(self, lattices: Sequence[Lattice], basis: Any, points: int, sparse: bool):
+    def __init__(self, lattices: Sequence[Lattice], basis: Tag, points: int, sparse: bool):
         self.direct = points <= DIRECT_UP_TO  # points scatter directly to the nodes, by tile
         self.dimension = d = lattices[0].dimension
         # Cells of a tile of points, nodes of a tile of nodes, by direction.
@@ -105,18 +105,17 @@ class Tiles:
     def empty_buffers(self, nodes: kernel_arrays.Nodes, blocks: int) -> kernel_arrays.Buffers:
         most = blocks * self._most_rows
         rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
-        given = tuple(one for one in nodes.fields if getattr(type(one), "summed", False))
-        of = nodes._replace(fields=given)
+        summed_fields = tuple(one for one in nodes.fields if isinstance(one, SummedField))
+        of = nodes._replace(fields=summed_fields)
         if not self.direct:
             of = kernel_arrays.Nodes(
                 *(grid_boxes.room_of(rows, array) for array in of[:-1]),
-                tuple(type(one)(grid_boxes.room_of(rows, one.array)) for one in given),
+                tuple(type(one)(grid_boxes.room_of(rows, one.array)) for one in summed_fields),
             )
         self.sets += 1
         return kernel_arrays.Buffers(of, *self._layout, self.sets - 1)
 
     def empty_nodes(self, s: kernel_arrays.Setup) -> None:
-        """Zero the sums of points at the nodes in use."""
         _empty(s, grid_boxes.used(s.spans)[1:])
         if not self.direct:
             for one in grid_boxes.buffers_of(s):
@@ -156,7 +155,7 @@ class Tiles:
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
-        beyond = far + drift + getattr(type(s.contact), "looks_beyond", 0)
+        beyond = far + drift + grid_boxes.beyond(s.contact)
         return beyond if far < cells else cells  # also for NaN
 
     def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
@@ -179,7 +178,7 @@ class Tiles:
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
             parts, mode = 1, Serial()
-        found = sorting.SortedOrder(
+        result = sorting.SortedOrder(
             width=lanes_for(8 * x.itemsize).width,
             ends=np.empty((parts, self.count), np.int64),
             share=np.empty(parts + 1, np.int64),
@@ -194,8 +193,8 @@ class Tiles:
         around = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
         kin, of, ids = planar(s.kin), points.grid, points.id
         rows = addresses_of_rows(array for _, array in kernel_arrays.arrays_of(points))
-        sorting.sort_points(mode, kin, s.grids, around, self._cut, x, of, ids, found, rows)
-        ends = found.ends[-1]
+        sorting.sort_points(mode, kin, s.grids, around, self._cut, x, of, ids, result, rows)
+        ends = result.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
         count = len(occupied)
@@ -205,7 +204,7 @@ class Tiles:
         tiling.range[:count] = np.stack([begins[occupied], ends[occupied]], axis=1)
         tiling.share[:] = shares_of(tiling.range[:count], shares, len(tiling.share))
         tiling.grid[:count] = np.searchsorted(self.first, occupied, side="right") - 1
-        tiling.box[:count] = np.concatenate(found.boxes[:, occupied], axis=1)
+        tiling.box[:count] = np.concatenate(result.boxes[:, occupied], axis=1)
         if self._most_in_box:
             sorting.find_rows(mode, parts, s.kin, s.grids, around, x, tiling, parts)
         return occupied
@@ -213,17 +212,16 @@ class Tiles:
     def box_bytes(self, s: kernel_arrays.Setup) -> int:
         if self.direct:
             return 0
-        given = [
+        summed_arrays = [
             array for one in grid_boxes.buffers_of(s) for array in grid_boxes.summed(one.nodes)
         ]
-        return self.rows * sum(array.itemsize * array.shape[1] for array in given)
+        return self.rows * sum(array.itemsize * array.shape[1] for array in summed_arrays)
 
     def lay_out(self, s: kernel_arrays.Setup) -> None:
-        """Lay out the boxes of all blocks, and find the tiles of nodes that they reach."""
-        spans, *found = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
-        s.buffers.count[:] = len(found[1]) - 1, self.direct
+        spans, *parts = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
+        s.buffers.count[:] = len(parts[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
-        for room, rows in zip((s.spans, s.ranges, *s.buffers[2:4]), (spans, *found), strict=True):
+        for room, rows in zip((s.spans, s.ranges, *s.buffers[2:4]), (spans, *parts), strict=True):
             grid_boxes.grow(room, len(rows))
             room[: len(rows)] = rows
 
@@ -289,14 +287,14 @@ class Tiles:
 
     def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
         """Return the set of each own tile, of the points of its block."""
-        found = []
+        sets = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count
             share = np.empty(tiles, np.int64)
             sizes = np.diff(block.tiling.share[: shares + 1])
             share[block.tiling.order[:tiles]] = np.repeat(np.arange(shares) % SHARES, sizes)
-            found.append(share)
-        return np.concatenate(found)
+            sets.append(share)
+        return np.concatenate(sets)
 
     def _boxes(self, s: kernel_arrays.Setup) -> grid_boxes.Boxes:
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
@@ -382,7 +380,7 @@ def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
-    `parts` (n, 10) has all used nodes of each tile (see `Buffers`). A set gets the tiles whose
+    `parts` (n, 10) are the used nodes of each tile (see `Buffers`). A set gets the tiles whose
     middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same number
     in `beside` (n,) get the set of the first of them.
     """
@@ -394,7 +392,6 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
 
 
 def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
-    """Return names and numbers of rows of the arrays of a tiling that a sort changes."""
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
     return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]

@@ -4,28 +4,34 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from types import EllipsisType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, rows_of_points
 from karamelo_py.compiler.tuples import flat
-from karamelo_py.kernels.arrays import Nodes, Points, Tiling, arrays_of
+from karamelo_py.kernels.arrays import Nodes, Points, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import numbers, used
 from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling, stripped, work_of
 from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
+if TYPE_CHECKING:
+    import h5py
+
 ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 
-# Name and shape of an array, where in it something belongs, and that.
-Stored = tuple[str, tuple[int, ...], Any, np.ndarray]
+# Name and shape of an array, the index of a piece of it, and the piece.
+Index = EllipsisType | slice | tuple
+Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
-def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
+def changing(simulation: Backend) -> Iterator[tuple[str, np.ndarray]]:
     """Yield every array, as far as it is in use, that a step changes and the next one needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
@@ -39,26 +45,26 @@ def changing(simulation: Any) -> Iterator[tuple[str, np.ndarray]]:
     for k, block in enumerate(s.blocks):
         now = s.control.clock[0].now  # known once the clock is put back
         for name, array in arrays_of(block.points):
-            # The other places belong to the step before, and to no failed step.
+            # The other positions belong to the step before.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
 
 
-def copied(simulation: Any, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def copied(simulation: Backend, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Copy the state and the published values, reusing the arrays of `before`."""
-    found = {}
-    # One array after another: where points have come or gone none is there twice.
+    copies = {}
+    # One array after another: if the number of points changed, none exists twice.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
             del copy
             copy = np.empty_like(array)
         copy[...] = array
-        found[name] = copy
-    return found | touched(simulation)
+        copies[name] = copy
+    return copies | touched(simulation)
 
 
-def touched(simulation: Any) -> dict[str, np.ndarray]:
-    """List the nodes where contact acted lately, and what it remembers of them.
+def touched(simulation: Backend) -> dict[str, np.ndarray]:
+    """Return the nodes where contact acted lately, and its memory of them.
 
     Liquids may return to nodes that are not in use now. Processes list the nodes in use.
     """
@@ -72,8 +78,8 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
     found = []
     for first, rows in zip(spans[:, 0], remembered_at(simulation, spans), strict=True):
         recent = (rows != 0) & (np.abs(rows) > simulation.step - steps)
-        there = np.flatnonzero(recent.any(axis=1))
-        found.append((first + there, np.where(recent[there], rows[there], 0)))
+        indices = np.flatnonzero(recent.any(axis=1))
+        found.append((first + indices, np.where(recent[indices], rows[indices], 0)))
     nodes, rows = (np.concatenate(parts) for parts in zip(*found, strict=True))
     if simulation.domain.parted:
         counted = np.isin(nodes, simulation.nodes.counted())
@@ -81,7 +87,7 @@ def touched(simulation: Any) -> dict[str, np.ndarray]:
     return {"touched/nodes": nodes, "touched/rows": rows}
 
 
-def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
+def stored(simulation: Backend, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
     """Yield the content of a restart file for the present state, or for the `kept` one.
 
     Collective; the first process gets the arrays, with the bits and in the order of a serial run.
@@ -97,22 +103,21 @@ def stored(simulation: Any, kept: dict[str, np.ndarray] | None = None) -> Iterat
     yield from _shown_by_nodes(simulation)
 
 
-def _shown_by_nodes(simulation: Any) -> Iterator[Stored]:
-    """Yield the nodes with nonzero values, by number, and their rows, in pieces."""
-    comm, own = simulation.comm, simulation.nodes.counted()
-    found = np.zeros(len(own), np.bool_)
+def _shown_by_nodes(simulation: Backend) -> Iterator[Stored]:
+    comm, counted = simulation.comm, simulation.nodes.counted()
+    nonzero = np.zeros(len(counted), np.bool_)
     for _, array in of_nodes(simulation.setup):
-        for first in range(0, len(own), PIECE):  # no copy of all of them
-            some = slice(first, first + PIECE)
-            found[some] |= array[own[some]].any(axis=1)
-    numbers = comm.gather(own[found])
-    if numbers is not None:
-        numbers = np.sort(np.concatenate(numbers))
-        yield from wholes({"node numbers": numbers})
-    total = comm.bcast(numbers is not None and len(numbers))
+        for first in range(0, len(counted), PIECE):  # no copy of all of them
+            piece = slice(first, first + PIECE)
+            nonzero[piece] |= array[counted[piece]].any(axis=1)
+    parts = comm.gather(counted[nonzero])
+    of_all = np.sort(np.concatenate(parts or [counted[:0]]))
+    if parts is not None:
+        yield from wholes({"node numbers": of_all})
+    total = comm.bcast(len(of_all))
     for first in range(0, total, PIECE):
         where = slice(first, min(first + PIECE, total))
-        nodes = comm.bcast(numbers is not None and numbers[where])
+        nodes = comm.bcast(of_all[where])
         for name, array in (rows_at(simulation, nodes, comm.gather) or {}).items():
             yield name, (total, *array.shape[1:]), where, array + 0
 
@@ -129,36 +134,39 @@ def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
         yield name, array.shape, ..., array
 
 
-def known(simulation: Any) -> dict[str, np.ndarray]:
+def known(simulation: Backend) -> dict[str, np.ndarray]:
     return {"present": simulation.present, "shown": np.array(simulation.flags)}
 
 
 class InFile:
-    def __init__(self, data: Any):
+    def __init__(self, data: "h5py.Dataset"):
         self._data = data
         self.shape, self.dtype, self.size = data.shape, data.dtype, data.size
 
     def __len__(self) -> int:
         return self.shape[0]
 
-    def __getitem__(self, where: Any) -> Any:
+    def __getitem__(self, where: Index) -> Any:
         with reading():
             return self._data[where]
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        # At once, where NumPy would ask for one number after the other.
+    def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
+        # At once: NumPy would read one number after the other.
         return np.asarray(self[()], dtype)
+
+
+ArraysByName = Mapping[str, np.ndarray | InFile]
 
 
 @contextmanager
 def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
     import h5py
 
-    found: dict[str, InFile] = {}
+    arrays: dict[str, InFile] = {}
 
-    def note(name: str, item: Any) -> None:
+    def note(name: str, item: object) -> None:
         if hasattr(item, "shape"):
-            found[name] = InFile(item)
+            arrays[name] = InFile(item)
 
     with reading():
         root = h5py.File(path, "r", locking=False)
@@ -168,7 +176,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
                 root[group].visititems(note)
             except (RuntimeError, KeyError, ValueError) as error:
                 raise OSError(str(error)) from error
-        yield found
+        yield arrays
 
 
 @contextmanager
@@ -183,9 +191,9 @@ def reading() -> Iterator[None]:
         ) from error
 
 
-def restore(simulation: Any, state: Mapping[str, Any]) -> None:
+def restore(simulation: Backend, state: ArraysByName) -> None:
     s = simulation.setup
-    # Nodes that were not in use then have to be empty, as they were.
+    # Nodes that were not in use in the state must be empty.
     simulation.tiles.empty_nodes(s)
     blocks = []
     for k, block in enumerate(s.blocks):
@@ -198,7 +206,7 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        # The lay-out has put the tiles first that other processes wait for.
+        # The lay-out has ordered the tiles for other processes.
         if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:
@@ -207,24 +215,24 @@ def restore(simulation: Any, state: Mapping[str, Any]) -> None:
         s.control.values[:] = state["values"]
     for memory in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
         memory[memory != 0] = 0
-        if "touched/nodes" in state:  # a process that has no points has no nodes in use, either
+        if "touched/nodes" in state:  # a process without points has no nodes in use
             memory[state["touched/nodes"][()]] = state["touched/rows"]
     simulation.changed()
 
 
-def take_snapshot(simulation: Any, path: Path) -> dict[str, np.ndarray]:
-    with opened(path, "good") as found:
-        check_numbers(simulation, found)
+def take_snapshot(simulation: Backend, path: Path) -> dict[str, np.ndarray]:
+    with opened(path, "good") as arrays:
+        check_numbers(simulation, arrays)
         if simulation.domain.parted:
-            return dict(simulation.domain.own_part(found))
-        # In the order in which copies are made, and written.
-        names = [*(name for name, _ in changing(simulation)), "values", *found]
-        return {name: found[name][()] for name in dict.fromkeys(names)}
+            return dict(simulation.domain.own_part(arrays))
+        # In the order in which copies are made and written.
+        names = [*(name for name, _ in changing(simulation)), "values", *arrays]
+        return {name: arrays[name][()] for name in dict.fromkeys(names)}
 
 
-def take_stored(simulation: Any, path: Path) -> None:
+def take_stored(simulation: Backend, path: Path) -> None:
     with opened(path) as state, simulation.comm.joint():
-        # Nothing of the arrays changes where the file is of another scene.
+        # Arrays must not change if the file belongs to another scene.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
         check_numbers(simulation, state)
@@ -235,23 +243,23 @@ def take_stored(simulation: Any, path: Path) -> None:
         _take_nodes(simulation, state)
 
 
-def _take_nodes(simulation: Any, state: Mapping[str, Any]) -> None:
-    own = numbers(simulation.setup.spans)
+def _take_nodes(simulation: Backend, state: ArraysByName) -> None:
+    counted = numbers(simulation.setup.spans)
     used = np.zeros(simulation.hub.fields.node_count, np.bool_)
-    used[own] = True
-    nodes = state["node numbers"][()] if "node numbers" in state else own[:0]
+    used[counted] = True
+    nodes = state["node numbers"][()] if "node numbers" in state else counted[:0]
     for name, array in of_nodes(simulation.setup):
-        array[own] = 0
-        like = np.broadcast_to(array[:1], (len(nodes), *array.shape[1:]))
+        array[counted] = 0
+        row = np.broadcast_to(array[:1], (len(nodes), *array.shape[1:]))
         if len(nodes):
-            _checked(state, name, like, read=False)
+            _checked(state, name, row, read=False)
         for first in range(0, len(nodes), PIECE):
-            some = nodes[first : first + PIECE]
-            here = used[some]
-            array[some[here]] = state[name][first : first + PIECE][here]
+            piece = nodes[first : first + PIECE]
+            here = used[piece]
+            array[piece[here]] = state[name][first : first + PIECE][here]
 
 
-def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
+def of_nodes(s: Setup) -> Iterator[tuple[str, np.ndarray]]:
     for kind, nodes in (
         ("nodes", s.nodes),
         ("heat", s.heat.nodes if isinstance(s.heat, Conducting) else None),
@@ -264,66 +272,70 @@ def of_nodes(s: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield f"{kind}/{name_of(type(one))}", one.array
 
 
-def kept_at_nodes(s: Any) -> list[tuple[str, np.ndarray]]:
+def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
     return [(name_of(type(one)), one.array) for one in s.nodes.fields if is_kept(type(one))]
 
 
-def rows_at(simulation: Any, nodes: np.ndarray, gather: Callable) -> dict[str, np.ndarray] | None:
+def rows_at(
+    simulation: Backend, nodes: np.ndarray, gather: Callable
+) -> dict[str, np.ndarray] | None:
     """Gather rows of all arrays of nodes (ascending numbers), zero if not in use; or None."""
     counted, kinds = simulation.nodes.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
     here = here[np.isin(here, nodes, assume_unique=True)]
-    found = gather((here, [array[here] for array in kinds.values()]))
-    if found is None:
+    parts = gather((here, [array[here] for array in kinds.values()]))
+    if parts is None:
         return None
     rows = {name: np.zeros((len(nodes), *a.shape[1:]), a.dtype) for name, a in kinds.items()}
-    for there, some in found:
-        for array, of in zip(rows.values(), some, strict=True):
-            array[np.searchsorted(nodes, there)] = of
+    for nodes_there, rows_there in parts:
+        for array, of in zip(rows.values(), rows_there, strict=True):
+            array[np.searchsorted(nodes, nodes_there)] = of
     return rows
 
 
-def take_tiling(tiling: Tiling, found: Mapping[str, np.ndarray], stem: str) -> Tiling:
+def take_tiling(tiling: Tiling, arrays: Mapping[str, np.ndarray], stem: str) -> Tiling:
     for name, _ in in_use(tiling):
-        array, there = getattr(tiling, name), found.get(stem + name)
-        if there is None or len(there) > len(array):
+        array, stored_array = getattr(tiling, name), arrays.get(stem + name)
+        if stored_array is None or len(stored_array) > len(array):
             raise _misfit(stem + name)
-        array[: len(there)] = there
+        array[: len(stored_array)] = stored_array
     return tiling
 
 
-def take_points(points: Points, found: Mapping[str, Any], stem: str) -> Points:
-    """Return points in the order and number of the arrays, reusing arrays that fit."""
-    check_points(points, found, stem)
-    own: dict[str, Any] = {
-        name: None if array is None else as_rows_of_points(found[stem + name])
+def take_points(points: Points, arrays: ArraysByName, stem: str) -> Points:
+    check_points(points, arrays, stem)
+    columns: dict[str, Any] = {
+        name: None if array is None else as_rows_of_points(arrays[stem + name])
         for name, array in points._asdict().items()
         if name != "fields"
     }
-    if own["x"].ndim < points.x.ndim:
-        own["x"] = as_rows_of_points(np.stack([own["x"]] * len(points.x)))
+    if columns["x"].ndim < points.x.ndim:
+        columns["x"] = as_rows_of_points(np.stack([columns["x"]] * len(points.x)))
     declared = (
-        type(one)(as_rows_of_points(found[stem + name_of(type(one))])) for one in points.fields
+        type(one)(as_rows_of_points(arrays[stem + name_of(type(one))])) for one in points.fields
     )
-    return Points(**own, fields=tuple(declared))
+    return Points(**columns, fields=tuple(declared))
 
 
-def check_points(points: Points, found: Mapping[str, Any], stem: str) -> None:
-    """Refuse arrays that do not fit such points; positions may be only the present ones."""
-    likes = dict(arrays_of(points))
-    there = {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
-    for name in likes.keys() ^ there.keys():
+def check_points(points: Points, arrays: ArraysByName, stem: str) -> None:
+    expected_arrays = dict(arrays_of(points))
+    stored_arrays = {
+        n.removeprefix(stem): array for n, array in arrays.items() if n.startswith(stem)
+    }
+    for name in expected_arrays.keys() ^ stored_arrays.keys():
         raise _misfit(f"{name} of points")
-    for name, like in likes.items():
-        array = there[name]
-        like = like[0] if name == "x" and len(array.shape) == 2 else like
-        if array.dtype != like.dtype or array.shape != (*like.shape[:-1], there["id"].size):
+    for name, expected in expected_arrays.items():
+        array = stored_arrays[name]
+        expected = expected[0] if name == "x" and len(array.shape) == 2 else expected
+        if array.dtype != expected.dtype or array.shape != (
+            *expected.shape[:-1],
+            stored_arrays["id"].size,
+        ):
             raise _misfit(f"{name} of points")
 
 
-def check_numbers(simulation: Any, found: Mapping[str, Any]) -> None:
-    """Refuse numbers of points, materials, grids and nodes that the scene does not have."""
+def check_numbers(simulation: Backend, arrays: ArraysByName) -> None:
     s, count = simulation.setup, simulation.hub.fields.node_count
     ends = {"node numbers": count, "touched/nodes": count}
     for k, block in enumerate(s.blocks):
@@ -331,12 +343,12 @@ def check_numbers(simulation: Any, found: Mapping[str, Any]) -> None:
         ends[points + "material"] = len(flat(block.laws)[0])
         ends[points + "id"] = simulation.count
         ends[points + "grid"] = ends[tiling + "grid"] = len(s.grids.x0)
-        # Points that went since the last sort are in the ranges still; the next step sorts first.
-        sorted_since = np.isfinite(np.asarray(found["clock"][()])["drift"]).all()
-        number = found[points + "id"].size if sorted_since else simulation.count
+        # Points deleted since the last sort are still in the ranges; the next step sorts first.
+        sorted_since = np.isfinite(np.asarray(arrays["clock"][()])["drift"]).all()
+        number = arrays[points + "id"].size if sorted_since else simulation.count
         ends[tiling + "range"] = number + 1
-    for name in ends.keys() & found.keys():
-        array, end = found[name], ends[name]
+    for name in ends.keys() & arrays.keys():
+        array, end = arrays[name], ends[name]
         for first in range(0, len(array), PIECE):
             some = array[first : first + PIECE]
             if some.min() < 0 or some.max() >= end:
@@ -345,12 +357,12 @@ def check_numbers(simulation: Any, found: Mapping[str, Any]) -> None:
                 )
 
 
-def remembered_at(simulation: Any, spans: np.ndarray) -> list[np.ndarray]:
+def remembered_at(simulation: Backend, spans: np.ndarray) -> list[np.ndarray]:
     return simulation.hub.update.method.remembered(simulation.setup.contact, spans)
 
 
-def _checked(found: Mapping[str, Any], name: str, like: np.ndarray, *, read: bool = True) -> Any:
-    there = found.get(name)
+def _checked(arrays: ArraysByName, name: str, like: np.ndarray, *, read: bool = True) -> Any:
+    there = arrays.get(name)
     if there is None or there.shape != like.shape or there.dtype != like.dtype:
         raise _misfit(name)
     return there[()] if read else None
@@ -366,16 +378,15 @@ def _misfit(what: str) -> ScriptError:
 # --- of several processes -------------------------------------------------------------------------
 
 
-def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
+def _joined(simulation: Backend, own: dict[str, np.ndarray]) -> Iterator[Stored]:
     s, comm = simulation.setup, simulation.comm
-    parts = comm.gather(
-        {
-            "tiling": [stripped(own, f"tiling/{k}/") for k in range(len(s.blocks))],
-            "work": own["work"].copy(),
-            "touched": stripped(own, "touched/"),
-        }
-    )
-    # Tiles as of one process.
+    state: dict[str, Any] = {
+        "tiling": [stripped(own, f"tiling/{k}/") for k in range(len(s.blocks))],
+        "work": own["work"].copy(),
+        "touched": stripped(own, "touched/"),
+    }
+    parts = comm.gather(state)
+    # Tiles as in a serial run.
     tilings = [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks]
     rows: dict[str, np.ndarray] = {}
     for k, tiling in enumerate(tilings if parts is not None else ()):
@@ -399,18 +410,17 @@ def _joined(simulation: Any, own: dict[str, np.ndarray]) -> Iterator[Stored]:
 def points_of_tiles(
     tiling: dict[str, np.ndarray], arrays: list[np.ndarray], first: int, end: int
 ) -> dict[str, Any]:
-    """Return own points in tiles with numbers in [first, end), and their ranges."""
-    own = slice(*np.searchsorted(tiling["number"], (first, end)))
-    ranges = tiling["range"][own]
+    chosen = slice(*np.searchsorted(tiling["number"], (first, end)))
+    ranges = tiling["range"][chosen]
     points = slice(ranges[0, 0], ranges[-1, 1]) if len(ranges) else slice(0, 0)
     return {
-        "number": tiling["number"][own], "range": ranges, "count": [len(ranges)],
+        "number": tiling["number"][chosen], "range": ranges, "count": [len(ranges)],
         "points": [array[..., points] for array in arrays],
     }  # fmt: skip
 
 
 def _points(
-    simulation: Any, k: int, tiling: Tiling, own: dict[str, np.ndarray]
+    simulation: Backend, k: int, tiling: Tiling, own: dict[str, np.ndarray]
 ) -> Iterator[Stored]:
     comm = simulation.comm
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
@@ -445,7 +455,7 @@ def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
     return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
 
 
-def own_share(simulation: Any, state: Mapping, costs: np.ndarray) -> dict[str, np.ndarray]:
+def own_share(simulation: Backend, state: ArraysByName, costs: np.ndarray) -> dict[str, np.ndarray]:
     """Read the own part of the state in a file, after cutting its tiles for the processes."""
     blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
     tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]
@@ -453,23 +463,23 @@ def own_share(simulation: Any, state: Mapping, costs: np.ndarray) -> dict[str, n
     before = tiles.owner
     tiles.share_out(work_of(tiles.loads(whole), costs))
     owner, tiles.owner = tiles.owner, before
-    found = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith(EACH_HAS)}
+    result = {n: state[n][()] for n in state if n in ALL_HAVE or n.startswith(EACH_HAS)}
     if not comm.leads:
-        found["work"] = np.zeros_like(found["work"])
+        result["work"] = np.zeros_like(result["work"])
     for k, tiling in enumerate(tilings):
         points, of_tiles = share_of_tiling(k, tiling, owner == comm.rank)
         if not tiling.count[0]:  # not sorted yet: an equal range
             count = state[f"points/{k}/id"].size
             points = np.arange(count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size)
         names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]
-        found |= of_tiles | {name: _chosen(state[name], points) for name in names}
-    return found | {"owner": owner}
+        result |= of_tiles | {name: _chosen(state[name], points) for name in names}
+    return result | {"owner": owner}
 
 
-def _chosen(array: Any, points: np.ndarray) -> np.ndarray:
-    found = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
+def _chosen(array: np.ndarray | InFile, points: np.ndarray) -> np.ndarray:
+    rows = rows_of_points((*array.shape[:-1], len(points)), array.dtype)
     for begin in range(0, array.shape[-1], PIECE):
-        own = slice(*np.searchsorted(points, (begin, begin + PIECE)))
-        if own.start < own.stop:
-            found[..., own] = array[..., begin : begin + PIECE][..., points[own] - begin]
-    return found
+        piece = slice(*np.searchsorted(points, (begin, begin + PIECE)))
+        if piece.start < piece.stop:
+            rows[..., piece] = array[..., begin : begin + PIECE][..., points[piece] - begin]
+    return rows

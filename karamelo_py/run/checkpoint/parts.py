@@ -25,6 +25,7 @@ import numpy as np
 
 from karamelo_py.kernels.step import DONE
 from karamelo_py.language.faults import fault
+from karamelo_py.run.backend import Backend
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -38,7 +39,7 @@ class PartStates(NamedTuple):
     """The memories of parts at one state, as JSON knows them, and the published values."""
 
     parts: dict[Key, dict[str, Any]]
-    arrays: list[np.ndarray]  # by the numbers that they have in it
+    arrays: list[np.ndarray]  # indexed by the numbers in `parts`
     values: dict[str, float]
 
     @classmethod
@@ -69,8 +70,7 @@ class PartStates(NamedTuple):
                 part.resumed()
 
 
-def named(part: Any, where: str = "remembers") -> tuple[str, ...]:
-    """Return the attributes that a part and its bases name in ``remembers`` or ``carries``."""
+def named(part: object, where: str = "remembers") -> tuple[str, ...]:
     return _named_by(type(part), where)
 
 
@@ -80,11 +80,11 @@ def _named_by(kind: type, where: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def parts_of(hub: Hub) -> Iterator[tuple[Key, Any]]:
+def parts_of(hub: Hub) -> Iterator[tuple[Key, object]]:
     return ((key, part) for key, part in _all_parts(hub) if named(part))
 
 
-def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
+def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
     yield ("update", "", ""), hub.update
     yield ("method", "", ""), hub.update.method
     for catalogue in hub.catalogues:
@@ -94,35 +94,35 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, Any]]:
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item
-    # The last one: what it shows is what the others remember.
+    # Last: it shows what the others remember.
     yield ("log", "", ""), hub.output.log
 
 
-def state_of(part: Any, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
+    memory: dict[str, Any] = {}
     for name in named(part):
         value = getattr(part, name)
         if named(value):
-            found[name] = {"part": state_of(value, arrays, grows=grows)}
+            memory[name] = {"part": state_of(value, arrays, grows=grows)}
         elif grows and type(value) is list:
-            found[name] = Grown(value, len(value), arrays)
+            memory[name] = Grown(value, len(value), arrays)
         else:
             try:
-                found[name] = plain(value, arrays)
+                memory[name] = plain(value, arrays)
             except TypeError as error:
                 who, place = type(part).__name__, getattr(part, "place", None)
                 why = fault(who, f"remembers: {name} is {error}", place)
-                found[name] = Unwritable(_copied(value), why)
-    return found
+                memory[name] = Unwritable(_copied(value), why)
+    return memory
 
 
-def give_state(part: Any, state: dict[str, Any], arrays: list[np.ndarray]) -> None:
+def give_state(part: object, state: dict[str, Any], arrays: list[np.ndarray]) -> None:
     for name in named(part):
-        kept, there = state.get(name, part), getattr(part, name)
+        kept, present = state.get(name, part), getattr(part, name)
         if isinstance(kept, dict) and "part" in kept:
-            if named(there):
-                give_state(there, kept["part"], arrays)
-        elif kept is not part and not named(there):
+            if named(present):
+                give_state(present, kept["part"], arrays)
+        elif kept is not part and not named(present):
             setattr(part, name, value_of(kept, arrays))
 
 
@@ -143,7 +143,7 @@ class Grown:
 class Unwritable:
     """A copy of Python values that no file can store, and the warning for them."""
 
-    kept: Any
+    kept: object
     fault: ScriptError
 
     def value(self) -> Any:
@@ -153,10 +153,10 @@ class Unwritable:
         raise self.fault
 
 
-def _copied(value: Any) -> Any:
+def _copied(value: object) -> Any:
     try:
         return copy.deepcopy(value)
-    except Exception:  # an object of anybody
+    except Exception:  # any object
         return value
 
 
@@ -167,12 +167,12 @@ def _generator(kind: str, state: dict) -> np.random.Generator:
 
 
 def _random_state(state: dict) -> np.random.RandomState:
-    found = np.random.RandomState()
-    found.set_state(state)
-    return found
+    generator = np.random.RandomState()
+    generator.set_state(state)
+    return generator
 
 
-# Kinds of data that JSON does not know: as arguments that it does, and what makes them anew.
+# Types that JSON does not know: functions to JSON arguments, and back.
 KINDS: dict[type, tuple[Callable, Callable]] = {
     tuple: (list, lambda *items: items),
     set: (list, lambda *items: set(items)),
@@ -190,7 +190,7 @@ KINDS: dict[type, tuple[Callable, Callable]] = {
 MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
-def plain(value: Any, arrays: list[np.ndarray]) -> Any:
+def plain(value: object, arrays: list[np.ndarray]) -> Any:
     """Return a value as JSON knows it; arrays are copied into `arrays` and numbered."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
@@ -205,7 +205,7 @@ def plain(value: Any, arrays: list[np.ndarray]) -> Any:
     return {kind.__name__: plain(KINDS[kind][0](value), arrays)}
 
 
-def value_of(kept: Any, arrays: list[np.ndarray]) -> Any:
+def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
     if isinstance(kept, (Grown, Unwritable)):
         return kept.value()
     if isinstance(kept, list):
@@ -228,7 +228,7 @@ class RollbackPoint:
     def parts(self) -> PartStates:
         return self._parts[self.step]
 
-    def keep(self, simulation: Any, *, forget: bool = True) -> None:
+    def keep(self, simulation: Backend, *, forget: bool = True) -> None:
         """Make the present state the last good one; `forget` the parts at other states."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
@@ -244,7 +244,7 @@ class RollbackPoint:
         if always or any(part.last_step == step for part in outputs):
             self._parts[step] = PartStates.of(self.hub)
 
-    def return_to(self, simulation: Any, *, cut: bool = False) -> None:
+    def return_to(self, simulation: Backend, *, cut: bool = False) -> None:
         """Return to that state; with `cut`, outputs are cut there and continue."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)

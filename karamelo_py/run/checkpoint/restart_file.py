@@ -10,7 +10,7 @@ import re
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
@@ -28,7 +28,10 @@ from karamelo_py.run.checkpoint.arrays import (
 )
 from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, parts_of
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Place, ScriptError
+
+if TYPE_CHECKING:
+    import h5py
 
 FORMAT, VERSION = "karamelo-py restart", 10
 OURS = "a file that restart or write_restart of karamelo-py has written"
@@ -39,20 +42,20 @@ CONTENT = (
 # HDF5 stores checksums of all but arrays from this version on; arrays have one as an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
-PIECE = 1 << 22  # bytes that are looked at together
+PIECE = 1 << 22  # bytes per read
 
 
 class Restarts(Rhythmic):
     """Writes restart files during a run; a first ``*`` in the name becomes the step number."""
 
-    place: Any = None
+    place: Place | None = None
     style = ""
 
     def __init__(self, hub: Hub, every: int | ByTime, file: Path):
         self.hub = hub
         self.every = every
         self.file = file
-        # What a run begins with can be had from the script.
+        # The initial state of a run needs no file.
         self.last_step = hub.update.step
 
     def write(self) -> None:
@@ -69,13 +72,13 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
     groups, point = {"state": stored(simulation)}, simulation.rollback if hub.in_run else None
     if point and point.halve and point.arrays:
-        # The last good state, where the run in progress may go back to it.
+        # The last good state, if the run may return to it.
         groups["good"] = stored(simulation, point.arrays)
     if comm.leads:
         _write(hub, path, within, point, groups)
     else:
-        for found in groups.values():
-            for _ in found:
+        for pieces in groups.values():
+            for _ in pieces:
                 pass
     comm.barrier()
     return path
@@ -119,10 +122,10 @@ def _write(hub: Hub, path: Path, within: bool, point: RollbackPoint | None, grou
             data.attrs[CHECKSUM] = _checksum(data, out)
 
 
-def _arrays_in(root: Any) -> list[Any]:
-    found: list[Any] = []
-    root.visititems(lambda _, item: found.append(item) if hasattr(item, "shape") else None)
-    return found
+def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
+    arrays: list[h5py.Dataset] = []
+    root.visititems(lambda _, item: arrays.append(item) if hasattr(item, "shape") else None)
+    return arrays
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
@@ -142,9 +145,9 @@ def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> 
             raise OSError(str(error)) from error
 
 
-def _checksum(data: Any, file: BinaryIO) -> int:
+def _checksum(data: "h5py.Dataset", file: BinaryIO) -> int:
     """Return the checksum of an array: of a piece of the file, unless it is compressed."""
-    begin, found, left = data.id.get_offset(), 0, data.id.get_storage_size()
+    begin, crc, left = data.id.get_offset(), 0, data.id.get_storage_size()
     if begin is None:
         return zlib.crc32(np.ascontiguousarray(data[()]))
     file.seek(begin)
@@ -152,13 +155,13 @@ def _checksum(data: Any, file: BinaryIO) -> int:
         piece = file.read(min(left, PIECE))
         if not piece:
             raise OSError(f"it ends within {data.name}")
-        found, left = zlib.crc32(piece, found), left - len(piece)
-    return found
+        crc, left = zlib.crc32(piece, crc), left - len(piece)
+    return crc
 
 
-def _put(group: Any, found: Iterator[Stored]) -> None:
-    begun: dict[str, Any] = {}
-    for name, shape, where, array in found:
+def _put(group: "h5py.Group", pieces: Iterator[Stored]) -> None:
+    begun: dict[str, h5py.Dataset] = {}
+    for name, shape, where, array in pieces:
         if array.shape == shape and array.size and name not in begun:
             group.create_dataset(name, data=array, track_times=False)  # in half the time
             continue
@@ -174,7 +177,7 @@ def is_restart(path: Path) -> bool:
     try:
         with h5py.File(path, "r", locking=False) as root:
             return root.attrs.get("format") == FORMAT
-    except (OSError, KeyError, TypeError):  # what HDF5 says of one that is damaged
+    except (OSError, KeyError, TypeError):  # a damaged file
         return False
 
 
@@ -210,10 +213,9 @@ class Restart:
             why = "" if "signature" in str(error) else f": {error}"
             raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
 
-    def presets(self, given: dict[str, str]) -> dict[str, str]:
-        """Return the variables of the command line that wrote the file; `given` must agree."""
+    def presets(self, requested: dict[str, str]) -> dict[str, str]:
         before = self.content["presets"]
-        for name, text in given.items():
+        for name, text in requested.items():
             if before.get(name) != text:
                 was = f"-var {name} {before[name]}" if name in before else f"no -var {name}"
                 raise ScriptError(
@@ -260,8 +262,8 @@ class Restart:
         import h5py
 
         with reading(), h5py.File(self.path, "r", locking=False) as root:
-            there = root.get(name, ())
-            arrays = [there[str(k)][()] for k in range(len(there))]
+            group = root.get(name, ())
+            arrays = [group[str(k)][()] for k in range(len(group))]
         return PartStates({tuple(key): state for *key, state in self.content[name]}, arrays, values)
 
 
@@ -269,11 +271,11 @@ def _latest(path: Path, out: Path | None) -> Path:
     if "*" not in path.name or path.exists():
         return path
     pattern = re.compile(re.escape(path.name).replace(r"\*", r"(\d+)", 1))
-    there = path.parent.iterdir() if path.parent.is_dir() else ()
-    found = [(int(match[1]), one) for one in there if (match := pattern.fullmatch(one.name))]
-    if not found:
+    files = path.parent.iterdir() if path.parent.is_dir() else ()
+    matches = [(int(match[1]), one) for one in files if (match := pattern.fullmatch(one.name))]
+    if not matches:
         raise _no_file(path, out)
-    return max(found)[1]
+    return max(matches)[1]
 
 
 def _no_file(path: Path, out: Path | None) -> ScriptError:
@@ -314,20 +316,20 @@ def described(hub: Hub) -> dict[str, str]:
 
 
 def check(hub: Hub, restart: Restart) -> None:
-    here, there = described(hub), restart.content["scene"]
-    for name in dict.fromkeys([*there, *here]):
-        mine, theirs = here.get(name), there.get(name)
-        # Points that leave may be deleted from there on.
+    here, stored = described(hub), restart.content["scene"]
+    for name in dict.fromkeys([*stored, *here]):
+        mine, theirs = here.get(name), stored.get(name)
+        # boundary(delete) may begin here.
         if mine == theirs or (name == "boundary" and "reflect" not in (mine, theirs)):
             continue
         if mine is None or theirs is None:
-            what = f"{name}, which {'is not here' if mine is None else 'it does not have'}"
+            difference = f"{name}, which {'is not here' if mine is None else 'it does not have'}"
         elif name.startswith("solid") and mine.rsplit(",")[0] == theirs.rsplit(",")[0]:
-            what = f"other points in {name}"
+            difference = f"other points in {name}"
         else:
-            what = f"{name} {theirs}; here it is {mine}"
+            difference = f"{name} {theirs}; here it is {mine}"
         raise ScriptError(
-            f"{restart.path} was written by another scene: {what}",
+            f"{restart.path} was written by another scene: {difference}",
             argument="file",
             expected="the same domain, method and solids as in the script that wrote it",
         )

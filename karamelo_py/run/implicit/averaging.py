@@ -1,5 +1,6 @@
 """F-bar in the equations of an implicit step."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ class AveragedVolumes:
         kin = equations.s.kin
         self.averages = [loops.nothing_averaged(kin, block) for block in equations.blocks]
 
-    def _parts(self) -> Any:
+    def _parts(self) -> Iterator[tuple]:
         e = self.equations
         return (
             (known_to_laws(block.points), block.laws, seen, response, averages)

@@ -2,11 +2,11 @@
 
 import importlib.util
 from collections.abc import Iterator
-from typing import Any
 
 from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import declared
 from karamelo_py.compiler.slopes import NoSlope
+from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity, initial_state
@@ -76,11 +76,13 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             for hook in fix.hooks()
             if hook not in (_MOMENTS + _OF_HEAT if own else _OF_PLUGINS)
         ]
-        if fix.prescribes_velocity or fix.first_step_only:
+        prescribes = fix.prescribes_velocity or fix.first_step_only
+        if prescribes:
             other = [hook for hook in other if hook != "post_velocities_to_grid"]
         if _of_rigid_points(hub, fix):
             other = [hook for hook in other if hook != "post_advance_particles"]
-        if "post_update_grid_state" in fix.hooks() and not _only_prescribes(fix):
+        only_prescribes = prescribes and fix.wall_friction is None
+        if "post_update_grid_state" in fix.hooks() and not only_prescribes:
             yield (
                 f"knows no fix {fix.style} that changes velocities by what they are",
                 f"fix velocity_nodes without leq, geq and friction, or {_EXPLICIT}",
@@ -127,7 +129,7 @@ def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
     return not any(fix.group.touches(solid) for solid in soft)
 
 
-def _bears_shear(law: Any, kin: Any) -> bool:
+def _bears_shear(law: Tag, kin: Tag) -> bool:
     """Return True if a law resists slow shear; in one dimension all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
@@ -136,10 +138,6 @@ def _bears_shear(law: Any, kin: Any) -> bool:
         return True
     shear = places.index((0, 1))
     return abs(C[shear][shear]) > 1e-12 * abs(C[0][0])
-
-
-def _only_prescribes(fix: Fix) -> bool:
-    return (fix.prescribes_velocity or fix.first_step_only) and fix.wall_friction is None
 
 
 def check(hub: Hub) -> None:

@@ -1,11 +1,9 @@
 """Conduction of heat in an implicit step, by the backward rule of Euler."""
 
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 
-from karamelo_py.kernels.arrays import MASS, of_force
+from karamelo_py.kernels.arrays import MASS, Tag, of_force
 from karamelo_py.kernels.heat import FLOW_TO_NODES, HOLD, WARM
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.kinematics import Line
@@ -14,7 +12,7 @@ from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
 
-def conduct(equations: Equations, hooks: Any, fixes: list[Fix], dt: float) -> None:
+def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
     """Conduct heat for a step of `dt`, before the points are strained; raises `Singular`.
 
     With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T' (backward Euler).
@@ -42,7 +40,7 @@ def conduct(equations: Equations, hooks: Any, fixes: list[Fix], dt: float) -> No
     if np.any(free):
         change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
-    # What the nodes would have without those that hold them, who publish the heat that it takes.
+    # Fixes get the temperature without them, and publish the heat that they supply.
     without = new - np.where(given, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
     update[nodes, 0], update[nodes, 1] = without, without - own

@@ -7,15 +7,13 @@ same spring while |k s| <= mu p for the slip s of the step; then they slide with
 Normals and gaps are those at the beginning of the step.
 """
 
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import TIMESTEP
-from karamelo_py.kernels.contact import SeparateFields, list_pairs
+from karamelo_py.kernels.contact import list_pairs
 from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
@@ -23,7 +21,7 @@ from karamelo_py.run.implicit.equations import Equations
 STIFF = 1e3  # springs, relative to the stiffness of a cell of the softer body
 LIGHT = 0.01  # fraction of the mass of nodes within a body
 SLIPPERY = 0.05  # the same: below it, spline nodes next to a body are too weak to stick
-CLOSE = 1e-4  # cells between bodies of which Newton's method first supposes that they touch
+CLOSE = 1e-4  # gap in cells below which contact is first assumed
 
 
 class Contact:
@@ -42,7 +40,7 @@ class Contact:
         pairs, gap = np.zeros((room, 2), np.int64), np.zeros(room)
         normal = np.zeros((room, self.d))
         count = list_pairs(tag, s.kin, s.grids, s.nodes, s.spans, pairs, normal, gap)
-        # Nodes with almost none of a body sustain nothing: contact would only disturb it.
+        # Nodes with almost no mass sustain nothing: contact would only disturb them.
         shares = self._shares()[equations.number_of(pairs[:count])].min(1)
         chosen = np.flatnonzero(shares >= LIGHT)
         count = len(chosen)
@@ -168,7 +166,7 @@ class Contact:
         velocities `v` (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
-        touched = touched & (B @ a.ravel() > 0)  # others are left to part
+        touched = touched & (B @ a.ravel() > 0)  # others may separate
         every = np.repeat(touched & stuck, self.d)
         rows = sp.vstack([B[touched & ~stuck], self.jumps[every]]).tocsr()
         forces = self._stopping(a, inverse, rows)
@@ -230,9 +228,3 @@ class Contact:
         share = self.tag.warmth[self.a, self.b]
         for at, part in ((self.first, share), (self.second, 1 - share)):
             np.add.at(heat[:, 0], nodes[at], part * work / mass[at])
-
-
-def contact_of(equations: Equations, moduli: np.ndarray) -> Any:
-    if not isinstance(equations.s.contact, SeparateFields):
-        return None
-    return Contact(equations, moduli)

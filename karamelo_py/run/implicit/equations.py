@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,7 +12,7 @@ from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import implicit as loops
-from karamelo_py.kernels.arrays import MASS, Setup, known_to_laws
+from karamelo_py.kernels.arrays import MASS, Block, Setup, Tag, known_to_laws
 from karamelo_py.kernels.equations.fbar import FBar
 from karamelo_py.kernels.equations.heat import Conductance
 from karamelo_py.points.kinematics import Axisymmetric
@@ -21,9 +21,9 @@ from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.scene.modify import Fix
 
-AT_ONCE = 8192  # points whose derivatives are kept until they are in the matrix
-FAR = 0.5  # cells that nodes may go at once towards others, and that for each cell between them
-# What is known of a step before where the first are the same.
+AT_ONCE = 8192  # points per batch of assembly
+FAR = 0.5  # cells that nodes may move at once towards others, per cell of distance
+# Reused from the step before if the first are the same.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
@@ -38,10 +38,10 @@ def distinct(numbers: list[np.ndarray]) -> np.ndarray:
     if not numbers:
         return np.zeros(0, np.int64)
     low = min(int(array.min()) for array in numbers)
-    there = np.zeros(max(int(array.max()) for array in numbers) - low + 1, bool)
+    present = np.zeros(max(int(array.max()) for array in numbers) - low + 1, bool)
     for array in numbers:
-        there[array - low] = True
-    return np.flatnonzero(there) + low
+        present[array - low] = True
+    return np.flatnonzero(present) + low
 
 
 class Moduli(NamedTuple):
@@ -63,11 +63,11 @@ class Equations:
     (m, d). `known` is from the step before, or empty.
     """
 
-    def __init__(self, s: Setup, mode: Any, known: dict[str, Any], stabilised: bool):
+    def __init__(self, s: Setup, mode: Tag, known: dict[str, np.ndarray], stabilised: bool):
         self.s, self.mode, self.d = s, mode, s.kin.dimension
         self.blocks = [block for block in s.blocks if not can(block.laws, constrained_velocity)]
         self.parts = [self._seen(block) for block in self.blocks]
-        # Gradients of points on a line between cells reach nodes where they have no weight.
+        # Points on cell boundaries have gradients at nodes without weight.
         counts = [seen.nodes[valid(seen)] for seen, _ in self.parts]
         soft = distinct(counts)
         tools = [(b, self._seen(b)[0]) for b in s.blocks if can(b.laws, constrained_velocity)]
@@ -86,7 +86,7 @@ class Equations:
         self._find_pairs(stabilised)
         self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
 
-    def known(self) -> dict[str, Any]:
+    def known(self) -> dict[str, np.ndarray]:
         """Return what depends on the nodes alone, for later steps with the same nodes."""
         return {name: vars(self)[name] for name in (*FOLLOWED, *FOLLOWING) if name in vars(self)}
 
@@ -101,7 +101,7 @@ class Equations:
         x, y = self.s.grids.step_x[g], self.s.grids.step_y[g]
         return np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
 
-    def _seen(self, block: Any) -> tuple[loops.Seen, loops.Response]:
+    def _seen(self, block: Block) -> tuple[loops.Seen, loops.Response]:
         s = self.s
         seen, response = loops.nothing_seen(s, block)
         loops.see(
@@ -118,7 +118,7 @@ class Equations:
         )
         return seen, response
 
-    def _led(self, tools: list[tuple[Any, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
+    def _led(self, tools: list[tuple[Block, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
         """Return the nodes (m,) that see rigid points, and their velocities (m, d) from these."""
         mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
         for block, seen in tools:
@@ -175,7 +175,6 @@ class Equations:
         )
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the indices of nodes among the unknown ones; -1 for others."""
         at = nodes - self.nodes[0]
         inside = (at >= 0) & (at < len(self.numbers))
         return np.where(inside, self.numbers[np.where(inside, at, 0)], -1)
@@ -207,7 +206,6 @@ class Equations:
         return f
 
     def furthest(self) -> float:
-        """Return the largest displacement component of a point at the last response."""
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, held: np.ndarray) -> float:
@@ -233,7 +231,6 @@ class Equations:
         return most
 
     def present_forces(self) -> np.ndarray:
-        """Return the nodal forces (m, d) of the present stress."""
         if self.averaged is not None:
             self.averaged.keep_stress()
         else:
@@ -267,7 +264,6 @@ class Equations:
         return sp.bsr_matrix((blocks, matrix.indices, matrix.indptr), shape)
 
     def linearise(self, dt: float, ghost: sp.csr_matrix | None = None) -> None:
-        """Assemble the derivatives of the last forces, plus a stabilisation (m, m)."""
         d, t, kin = self.d, self.s.kin.tensor_size, self.s.kin
         blocks = self.K.data
         blocks[:] = 0

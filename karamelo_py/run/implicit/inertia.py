@@ -1,10 +1,9 @@
 """Inertia in the balance of an implicit step, and the velocities after it."""
 
-from typing import Any
-
 import numpy as np
 
 from karamelo_py.compiler.fields import field
+from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.implicit import gather, scatter
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.implicit.contact import Contact
@@ -46,7 +45,7 @@ class Motion:
     def __init__(
         self,
         equations: Equations,
-        scheme: Any,
+        scheme: Tag,
         dt: float,
         before: np.ndarray,
         given: np.ndarray,
@@ -75,7 +74,6 @@ class Motion:
         self.old = [block.points.v.copy() for block in equations.blocks]
 
     def _means(self, values: list[np.ndarray]) -> np.ndarray:
-        """Average values (d, n) of the points of each block at the nodes (m, d), by mass."""
         equations = self.equations
         total = np.zeros((len(equations.nodes), equations.d))
         for block, (seen, _), own in zip(equations.blocks, equations.parts, values, strict=True):
@@ -83,14 +81,13 @@ class Motion:
         return total * self.inverse
 
     def acceleration(self, u: np.ndarray) -> np.ndarray:
-        """Return accelerations (m, d) after displacements (m, d); prescribed ones if held."""
         free = (u - self.dt * self.v) / (self.beta * self.dt**2) - self.rest * self.a
         return np.where(self.given, (self.prescribed - self.v) / self.dt, free)
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Add inertia to the residual forces (m, d)."""
         a = self.acceleration(u)
-        # Who holds a node does it with the force of the end of the step.
+        # Reactions are those at the end of the step.
         return forces - self.mass * np.where(self.given, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:

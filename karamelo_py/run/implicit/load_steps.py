@@ -1,13 +1,14 @@
 """Steps of implicit schemes, by Newton's method."""
 
 from math import ceil
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, Tag, of_change, of_force
 from karamelo_py.kernels.clock import finish
+from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
@@ -17,12 +18,12 @@ from karamelo_py.points.kinematics import Axisymmetric, free_from
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import used
 from karamelo_py.run.implicit.conduction import conduct
-from karamelo_py.run.implicit.contact import Contact, contact_of
+from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
 from karamelo_py.run.implicit.solvers import Singular, release
-from karamelo_py.run.implicit.tools import PushingTool, tools_of
+from karamelo_py.run.implicit.tools import PushingTool
 from karamelo_py.run.no_number import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
@@ -42,18 +43,18 @@ class NoEquilibrium(Exception):
 
 
 class LoadSteps:
-    def __init__(self, simulation: Any):
+    def __init__(self, simulation: Simulation):
         self.simulation = simulation
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
-        self.known: dict[str, Any] = {}  # of the last equations
+        self.known: dict[str, np.ndarray] = {}  # of the last equations
         self.parts = 0  # of the present step that have been done
         self.failure = ""  # why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; so far
         self.seconds: dict[str, float] = {}  # in stages of the steps so far
 
-    def advance(self, hooks: Any, count: int) -> int:
+    def advance(self, hooks: Tag, count: int) -> int:
         """Take up to `count` load steps; return the status, as `run_steps` does."""
         control = self.simulation.setup.control
         clock = control.clock[0]
@@ -79,17 +80,16 @@ class LoadSteps:
         return DONE
 
     def held(self) -> np.ndarray:
-        """Return the components (nodes, d) that fixes hold."""
-        found = np.zeros(
+        mask = np.zeros(
             (self.simulation.hub.fields.node_count, self.simulation.setup.kin.dimension), bool
         )
         for fix in self.simulation.hub.fixes.values():
             if "post_update_grid_state" in fix.hooks() and not fix.first_step_only:
-                for k in fix.held_directions or range(found.shape[1]):
-                    found[fix.nodes, k] = True
-        return found
+                for k in fix.held_directions or range(mask.shape[1]):
+                    mask[fix.nodes, k] = True
+        return mask
 
-    def _step(self, hooks: Any) -> None:
+    def _step(self, hooks: Tag) -> None:
         control = self.simulation.setup.control
         whole, step = float(control.values[DT]), control.values[TIMESTEP]
         end = float(control.values[TIME]) + whole
@@ -118,8 +118,8 @@ class LoadSteps:
                     break
                 part /= 2
                 if isinstance(reason, TooFar):
-                    # In as many equal parts as bring the points there.
-                    part = most = 2 * part / min(max(ceil(1.1 * reason.times), 2), 4)
+                    # In as many equal parts as the distance needs.
+                    part = most = 2 * part / min(max(ceil(1.1 * reason.at), 2), 4)
                 continue
             left -= part
             control.values[TIMESTEP] = step
@@ -132,9 +132,9 @@ class LoadSteps:
             self.simulation.hub.values.set(name, float(value))
         control.values[TIME], control.values[TIMESTEP] = end, step + (self.parts > 0)
 
-    def _tell_of_long_way(self, found: Any) -> None:
+    def _tell_of_long_way(self, equilibrium: "Equilibrium") -> None:
         """Report once that points cross cells within a load step, which costs accuracy."""
-        far = found.equations.furthest() / float(np.min(self.simulation.setup.grids.spacing))
+        far = equilibrium.equations.furthest() / float(np.min(self.simulation.setup.grids.spacing))
         if far <= LONG or self.dynamic or not self.simulation.setup.frame.moves:
             return
         if self.simulation.hub.update.first_time("a long way in a load step"):
@@ -145,7 +145,6 @@ class LoadSteps:
             )
 
     def _check_at_rest(self) -> None:
-        """Refuse initial velocities, which mean nothing without inertia."""
         for block in self.simulation.setup.blocks:
             moving = np.flatnonzero(block.points.v.any(0))
             if len(moving) and not can(block.laws, constrained_velocity):
@@ -163,14 +162,13 @@ class LoadSteps:
         return simulation.between(within) and not simulation.begins
 
     def _limit_reached(self, reason: Failed) -> float:
-        """End the run at the load that was reached; return its time."""
         time = self.simulation.steps.end_here()
         self.simulation.hub.console.say(
             f"limit load: no equilibrium beyond time {time:.6g}, {reason}; the run ends there"
         )
         return time
 
-    def _part(self, hooks: Any, dt: float) -> tuple[int, float]:
+    def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
         """Take a substep, with the loads at its end; return corrections and residual.
 
         Raises `Failed` if no equilibrium is found; the points have not moved then.
@@ -185,18 +183,22 @@ class LoadSteps:
         try:
             # Heat flows by these masses, and changes the stress that is summed after it.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
-            own = simulation.hooks
-            loads = own.loads.copy() if self.dynamic and isinstance(own, Hooks) else None
+            simulation_hooks = simulation.hooks
+            loads = (
+                simulation_hooks.loads.copy()
+                if self.dynamic and isinstance(simulation_hooks, Hooks)
+                else None
+            )
             control.values[TIME] = time + dt
             if heated:
                 self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
                 # Their work uses the mean of both, like Newmark's velocities.
-                own.loads[:] = 0.5 * (loads + own.loads)
-            found = self._equilibrium(dt, before if self.dynamic else None, after)
-            self._tell_of_long_way(found)
-            self._publish(found, hooks, dt)
+                simulation_hooks.loads[:] = 0.5 * (loads + simulation_hooks.loads)
+            equilibrium = self._equilibrium(dt, before if self.dynamic else None, after)
+            self._tell_of_long_way(equilibrium)
+            self._publish(equilibrium, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
                 raise PointsWrong
         except Failed:
@@ -206,12 +208,12 @@ class LoadSteps:
             raise
         finally:
             control.values[TIME] = time
-        found.inertia.end(found.u)
+        equilibrium.inertia.end(equilibrium.u)
         finish(control)
         simulation.steps.anew()
-        return found.iterations, found.residual
+        return equilibrium.iterations, equilibrium.residual
 
-    def _conduct(self, hooks: Any, dt: float) -> None:
+    def _conduct(self, hooks: Tag, dt: float) -> None:
         s, mode = self.simulation.setup, self.simulation.mode
         try:
             conduct(Equations(s, mode, self.known, False), hooks, self.simulation.acting, dt)
@@ -221,7 +223,7 @@ class LoadSteps:
                 "look at conductivities and heat capacities",
             ) from None
 
-    def _forces(self, hooks: Any) -> np.ndarray:
+    def _forces(self, hooks: Tag) -> np.ndarray:
         """Sum mass, momentum and forces at the nodes; return the forces (nodes, d)."""
         simulation = self.simulation
         s = simulation.setup
@@ -252,30 +254,33 @@ class LoadSteps:
         self._check_numbers(external, "a node gets a force that is not a number")
         fixed, velocities = self._prescribed(equations)
         led = equations.led[:, None]
-        given = fixed | led
+        held = fixed | led
         velocities = np.where(led, equations.velocity_of_rigid, velocities)
         if self.moduli is None:
             self.moduli = equations.moduli()
-        contact = contact_of(equations, self.moduli.of_grids)
+        separate = isinstance(s.contact, SeparateFields)
+        contact = Contact(equations, self.moduli.of_grids) if separate else None
         if not self.dynamic:
-            self._check_held(equations, given, contact)
+            self._check_held(equations, held, contact)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
-            inertia = Motion(equations, self.scheme, dt, before[nodes], given, velocities, contact)
-        pushing = [*([] if contact is None else [contact]), *tools_of(equations, simulation)]
+            inertia = Motion(equations, self.scheme, dt, before[nodes], held, velocities, contact)
+        tools = [fix for fix in simulation.hub.fixes.values() if fix.follows_points]
+        pushing = [*([] if contact is None else [contact])]
+        pushing += [PushingTool(fix, equations, simulation) for fix in tools]
         more = self.seconds, self.held
-        newton = Newton(self.scheme, equations, ~given, inertia, pushing, external, dt, *more)
+        newton = Newton(self.scheme, equations, ~held, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
         try:
-            jump = np.where(given, velocities * dt, 0.0)
+            jump = np.where(held, velocities * dt, 0.0)
             u, iterations, residual = newton.solve(jump, self._interrupted)
         except Loose as reason:
-            where = ", ".join(f"{x:.4g}" for x in equations.positions[reason.node])
-            solid = self._solid_at(equations, np.arange(len(nodes)) == reason.node)
+            where = ", ".join(f"{x:.4g}" for x in equations.positions[int(reason.at)])
+            solid = self._solid_at(equations, np.arange(len(nodes)) == reason.at)
             raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
         except Wrong as reason:
-            raise Failed(f"{reason} (solid '{self._solid_of(reason.point)}')") from None
+            raise Failed(f"{reason} (solid '{self._solid_of(int(reason.at))}')") from None
         update = simulation.hub.update
         if not self.dynamic and "unstable" not in update.warned_of and newton.unstable:
             update.first_time("unstable")
@@ -286,54 +291,54 @@ class LoadSteps:
             )
         release(newton.kept)
         self.known = equations.known()
-        self.unknowns = int(np.count_nonzero(~given))
+        self.unknowns = int(np.count_nonzero(~held))
         self.corrections += iterations
         reaction = newton.reaction(u)
         return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
         holding = [f for f in self.simulation.acting if "post_update_grid_state" in f.hooks()]
-        given, velocities = equations.prescribed(holding, equations.d)
+        mask, velocities = equations.prescribed(holding, equations.d)
         self._check_numbers(velocities, "a node gets a velocity that is not a number")
         if isinstance(equations.s.kin, Axisymmetric):
             on_axis = equations.positions[:, 0] == 0
-            given[on_axis, 0], velocities[on_axis, 0] = True, 0.0
-        return given, velocities
+            mask[on_axis, 0], velocities[on_axis, 0] = True, 0.0
+        return mask, velocities
 
-    def _check_numbers(self, numbers: Any, message: str) -> None:
+    def _check_numbers(self, numbers: np.ndarray, message: str) -> None:
         if not np.all(np.isfinite(numbers)):
             hint = "look for a formula that gives NaN, such as a division by zero"
-            found = no_number(self.simulation, message, hint)
-            raise self._error(found.message, found.fix, found.place)
+            trouble = no_number(self.simulation, message, hint)
+            raise self._error(trouble.message, trouble.fix, trouble.place)
 
-    def _publish(self, found: "Equilibrium", hooks: Any, dt: float) -> None:
+    def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
         """Let fixes publish the reactions at the nodes they hold; set nodal velocities.
 
         Fixes get the velocity that a node would have without them. Rigid solids take the remaining
         forces.
         """
-        simulation, s = self.simulation, found.equations.s
-        d, nodes, update = found.equations.d, found.equations.nodes, s.nodes.update
-        mass = found.equations.mass[:, None]
-        v = found.u / dt
-        held = found.fixed & (mass > 0)
-        without = np.where(held, -found.reaction * dt / np.where(held, mass, 1.0), 0.0)
+        simulation, s = self.simulation, result.equations.s
+        d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
+        mass = result.equations.mass[:, None]
+        v = result.u / dt
+        held = result.fixed & (mass > 0)
+        without = np.where(held, -result.reaction * dt / np.where(held, mass, 1.0), 0.0)
         change = of_change(s.kin)
         update[nodes, :d] = v + without
         update[nodes, change : change + d] = without
         work = s.control.totals[WORK].copy()
-        with simulation.steps.altered(kept=0.0):  # reactions have all that velocities change by
+        with simulation.steps.altered(kept=0.0):  # reactions account for the whole velocity change
             take_rows(self.scheme.hold, s, simulation.mode, hooks)
         s.control.totals[WORK] = work
-        add_to(s.control.totals, WORK, found.inertia.work(found.u, found.reaction))
+        add_to(s.control.totals, WORK, result.inertia.work(result.u, result.reaction))
         carry(s.control.totals[WORK])
         update[nodes, :d] = s.nodes.velocity[nodes, :d] = v
         update[nodes, change : change + d] = 0
-        for one in found.pushing:
+        for one in result.pushing:
             one.publish()
         if isinstance(s.contact, RigidBodies):
-            forces = np.where(found.fixed, 0.0, -found.reaction)
-            led = found.equations.led
+            forces = np.where(result.fixed, 0.0, -result.reaction)
+            led = result.equations.led
             rigid, first = field(s.nodes.fields, RigidSums), of_force(s.kin)
             rigid[nodes[led], first : first + s.kin.dimension] = forces[led]
             take_rows(PUBLISH, s, simulation.mode, hooks)
@@ -347,27 +352,27 @@ class LoadSteps:
         values = self.simulation.setup.control.values
         return f"step {int(values[TIMESTEP]) + 1}, time {float(values[TIME]):.6g}"
 
-    def _check_held(self, equations: Equations, given: np.ndarray, contact: Contact | None) -> None:
+    def _check_held(self, equations: Equations, fixed: np.ndarray, contact: Contact | None) -> None:
         """Refuse bodies (nodes that points connect) that can move as a whole."""
         s = equations.s
         bodies = equations.bodies()
         motions = equations.rigid_motions
         for body in range(bodies.max() + 1):
-            own = bodies == body
-            held = motions[own][given[own]]
-            if given[own].all():
+            nodes = bodies == body
+            rows = motions[nodes][fixed[nodes]]
+            if fixed[nodes].all():
                 continue
             if contact is not None:
-                held = np.concatenate([held, contact.held(motions, own)])
-            if np.linalg.matrix_rank(held) == motions.shape[2]:
+                rows = np.concatenate([rows, contact.held(motions, nodes)])
+            if np.linalg.matrix_rank(rows) == motions.shape[2]:
                 continue
             free = free_from(s.kin)
             loose = [
-                x for x, h in zip("xyz"[free:], given[own].any(0)[free:], strict=False) if not h
+                x for x, h in zip("xyz"[free:], fixed[nodes].any(0)[free:], strict=False) if not h
             ]
             how = f"is not held along {loose[0]}" if loose else "can rotate"
-            how = how if len(held) else "is held by nothing"
-            raise self._loose(self._solid_at(equations, own), how)
+            how = how if len(rows) else "is held by nothing"
+            raise self._loose(self._solid_at(equations, nodes), how)
 
     def _loose(self, solid: str, how: str) -> ScriptError:
         return self._error(
@@ -383,7 +388,6 @@ class LoadSteps:
             raise self._loose(next(iter(self.simulation.hub.solids)), "is held by nothing")
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
-        """Return the solid of a point that sees some of the chosen nodes (m,)."""
         for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True):
             points = np.flatnonzero(chosen[seen.nodes].any(1))
             if len(points):

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from karamelo_py.kernels.arrays import Tag
 from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import FAR, Equations, Moduli
 from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
+SINGULAR = "the equations are singular"
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
 
 
@@ -27,31 +29,23 @@ def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 class Failed(Exception):
-    """Newton's method finds no equilibrium."""
+    """Newton's method finds no equilibrium; `at` is a node, a point or a distance."""
+
+    def __init__(self, reason: str = "", at: float = 0):
+        super().__init__(reason)
+        self.at = at
 
 
 class TooFar(Failed):
-    """Points would move this many times further than allowed at once."""
-
-    def __init__(self, reason: str, times: float):
-        super().__init__(reason)
-        self.times = times
+    """Points would move `at` times further than allowed at once."""
 
 
 class Loose(Failed):
-    """The equations are singular: hardly anything holds a node."""
-
-    def __init__(self, node: int):
-        super().__init__("the equations are singular")
-        self.node = node
+    """The equations are singular: hardly anything holds node `at`."""
 
 
 class Wrong(Failed):
-    """A point has no finite stress."""
-
-    def __init__(self, reason: str, point: int):
-        super().__init__(reason)
-        self.point = point
+    """Point `at` has no finite stress."""
 
 
 class Broken(Failed):
@@ -68,7 +62,7 @@ class Newton:
 
     def __init__(
         self,
-        scheme: Any,
+        scheme: Tag,
         equations: Equations,
         free: np.ndarray,
         inertia: Any,
@@ -118,7 +112,6 @@ class Newton:
         raise Failed(f"after {scheme.iterations} corrections {residual:.1e} of the forces are left")
 
     def balance(self, u: np.ndarray) -> np.ndarray:
-        """Return the residual forces (m, d)."""
         forces = self.external - self.inner
         for one in self.pushing:
             forces += one.forces()
@@ -169,7 +162,7 @@ class Newton:
                 own = rigid.reshape(len(b), -1), accuracy, self.kept
                 x = solvers.solve(self.scheme.solver, A, b, *own).reshape(free.shape)
         except solvers.Singular:
-            raise Loose(self._loosest(A)) from None
+            raise Loose(SINGULAR, self._loosest(A)) from None
         except solvers.Unconverged:
             raise Failed("multigrid did not converge: take solver=direct") from None
         return np.where(free, x, jump)
@@ -192,7 +185,6 @@ class Newton:
         return Failed("forces of stress are no finite numbers")
 
     def _loosest(self, A: sp.bsr_matrix) -> int:
-        """Return the node that moves most in the softest mode, by inverse iteration."""
         size = np.abs(A.diagonal()) + 1e-12 * np.abs(A.data).max(initial=1e-300)
         B = A + sp.diags(1e-9 * size)
         x = np.where(self.free.ravel(), np.random.default_rng(0).standard_normal(A.shape[0]), 0)
@@ -212,11 +204,11 @@ class Newton:
             raise self._wrong(u)
         far = equations.furthest() / self.spacing
         if far > ASTRAY * FAR:
-            raise Loose(int(np.abs(u).max(1).argmax()))
+            raise Loose(SINGULAR, int(np.abs(u).max(1).argmax()))
         far = max(far, np.abs(u[equations.led]).max(initial=0.0) / self.spacing)
         if far <= FAR or not equations.s.frame.moves:
             return
-        if not self.pushing:  # contact knows nothing beyond the surfaces of now
+        if not self.pushing:  # contact only uses the present surfaces
             far = min(far, equations.furthest_into(u, self.held()))
         if far > FAR:
             raise TooFar(f"points would go {far:.3g} cells at once", far / FAR)

@@ -11,9 +11,9 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import MatrixRankWarning, splu
 
-MANY = 5000  # unknowns, from which on multigrid is faster than a direct solver
+MANY = 5000  # unknowns above which multigrid is faster than a direct solver
 MANY_IN_SPACE = 2000
-MANY_ITERATIONS = 25  # of multigrid, after which its coarse equations are made again
+MANY_ITERATIONS = 25  # of multigrid, above which its hierarchy is rebuilt
 
 
 class Singular(Exception):
@@ -52,7 +52,7 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    release(kept)  # before there are others: they take most of the memory
+    release(kept)  # before new factors: they take most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
@@ -65,13 +65,12 @@ def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarra
 
 
 def release(kept: dict) -> None:
-    for level in getattr(kept.get("multigrid"), "levels", ()):
-        vars(level).clear()  # levels know themselves, and would wait to be found
+    for level in kept["multigrid"].levels if "multigrid" in kept else ():
+        vars(level).clear()  # levels contain reference cycles
     kept.clear()
 
 
 def changed_sign(factors: Any) -> bool:
-    """Return True if the determinant of a factorised matrix is negative."""
     moved = np.empty_like(factors.perm_r)
     moved[factors.perm_c] = factors.perm_r
     n = len(moved)
@@ -96,11 +95,11 @@ def amg(
     if grids is None:
         release(kept)
     else:
-        grids.levels[0].A = None  # the last matrix, before there is another
+        grids.levels[0].A = None  # free the last matrix first
     B, s = scaled(A, kept.get("scale"))
     symmetric = is_symmetric(B)
     left: list[float] = []
-    # pyamg has its warnings shown whatever filters say: they are taken, and residuals tell.
+    # pyamg resets warning filters; residuals show a failure.
     with from_one_seed(), warnings.catch_warnings(record=True):
         if grids is None:
             symmetry = "symmetric" if symmetric else "nonsymmetric"
@@ -147,7 +146,7 @@ def solve(
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
         try:
             return solve("amg", A, b, rigid, accuracy, kept)
-        except (Singular, Unconverged):  # multigrid is not made for all matrices
+        except (Singular, Unconverged):  # multigrid fails for some matrices
             release(kept)
     x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b, kept)
     if not np.all(np.isfinite(x)):

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.scene.modify import Fix, PointsView
 
@@ -14,7 +15,7 @@ NEAR = 1e-6  # cells, over which forces are compared
 class Displaced:
     """Points of a view, displaced by (n, d); volume and damage are the old ones."""
 
-    def __init__(self, view: Any, way: np.ndarray):
+    def __init__(self, view: PointsView, way: np.ndarray):
         self.view, self.position = view, view.position + way
 
     def __getattr__(self, name: str) -> Any:
@@ -22,7 +23,7 @@ class Displaced:
 
 
 class PushingTool:
-    def __init__(self, fix: Fix, equations: Equations, simulation: Any):
+    def __init__(self, fix: Fix, equations: Equations, simulation: Backend):
         self.fix, self.d = fix, equations.d
         self.near = NEAR * float(np.min(equations.s.grids.spacing))
         self.view = PointsView(simulation, simulation.points.members(fix.group), then=False)
@@ -40,7 +41,7 @@ class PushingTool:
         self.gather = sp.csr_matrix((np.concatenate(weights), at), shape)
         self.gather_all = equations.for_all_components(self.gather)
         self.way = np.zeros((shape[0], self.d))
-        self.known = self.force = self.at(self.way)  # that the forces of the step have already
+        self.known = self.force = self.at(self.way)  # included in the forces of the step
 
     def at(self, way: np.ndarray) -> np.ndarray:
         """Return the forces (n, d) on points displaced by `way` (n, d)."""
@@ -68,8 +69,3 @@ class PushingTool:
         self.view.force = self.view.force + (self.force - self.known) / 2
         self.view.write_back()
         self.fix.publish_components(self.view.total(self.force))
-
-
-def tools_of(equations: Equations, simulation: Any) -> list[PushingTool]:
-    fixes = simulation.hub.fixes.values()
-    return [PushingTool(fix, equations, simulation) for fix in fixes if fix.follows_points]

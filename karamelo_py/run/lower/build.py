@@ -34,7 +34,7 @@ from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.stable_step import sparse
-from karamelo_py.run.step_size import LastSteps, set_up
+from karamelo_py.run.step_size import set_up
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
@@ -44,7 +44,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError, render_message
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-SERIAL_UP_TO = 20_000  # points; below, waking threads costs more than they save
+SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
 
 
 class State(NamedTuple):
@@ -57,9 +57,9 @@ class State(NamedTuple):
     laws: dict[tuple, np.ndarray]  # state for each kind of law
     fields: dict[type, np.ndarray]  # declared fields that are kept
     grids: NamedTuple
-    node_fields: dict[type, np.ndarray]  # the same of the nodes of these grids, (nodes, components)
-    contact: NamedTuple  # how solids touch, with what it remembers
-    last_steps: LastSteps
+    node_fields: dict[type, np.ndarray]  # of the nodes of `grids`, (nodes, components)
+    contact: NamedTuple  # contact tag with its memory
+    clock: dict[str, float]  # fields that later steps need
 
 
 def check_scene(hub: Hub) -> None:
@@ -103,7 +103,6 @@ def check_scene(hub: Hub) -> None:
 
 
 def thread_count(hub: Hub, points: int) -> int:
-    """Return the number of threads: --threads, or all cores if the scene is large enough."""
     from numba import config
 
     available = int(config.NUMBA_NUM_THREADS)
@@ -144,7 +143,7 @@ def lower(
         method.resume(contact, previous.contact)
     firsts = [solid.first_id for solid in hub.solids.values()]
     control = arrays.new_control(hub.values.array, firsts, kin.dimension)
-    set_up(control, hub, transfer, previous and previous.last_steps)
+    set_up(control, hub, transfer, previous.clock if previous else {})
     tiles.unsort(control)
     grids = table(lattices, real)
     if hub.update.boundary == "reflect":
@@ -174,12 +173,11 @@ def lower(
 
 def node_kinds(hub: Hub, basis: NamedTuple, contact: NamedTuple) -> list[type]:
     declared = fields.declared(owners_of_fields(hub, contact), "node_fields")
-    kinds = [kind for kind in declared if getattr(kind, "needed", lambda basis: True)(basis)]
+    kinds = [kind for kind in declared if kind.needed(basis)]
     return kinds + [EnergyLoss] * returns_loss(hub) + [FrictionalHeat] * warms_by_friction(hub)
 
 
 def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:
-    """Group solids by their kind of law, in order of use; only points of `ids`."""
     alike: dict[tuple, list] = {}
     for solid in hub.solids.values():
         part = solid if ids is None else part_of(solid, *ids)
@@ -279,7 +277,7 @@ def lower_points(
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
     elastic = elastic_law(used)
-    own = [kind for kind in kinds if getattr(kind, "needed", lambda law: True)(elastic)]
+    own = [kind for kind in kinds if kind.needed(elastic)]
     points = arrays.Points(
         x=x, home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),

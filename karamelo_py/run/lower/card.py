@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from karamelo_py.compiler.gpu import Counted, NoCard, card
 from karamelo_py.kernels import table
@@ -12,6 +11,7 @@ from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.step import untaken
 from karamelo_py.language import registry
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.lower.build import PRECISIONS
 from karamelo_py.run.lower.memory import largest, least_bytes
 from karamelo_py.scene.hub import Hub
@@ -65,16 +65,16 @@ def _too_large(hub: Hub, least: float) -> ScriptError:
     need = f", which take at least {in_words(least)} of its memory" if least else ""
     has = f"{hub.settings.card.name} has {free} of {whole} free"
     single = "" if hub.settings.precision == "single" else "; precision(single)"
-    found = ScriptError(
+    error = ScriptError(
         f"the GPU has no room for the scene: {plural(count, 'point')}{need}; {has}",
         place=largest(hub).place,
         hint=f"larger cells, or fewer points per cell{single}; {WITHOUT}",
     )
-    found.command = "solid"
-    return found
+    error.command = "solid"
+    return error
 
 
-def memory_there(simulation: Any) -> int:
+def memory_there(simulation: Backend) -> int:
     simulation.launches()
     return simulation.hub.settings.card.taken
 
@@ -125,6 +125,6 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
 
 
 def refuse(hub: Hub, setup: Setup | None = None) -> None:
-    if found := [*refusals(hub, setup)]:
-        found[0].others = found[1:]
-        raise found[0]
+    if errors := [*refusals(hub, setup)]:
+        errors[0].others = errors[1:]
+        raise errors[0]

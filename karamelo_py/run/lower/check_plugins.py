@@ -1,16 +1,12 @@
-"""Trial calls of plug-in parts on some points, in plain Python, before kernels are compiled.
-
-A missing function, a wrong length or an unusable number then ends in a message about the part.
-"""
+"""Trial calls of plug-in parts on some points, in plain Python, before kernels are compiled."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
 from karamelo_py.compiler.tuples import flat, record
-from karamelo_py.kernels.arrays import Setup
+from karamelo_py.kernels.arrays import Nodes, Number, Points, Setup, Tag
 from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, results
 from karamelo_py.kernels.laws import law_in, law_on
@@ -24,12 +20,13 @@ from karamelo_py.points.laws import parameter
 from karamelo_py.points.laws.strengths import hardening, shear_response
 from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
 from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
-STRAINS = (0, 1e-3, 0.05)  # the last beyond what metals yield at
+STRAINS = (0, 1e-3, 0.05)  # the last beyond yield of metals
 TRIED = 8  # points, at least, if the scene has enough
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
@@ -44,16 +41,16 @@ def try_parts(hub: Hub, setup: Setup) -> None:
         part = _part_of(hub, [type(setup.transfer)])
         v = vector(setup.kin, (_one(setup),) * setup.kin.dimension)
         with _trial(hub, part):
-            found = updated_velocity(setup.transfer, v, v, v)
-            _expect(part, updated_velocity, found, len(v))
-            _numbers(part, "updated_velocity", found, v[0])
+            result = updated_velocity(setup.transfer, v, v, v)
+            _expect(part, updated_velocity, result, len(v))
+            _numbers(part, "updated_velocity", result, v[0])
     for fix in hub.fixes.values():
         for moment, hook in fix.hooks().items():
             if isinstance(hook, CompiledHook) and hook.tag is not None and not hook.internal:
                 _try_hook(setup, fix, moment, hook)
 
 
-def _samples(setup: Setup, fix: Fix, hook: Any) -> Iterator[tuple]:
+def _samples(setup: Setup, fix: Fix, hook: CompiledHook) -> Iterator[tuple]:
     tag, kin = hook.tag(0, ()), setup.kin
     if hook.on_nodes:
         yield WholeNodes(0, planar(kin), None, _one_node(setup), None, 0.0, tag, True), kin, kin, 0
@@ -64,44 +61,44 @@ def _samples(setup: Setup, fix: Fix, hook: Any) -> Iterator[tuple]:
             yield what, *state_at(kin, points, table, p), p
 
 
-def _one_node(setup: Setup) -> Any:
+def _one_node(setup: Setup) -> Nodes:
     fields = tuple(type(one)(one.array[:1].copy()) for one in setup.nodes.fields)
     return type(setup.nodes)(*(np.ones_like(a[:1]) for a in setup.nodes[:3]), fields)
 
 
-def _try_hook(setup: Setup, fix: Fix, moment: str, hook: Any) -> None:
+def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
     part = PartInUse(f"fix {fix.style}", type(fix), fix.place)
     says = f"{moment}: {hook.function.__name__} has to return "
     values = (1.0,) * len(fix.formulas)
-    for what, law, state, p in _samples(setup, fix, hook):
+    for sample, law, state, p in _samples(setup, fix, hook):
         with (
             as_script_error(part.name, moment, hook.function, fix.place),
             np.errstate(all="ignore"),
         ):
             try:
-                found = results(what.tag, what, law, state, p, values, 1.0)
-            except ArithmeticError:  # of numbers that this is not about
+                result = results(sample.tag, sample, law, state, p, values, 1.0)
+            except ArithmeticError:  # caused by the sample numbers
                 continue
-        wanted = len(hook.writes) + hook.publishes
-        if not isinstance(found, tuple) or len(found) != wanted:
-            got = len(found) if isinstance(found, tuple) else repr(found)
-            raise fault(part.name, f"{says}{wanted} results, not {got}", part.place)
-        for item, new in zip(hook.writes, found, strict=False):
+        expected = len(hook.writes) + hook.publishes
+        if not isinstance(result, tuple) or len(result) != expected:
+            got = len(result) if isinstance(result, tuple) else repr(result)
+            raise fault(part.name, f"{says}{expected} results, not {got}", part.place)
+        for item, new in zip(hook.writes, result, strict=False):
             size = item.shape(setup.kin) if isinstance(item, type) else setup.kin.dimension
             if (got := len(flat((new,)))) != size:
                 name = item.__name__ if isinstance(item, type) else item
-                what = f"{says}{plural(size, 'number')} for {name}, not {got}"
-                raise fault(part.name, what, part.place)
-        if hook.publishes and len(flat(found[-1:])) > len(fix.published):
-            what = f"{says}as many totals as published has names, {len(fix.published)}"
-            raise fault(part.name, what, part.place)
+                message = f"{says}{plural(size, 'number')} for {name}, not {got}"
+                raise fault(part.name, message, part.place)
+        if hook.publishes and len(flat(result[-1:])) > len(fix.published):
+            message = f"{says}as many totals as published has names, {len(fix.published)}"
+            raise fault(part.name, message, part.place)
 
 
 def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
     return next((part for part in foreign_parts(hub) if part.kind in kinds), None)
 
 
-def _one(setup: Setup) -> Any:
+def _one(setup: Setup) -> Number:
     return setup.nodes.sums.dtype.type(1)
 
 
@@ -118,29 +115,31 @@ def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
                 raise
 
 
-def _expect(part: PartInUse, function: Any, given: Any, count: int, kind: type = tuple) -> None:
-    if not (isinstance(given, kind) and len(given) == count):
+def _expect(part: PartInUse, function: Tag, value: object, count: int, kind: type = tuple) -> None:
+    if not (isinstance(value, kind) and len(value) == count):
         at = place_of(function.find((part.kind,))) if function.defined(part.kind) else ""
-        wanted = "tuple" if kind is tuple else "symmetric tensor"
-        got = type(given).__name__ + (f" of {len(given)}" if isinstance(given, tuple) else "")
-        what = f"{function.__name__} has to return a {wanted} of {count}, not a {got}{at}"
-        raise fault(part.name, what, part.place)
+        expected = "tuple" if kind is tuple else "symmetric tensor"
+        got = type(value).__name__ + (f" of {len(value)}" if isinstance(value, tuple) else "")
+        message = f"{function.__name__} has to return a {expected} of {count}, not a {got}{at}"
+        raise fault(part.name, message, part.place)
 
 
-def _numbers(part: PartInUse, what: str, found: Iterable, one: Any) -> None:
+def _numbers(part: PartInUse, name: str, values: Iterable, one: Number) -> None:
     """Refuse values that are not finite numbers, or more precise than the run."""
-    for number in found:
+    for number in values:
         if not isinstance(number, (int, float, np.number)):
-            raise fault(part.name, f"{what} is {number!r} for some point, no number", part.place)
+            raise fault(part.name, f"{name} is {number!r} for some point, no number", part.place)
         if not np.isfinite(number):
-            raise fault(part.name, f"{what} is {number} for some point", part.place)
+            raise fault(part.name, f"{name} is {number} for some point", part.place)
         if isinstance(number, np.float64) and type(one) is not np.float64:
-            doubles = f"{what} is a double (float64) in a run of precision(single): its author "
-            doubles += "makes numbers of those that it is given, as in real(0.5, x)"
-            raise fault(part.name, doubles, part.place)
+            message = f"{name} is a double (float64) in a run of precision(single): its author "
+            message += "makes numbers of those that it is given, as in real(0.5, x)"
+            raise fault(part.name, message, part.place)
 
 
-def try_law(hub: Hub, material: Any, kin: Any = None, law: Any = None, one: Any = 1.0) -> None:
+def try_law(
+    hub: Hub, material: Material, kin: Tag = None, law: Tag = None, one: Number = 1.0
+) -> None:
     """Try a plug-in's law, as a solid has it or in a cell of size 1 at 293 K."""
     kinds = laws.law_kind(material.law)
     if not any(map(is_foreign, kinds)):
@@ -155,31 +154,31 @@ def try_law(hub: Hub, material: Any, kin: Any = None, law: Any = None, one: Any 
             _try_flow_stress(part, law, state, one * strain)
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
-                what = f"what a point remembers is {len(flat(state))} numbers at first and "
-                what += f"{len(flat(after))} after a step: their number must not change"
-                raise fault(part.name, what, part.place)
+                message = f"what a point remembers is {len(flat(state))} numbers at first and "
+                message += f"{len(flat(after))} after a step: their number must not change"
+                raise fault(part.name, message, part.place)
             _numbers(part, f"what a point remembers after a strain of {strain:g}", flat(after), one)
             for function in (*TENSORS, *NUMBERS):
-                found = function(law, kin, after)
+                result = function(law, kin, after)
                 if function in TENSORS:
-                    _expect(part, function, found, len(kin.Symmetric.places), kin.Symmetric)
+                    _expect(part, function, result, len(kin.Symmetric.places), kin.Symmetric)
                 name = f"{function.__name__} after a strain of {strain:g}"
-                _numbers(part, name, flat((found,)), one)
+                _numbers(part, name, flat((result,)), one)
             laws.specific_volume(law)
             for of in laws.columns_of(law).values():
                 laws.shown(of, law, kin, after)
 
 
-def _try_flow_stress(part: PartInUse, law: Any, state: Any, strain: Any) -> None:
+def _try_flow_stress(part: PartInUse, law: Tag, state: tuple, strain: Number) -> None:
     strength = parameter(law, "strength")
     kind = type(strength)
     if not (is_foreign(kind) and hardening.flow_stress.defined(kind)):
         return
     memory, heat, dt = state.m.strength, state.m.heat, strain / strain if strain else 1
     before = hardening.before_flow(strength, memory, heat)
-    found = hardening.flow_stress(strength, before, strain, dt)
-    _expect(part, hardening.flow_stress, found, 2)
-    _numbers(part, f"flow_stress, or its slope, at a plastic strain of {strain:g}", found, strain)
+    result = hardening.flow_stress(strength, before, strain, dt)
+    _expect(part, hardening.flow_stress, result, 2)
+    _numbers(part, f"flow_stress, or its slope, at a plastic strain of {strain:g}", result, strain)
     if shear_response.find((kind,)) is hardening.radial_return:
         after = hardening.updated_memory(strength, memory, strain, dt)
         _expect(part, hardening.updated_memory, after, len(memory))
@@ -196,7 +195,7 @@ def _try_basis(hub: Hub, setup: Setup) -> None:
             _try_functions(part, setup, points, p)
 
 
-def _try_functions(part: PartInUse, setup: Setup, points: Any, p: int) -> None:
+def _try_functions(part: PartInUse, setup: Setup, points: Points, p: int) -> None:
     """Check at a point that basis functions sum to 1 and their gradients to 0."""
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])
@@ -208,8 +207,10 @@ def _try_functions(part: PartInUse, setup: Setup, points: Any, p: int) -> None:
         for name in ("weights", "gradients", "affine"):
             got = len(getattr(line, name))
             if got != basis.line_nodes and (got or name != "affine"):
-                what = f"along has to return {basis.line_nodes} {name}, not {got}: register says so"
-                raise fault(part.name, what, part.place)
+                message = (
+                    f"along has to return {basis.line_nodes} {name}, not {got}: register says so"
+                )
+                raise fault(part.name, message, part.place)
     stencil = locate(basis, kin, grid, at)
     weights, slopes = [], []
     for k in range(support(basis, kin)):
@@ -219,11 +220,11 @@ def _try_functions(part: PartInUse, setup: Setup, points: Any, p: int) -> None:
     _numbers(part, "a weight", weights, one)
     _numbers(part, "a gradient", flat(slopes), one)
     rounding = 1e3 * len(weights) * np.finfo(type(one)).eps
-    for what, total, wanted in (
+    for message, total, wanted in (
         ("weights", sum(weights), 1),
         *(("gradients, times h,", sum(of) / grid.inv_h, 0) for of in zip(*slopes, strict=True)),
     ):
         if abs(total - wanted) > rounding:
             x = ", ".join(f"{c:g}" for c in at[: kin.dimension])
-            what = f"the {what} of a point at {x} add up to {total:.6g}, not to {wanted}"
-            raise fault(part.name, what, part.place)
+            message = f"the {message} of a point at {x} add up to {total:.6g}, not to {wanted}"
+            raise fault(part.name, message, part.place)

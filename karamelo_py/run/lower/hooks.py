@@ -9,10 +9,10 @@ from karamelo_py.compiler import INTERPRETED, address_of, address_of_python
 from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels import arrays, called
-from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup
+from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup, Tag
 from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
-from karamelo_py.kernels.hooks import POINT_STAGES, STAGES, CompiledHook
+from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
@@ -29,7 +29,7 @@ NO_PROGRAM = (-1, -1, -1, -1)
 
 
 def lower_hooks(
-    hub: Hub, fixes: list, mode: Any = None, threads: int = 1
+    hub: Hub, fixes: list, mode: Tag = None, threads: int = 1
 ) -> arrays.Hooks | arrays.NoHooks:
     """Make the tables of the compiled hooks of fixes, in their order."""
     dimension = hub.domain.dimension
@@ -66,8 +66,7 @@ def lower_hooks(
     )
 
 
-def compiled_hooks(fixes: list) -> list[tuple[Any, str, CompiledHook]]:
-    """Return (fix, name of the stage, hook) of compiled hooks, in the order of the tables."""
+def compiled_hooks(fixes: list) -> list[tuple[Fix, str, CompiledHook]]:
     return [
         (fix, name, hook)
         for fix in fixes
@@ -86,13 +85,13 @@ class _Builder:
         self.members: list[np.ndarray] = []
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
-        self.holding: list[Any] = []
+        self.holding: list[Fix] = []
         self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
         method = hub.update.method
         self.told = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         laws = (solid.material.law for solid in hub.solids.values())
         self.rigid = any(can(law, constrained_velocity) for law in laws)
-        self.whole: list[Any] = []  # tags of hooks on whole points
+        self.whole: list[Tag] = []  # tags of hooks on whole points
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
@@ -113,9 +112,9 @@ class _Builder:
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
         uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))
         self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
-        whole = hook.tag is not None  # its functions know no direction that is left alone
-        given = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
-        programs = list(map(self._program, given))
+        whole = hook.tag is not None  # its functions take all directions
+        formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
+        programs = list(map(self._program, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
@@ -146,7 +145,7 @@ class _Builder:
         members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
         return _put(self.members, members)
 
-    def _program(self, formula: Any) -> tuple:
+    def _program(self, formula: Expression | None) -> tuple:
         if formula is None:
             return NO_PROGRAM
         if formula.is_constant:  # without code: the number
@@ -179,11 +178,6 @@ class ActingFixes:
         """Tag of a step: the compiled hooks, or all if some are in Python."""
         return self if self.in_python else self.compiled
 
-    @property
-    def staged(self) -> bool:
-        names = (name for fix in self.fixes for name in fix.hooks())
-        return bool(self.in_python) or any(name in POINT_STAGES for name in names)
-
     def called(self) -> called.CalledHooks | None:
         """Return hooks that compiled steps call; None if one moves a point or acts elsewhere."""
         acting = [fix for fix, _ in self.in_python.get(INITIAL_INTEGRATE, ())]
@@ -207,7 +201,7 @@ class ActingFixes:
             self.simulation.domain.act(lambda whole: function(self, whole, stage, *arguments), s)
 
 
-def _call(simulation: Backend, fix: Fix, hook: Callable, view: Any) -> None:
+def _call(simulation: Backend, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
     """Call a hook; if each process calls it for its own points, check that all agree.
 
     Collective calls must match, else processes deadlock; published values must be equal, else they

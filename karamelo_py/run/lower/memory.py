@@ -5,12 +5,13 @@ Only the least that a run needs is compared: nothing that would run is refused.
 
 import gc
 from math import ceil
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Block, Hooks
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import used
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, lower_points, part_of, point_kinds
@@ -20,17 +21,17 @@ from karamelo_py.scene.machine_memory import in_words, machine_memory
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
-LARGE, PAGE = 1 << 22, 1 << 21  # bytes from which on NumPy asks for large pages, and of these
-THERE = 1  # bytes of each point of the whole scene, for those that were deleted
+LARGE, PAGE = 1 << 22, 1 << 21  # bytes above which NumPy uses large pages; their size
+THERE = 1  # bytes per point of the whole scene, in `present`
 
 
 class MemoryTaken(NamedTuple):
     touched: int
-    copied: int  # of the last good state, with places of the present alone
+    copied: int  # of the last good state, with present positions only
     known: int  # to each process, of the whole scene
 
 
-def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
+def memory_of(simulation: Backend, s: arrays.Setup, boxes: int) -> MemoryTaken:
     """Return the memory of the points in the tiles of `s`, nodes in use, and `boxes` bytes."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
@@ -43,24 +44,23 @@ def memory_of(simulation: Any, s: arrays.Setup, boxes: int) -> MemoryTaken:
 
 
 def known(hub: Hub) -> int:
-    """Return the bytes of data about the whole scene that each process holds: solids, groups."""
     seen = {id(hub)}
-    parts = (part for all in (hub.solids, hub.regions, hub.groups) for part in all.values())
-    there = THERE * sum(solid.count for solid in hub.solids.values())
-    return there + sum(_held(part, seen) for part in parts)
+    members = (member for all in (hub.solids, hub.regions, hub.groups) for member in all.values())
+    deleted = THERE * sum(solid.count for solid in hub.solids.values())
+    return deleted + sum(_held(member, seen) for member in members)
 
 
-def _held(thing: Any, seen: set[int]) -> int:
-    if isinstance(thing, np.ndarray) and isinstance(thing.base, np.ndarray):
-        thing = thing.base
-    if id(thing) in seen:
+def _held(item: object, seen: set[int]) -> int:
+    if isinstance(item, np.ndarray) and isinstance(item.base, np.ndarray):
+        item = item.base
+    if id(item) in seen:
         return 0
-    seen.add(id(thing))
-    if isinstance(thing, np.ndarray):
-        return thing.nbytes
-    ours = type(thing).__module__.startswith("karamelo_py.") and hasattr(thing, "__dict__")
-    parts = thing if isinstance(thing, (list, tuple)) else vars(thing).values() if ours else ()
-    return sum(_held(part, seen) for part in parts)
+    seen.add(id(item))
+    if isinstance(item, np.ndarray):
+        return item.nbytes
+    ours = type(item).__module__.startswith("karamelo_py.") and hasattr(item, "__dict__")
+    members = item if isinstance(item, (list, tuple)) else vars(item).values() if ours else ()
+    return sum(_held(member, seen) for member in members)
 
 
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
@@ -79,23 +79,22 @@ def nodes_in_use(s: arrays.Setup) -> int:
     return int(np.diff(used(s.spans)[1:]).sum())
 
 
-def node_fields(s: Any) -> list[tuple[str, np.ndarray]]:
+def node_fields(s: arrays.Setup) -> list[tuple[str, np.ndarray]]:
     parts = ((name.partition("/"), array) for name, array in of_nodes(s))
     return [(name + " (heat)" * (kind == "heat"), array) for (kind, _, name), array in parts]
 
 
 def point_fields(block: Block) -> list[tuple[str, str, int]]:
-    """Return name, shape and bytes of each field of a point of this block."""
-    found = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
-    found += [(name, array) for name, array in arrays.arrays_of(block.points) if name != "x"]
-    sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in found]
+    named = [("x", block.points.x[0]), ("x moved", block.points.x[1])]
+    named += [(name, array) for name, array in arrays.arrays_of(block.points) if name != "x"]
+    sizes = [(name, len(array) if array.ndim > 1 else 1, array) for name, array in named]
     return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
 
 
-def bytes_per_point(simulation: Any) -> int:
+def bytes_per_point(simulation: Backend) -> int:
     blocks = simulation.setup.blocks
-    own = np.array([len(block.points.id) for block in blocks])
-    counts = simulation.comm.allreduce(own).tolist()
+    local = np.array([len(block.points.id) for block in blocks])
+    counts = simulation.comm.allreduce(local).tolist()
     of_one = [sum(size for *_, size in point_fields(block)) for block in blocks]
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
@@ -104,17 +103,16 @@ FEW = 100_000  # points; this number fits everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
-    """Refuse a scene that exceeds memory, with a copy if `copied`; warn if it is not free."""
     comm = hub.settings.comm
     count = sum(solid.count for solid in hub.solids.values())
-    if count <= FEW or (there := machine_memory(comm.on_machine)) is None:
+    if count <= FEW or (memory := machine_memory(comm.on_machine)) is None:
         return
     need = comm.share_here * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
-    if need > there.free:
-        # Scenes of before, which point to themselves, stay until someone looks.
+    if need > memory.free:
+        # Former scenes contain reference cycles.
         gc.collect()
-        there = machine_memory(comm.on_machine) or there
-    if need <= there.free:
+        memory = machine_memory(comm.on_machine) or memory
+    if need <= memory.free:
         return
     place, beside = largest(hub).place, ""
     if comm.share_here < 1:
@@ -123,19 +121,19 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
         f"{beside}; this machine has "
     )
-    if need <= there.whole:  # who may have it the system knows alone
-        message += f"{in_words(there.free)} free: it may not fit"
-        hub.warn(message, place=place, hint=_ways(hub, need, there.free, copied))
+    if need <= memory.whole:  # other programs may release it
+        message += f"{in_words(memory.free)} free: it may not fit"
+        hub.warn(message, place=place, hint=_ways(hub, need, memory.free, copied))
         return
-    hint = _ways(hub, need, there.whole, copied)
-    said = f"{message}{in_words(there.whole)} in all"
+    hint = _ways(hub, need, memory.whole, copied)
+    said = f"{message}{in_words(memory.whole)} in all"
     error = ScriptError(said, place=place, hint=hint, code="memory")
     error.command = "solid"
     raise error
 
 
 def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
-    # Bytes go with that power of the number of cells along a side; two digits, rounded up.
+    # Bytes scale with that power of the cells per side; two digits, rounded up.
     larger = ceil(10 * (need / max(there, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
     single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)
@@ -158,7 +156,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
-        ppc = solid.ppc  # else nothing is known of the cells that it fills
+        ppc = solid.ppc  # else the number of cells is unknown
         cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
     d, per_cell = kin.dimension, hub.update.method.basis.traits.nodes_per_cell**kin.dimension
     of_node = np.dtype(real).itemsize * (

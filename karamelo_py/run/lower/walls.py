@@ -26,19 +26,19 @@ def key_of_walls(hub: Hub) -> tuple:
 
 def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:
     fixes = fixes_of_walls(hub)
-    found = []
+    walls = []
     for axis in sorted({axis for fix in fixes for axis in fix.held_directions}):
         nodes = np.unique(np.concatenate([f.nodes for f in fixes if axis in f.held_directions]))
         for lattice in lattices:
             ends = lattice.first, lattice.first + lattice.node_count
-            own = nodes[slice(*np.searchsorted(nodes, ends))]
-            if len(own):
-                found += [(lattice, *wall) for wall in _walls(lattice, own)]
-    if not found:
+            nodes_of_lattice = nodes[slice(*np.searchsorted(nodes, ends))]
+            if len(nodes_of_lattice):
+                walls += [(lattice, *wall) for wall in _walls(lattice, nodes_of_lattice)]
+    if not walls:
         return basis
     cells = sum(math.prod(lattice.cells) for lattice in lattices)
     faces = np.zeros((cells, hub.domain.dimension), np.int8)
-    for lattice, direction, above in found:
+    for lattice, direction, above in walls:
         for step, side in ((0, BELOW), (-1, ABOVE)):
             cell = above.copy()
             cell[:, direction] += step
@@ -65,8 +65,8 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
             face = np.moveaxis(face[:-1] & face[1:], 0, axis)
         wall = face.copy()
         wall[1:-1] &= ~(face[:-2] & face[2:])
-        place = np.argwhere(np.moveaxis(wall, 0, k)) + corner
-        # Functions that see three nodes have some beyond a box that is one cell wide.
-        place = place[(place[:, k] > 0) & (place < lattice.cells[:d]).all(axis=1)]
-        if len(place):
-            yield k, place
+        cell = np.argwhere(np.moveaxis(wall, 0, k)) + corner
+        # Stencils of three nodes exceed a box that is one cell wide.
+        cell = cell[(cell[:, k] > 0) & (cell < lattice.cells[:d]).all(axis=1)]
+        if len(cell):
+            yield k, cell

@@ -9,17 +9,18 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from math import inf
+from types import FrameType
 from typing import Any
 from zlib import crc32
 
 import numpy as np
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.comm import SerialComm, T
 from karamelo_py.script.errors import Quit, ScriptError
 
 INSTALL = "pip install '.[mpi]' in the folder of karamelo-py"
-# What the launchers of MPI tell each process: how many there are, and which it is.
+# Environment variables of MPI launchers: number of processes, and rank.
 LAUNCHED = (
     ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"),
     ("PMI_SIZE", "PMI_RANK"),
@@ -29,14 +30,15 @@ LAUNCHED = (
 # Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
-# Words of processes other than step numbers, which are positive.
+# Answers of processes besides step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
-PAUSE = 0.005  # seconds between two looks whether the others have come
+RankArray = tuple[int, np.ndarray]
+PAUSE = 0.005  # seconds between two checks for the others
 
 
 @contextmanager
 def handled_signals(
-    handler: Callable[[int, Any], None], numbers: Sequence[int] = ENDING
+    handler: Callable[[int, FrameType | None], None], numbers: Sequence[int] = ENDING
 ) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -83,8 +85,8 @@ class MpiComm(SerialComm):
         # Its messages may be longer than 2 GB.
         self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
-        self._aside = world.Dup()  # where they agree, whatever is under way elsewhere
-        self._between = world.Dup()  # for what is passed on in steps
+        self._aside = world.Dup()  # for agreement, independent of other messages
+        self._between = world.Dup()  # for messages within steps
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
         self.beside = self.allgather(mine).count(mine)
@@ -110,10 +112,10 @@ class MpiComm(SerialComm):
     def bcast(self, thing: Any = None) -> Any:
         return self.world.bcast(thing)
 
-    def gather(self, thing: Any) -> list | None:
+    def gather(self, thing: T) -> list[T] | None:
         return self.world.gather(thing)
 
-    def allgather(self, thing: Any) -> list:
+    def allgather(self, thing: T) -> list[T]:
         return self.world.allgather(thing)
 
     def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
@@ -153,20 +155,19 @@ class MpiComm(SerialComm):
         if not self.leads:
             act()
 
-    def connect(self, given: list[tuple[int, Any]], taken: list[tuple[int, Any]]) -> Any:
-        """Make persistent requests that send and receive arrays: (rank, array)."""
+    def connect(self, given: list[RankArray], taken: list[RankArray]) -> Any:
         requests = [self._between.Recv_init(array, rank) for rank, array in taken]
         return requests + [self._between.Send_init(array, rank) for rank, array in given]
 
-    def start(self, link: Any) -> None:
+    def start(self, link: list) -> None:
         self.mpi.Prequest.Startall(link)
 
-    def finish(self, link: Any) -> None:
+    def finish(self, link: list) -> None:
         begun = time.perf_counter()
         self.mpi.Request.Waitall(link)
         self.waited += time.perf_counter() - begun
 
-    def disconnect(self, link: Any) -> None:
+    def disconnect(self, link: list) -> None:
         for request in link:
             request.Free()
 
@@ -192,7 +193,7 @@ def check_same_run(hub: Scene) -> None:
     if (words == words[0]).all():
         return
     comm.parted = True
-    # One that has failed tells of it.
+    # A failed process reports it.
     if (words == FAILED).any() or comm.rank != int((words > 0).argmax()):
         raise Quit
     raise ScriptError(

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler.fields import length_of_rows, rows_of_points, some_points
-from karamelo_py.kernels.arrays import Block, Points, Setup, Tiling, arrays_of, made_of
+from karamelo_py.kernels.arrays import Block, Points, Setup, Tag, Tiling, arrays_of, made_of
 from karamelo_py.run.boxes import (
     Boxes,
     Reached,
     between,
+    beyond,
     buffers_of,
     chosen_of,
     extents,
@@ -49,23 +50,23 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
             continue
         busy = places[tiles[work[tiles] > 0]]
         lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
-        # The longest last; of equal ones that whose neighbours are furthest apart in memory.
+        # The longest last; of equal ones the direction with the largest stride in memory.
         long = np.argsort(-lengths / least, kind="stable")[::-1]
         tiles = tiles[np.lexsort([places[tiles, k] for k in long])]
         ends = np.cumsum(work[tiles])
         half = count // 2
-        # A tile is of the one that has its middle.
+        # A tile goes to the part with its middle.
         cut = np.searchsorted(ends - 0.5 * work[tiles], ends[-1:].sum() * (half / count))
         left += [(tiles[:cut], first, half), (tiles[cut:], first + half, count - half)]
     return part
 
 
-IMBALANCE = 1.1  # limit of largest work now over that after a new cut, for cutting tiles again
+IMBALANCE = 1.1  # largest work over its value after repartitioning, if that is worth it
 # Times longer than across, from which on bodies are cut along long tiles: to go through rows of
 # nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
 ROWS = 4
-OF_TILES = ("number", "range", "grid", "box", "rows")  # what a tiling has a row of for each tile
-FINE = 1000  # parts of the unit of costs, in which work is added up as whole numbers
+OF_TILES = ("number", "range", "grid", "box", "rows")  # arrays of a tiling with a row per tile
+FINE = 1000  # integer work per unit of cost
 
 
 class Needs(NamedTuple):
@@ -88,7 +89,7 @@ class SharedTiles(Tiles):
         self,
         comm: SerialComm,
         lattices: Sequence[Lattice],
-        basis: Any,
+        basis: Tag,
         points: int,
         sparse: bool,
         *,
@@ -96,7 +97,7 @@ class SharedTiles(Tiles):
     ):
         super().__init__(lattices, basis, points, sparse)
         self.comm = comm
-        self.one_place = one_place  # a node has others there: of bodies in contact
+        self.one_place = one_place  # bodies in contact have nodes at the same positions
         self._places = np.concatenate(
             [
                 one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
@@ -112,14 +113,13 @@ class SharedTiles(Tiles):
         self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
         self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
-        self._from = np.empty(0, np.int64)  # whose the boxes of others are
+        self._from = np.empty(0, np.int64)  # ranks of the boxes of others
 
     def share_out(self, work: np.ndarray) -> None:
         if not self.direct:
             self.owner = bisected(self._places, work, self.comm.size, ROWS if self.long else 1)
 
     def balance(self, work: np.ndarray) -> bool:
-        """Divide the tiles anew if that is worth it; `work` (tiles,) is of the own points."""
         before, work = self.owner, self.comm.allreduce(work)
 
         def largest() -> float:
@@ -133,12 +133,12 @@ class SharedTiles(Tiles):
 
     def loads(self, blocks: Sequence[Block]) -> np.ndarray:
         """Count points of each sorted block, and nodes in reach: (blocks + 1, tiles)."""
-        found = np.zeros((len(blocks) + 1, self.count), np.int64)
-        for row, block in zip(found, blocks, strict=False):
+        counts = np.zeros((len(blocks) + 1, self.count), np.int64)
+        for row, block in zip(counts, blocks, strict=False):
             tiles, points = occupied(block.tiling)
             row[tiles] = points
-            found[-1, tiles] += nodes_of(block.tiling)
-        return found
+            counts[-1, tiles] += nodes_of(block.tiling)
+        return counts
 
     def partners(self, going: np.ndarray) -> list[int]:
         going[self.comm.rank] = 0
@@ -146,7 +146,7 @@ class SharedTiles(Tiles):
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         tiles = [self.tiles_of(s, block.points) for block in s.blocks]
-        # Of nodes it is known what tiles reached from where their points were.
+        # Nodes in reach are known from the last sort.
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
         self.balance(work_of(loads, costs))
@@ -172,7 +172,7 @@ class SharedTiles(Tiles):
     def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
         """Join the points that stay and those that arrive, in the memory of the last sort."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
-        # Fresh memory for all of them would cost more than all else that a sort does.
+        # Fresh memory for all fields would cost more than the rest of a sort.
         arrays = []
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]
@@ -189,7 +189,7 @@ class SharedTiles(Tiles):
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
             arrays.append(array)
-            give_up(old)  # no two of the fields are there twice at a time
+            give_up(old)  # one field at a time exists twice
             for parts in come:
                 parts[i] = None
         return made_of(points, arrays)
@@ -200,7 +200,7 @@ class SharedTiles(Tiles):
     def _boxes(self, s: Setup) -> Boxes:
         """Return the own boxes, then boxes of others that may contain the same nodes."""
         own, me = self.own_boxes(s), self.comm.rank
-        self._looks_beyond = getattr(type(s.contact), "looks_beyond", 0) > 0
+        self._looks_beyond = beyond(s.contact) > 0
         of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
         if len(own.grid):
             low, high = own.lo.min(axis=0), own.hi.max(axis=0)
@@ -224,7 +224,6 @@ class SharedTiles(Tiles):
         return super()._shares(s)
 
     def _border_first(self, s: Setup) -> None:
-        """Visit the tiles first whose sums other processes wait for."""
         awaited = np.zeros(len(self._of), bool)
         for box, _, _ in self._passed.values():
             awaited[box] = True
@@ -274,7 +273,7 @@ class SharedTiles(Tiles):
         )
         pieces = others[which]
         self._from, box = of[pieces], reached.box[pieces]
-        # What they are of their rows is known already.
+        # Their rows were cut in `_reached` of the base.
         more = Boxes(boxes.order[box], boxes.grid[box], low, high, boxes.rows[box])
         count = np.count_nonzero(self._of == me)
         found = Reached(*(array[np.append(own, pieces)] for array in reached))
@@ -300,7 +299,7 @@ class SharedTiles(Tiles):
         self.given = {
             rank: _rows(low, high, first[which], steps[which])
             for rank, (which, low, high) in self._passed.items()
-            if len(which)  # where hulls meet there need not be a node of both
+            if len(which)  # hulls may overlap without a common node
         }
         ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
         own = len(ends) - 1 - len(self._from)
@@ -313,17 +312,17 @@ class SharedTiles(Tiles):
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        # Of those that have a node in use the first counts it.
+        # The first process with a node in use counts it.
         self.foreign[self._marked] = 0
-        found, me = [self._marked[:0]], self.comm.rank
+        nodes, me = [self._marked[:0]], self.comm.rank
         if self._looks_beyond:
-            found.append(self._unknown(between(*rows_of(self._parts(grid, begin, end, 0, 0)))))
+            nodes.append(self._unknown(between(*rows_of(self._parts(grid, begin, end, 0, 0)))))
         else:
             for rank, needs in self._needs.items():
                 if rank < me:
                     which, low, high = needs.among(self._place(tiles), begin, end)
-                    found.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
-        self._marked = np.concatenate(found)
+                    nodes.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
+        self._marked = np.concatenate(nodes)
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
@@ -364,7 +363,6 @@ class SharedTiles(Tiles):
 
 
 def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:
-    """Return the integer cost (tiles,) of points and nodes, with counts (k, tiles)."""
     return np.rint(FINE * (costs @ loads)).astype(np.int64)
 
 
@@ -405,13 +403,12 @@ def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) 
 
 
 def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
-    """Pack the points and tiles of `s` in the tiles marked in `own`, by name."""
-    found: dict[str, np.ndarray] = {}
+    packed: dict[str, np.ndarray] = {}
     for k, block in enumerate(s.blocks):
         points, tiles = share_of_tiling(k, block.tiling, own)
         arrays = arrays_of(block.points)
-        found |= tiles | {f"points/{k}/{name}": some_points(of, points) for name, of in arrays}
-    return found
+        packed |= tiles | {f"points/{k}/{name}": some_points(of, points) for name, of in arrays}
+    return packed
 
 
 def share_of_tiling(
@@ -437,7 +434,6 @@ def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
 
 
 def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:
-    """Return the order by tile of points that are ordered by process."""
     ranges = one_after_another(_joint(tilings, "range"))
     return between(*ranges[np.argsort(_joint(tilings, "number"))].T)
 

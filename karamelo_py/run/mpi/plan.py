@@ -1,6 +1,6 @@
 """The division of a scene among processes, predicted by one: memory and messages per step."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,10 +24,10 @@ class ProcessShare(NamedTuple):
     points: int
     tiles: int  # of points, that are occupied
     nodes: int  # in use
-    others: int  # that it passes something on to
-    given: int  # bytes that it passes on in a step
-    memory: int  # bytes that it touches in steps, and of a copy of its last good state
-    known: int  # of these, of what each process knows of the whole scene
+    others: int  # to which it sends
+    given: int  # bytes sent per step
+    memory: int  # bytes touched in steps, and of a copy of its last good state
+    known: int  # of these, of data about the whole scene
 
 
 class _Sums(NamedTuple):
@@ -52,7 +52,7 @@ class _PretendedComm(SerialComm):
     def __init__(self, rank: int, size: int, boxes: list[Boxes]):
         self.rank, self.size, self.boxes = rank, size, boxes
 
-    def allgather(self, thing: Any) -> list:
+    def allgather(self, thing: object) -> list:
         return self.boxes
 
 
@@ -92,7 +92,7 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
 def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> ProcessShare:
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
-    )  # boxes of nothing: only their places matter
+    )  # empty rows: only positions matter
     tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
     tilings = [block.tiling for block in s.blocks]
     memory = memory_of(simulation, s, tiles.box_bytes(simulation.setup))

@@ -11,6 +11,7 @@ from karamelo_py.compiler import address_of_python
 from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.kernels import ranks
 from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, NoHooks, Setup
+from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
 from karamelo_py.run.backend import Backend, WholeDomain
@@ -19,14 +20,14 @@ from karamelo_py.run.mpi import partition
 from karamelo_py.run.mpi.whole import Whole
 from karamelo_py.scene.comm import SerialComm
 
-LEARN_EVERY = 100  # steps from output to output, after which it is seen how work is shared
+LEARN_EVERY = 100  # steps between two checks of the balance
 
 
 class Load:
     """Time in sweeps over the points of each block, and in everything else but waiting."""
 
     def __init__(self, blocks: int):
-        # Of a point of each block in a step, and of a node that the points of a tile may reach.
+        # Per step: of a point of each block, and of a node in reach of a tile.
         self.costs = np.append(np.ones(blocks), 0.0)
         self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds, and points times steps
         self._rest = self._at = blocks
@@ -36,7 +37,6 @@ class Load:
         self._since = None
 
     def note(self) -> None:
-        """Count the time since the last `resume`."""
         if self._since is not None:
             self._spent[0, self._at] += time.perf_counter_ns() - self._since
 
@@ -52,7 +52,6 @@ class Load:
         self._spent[1] += np.array(counts) * steps
 
     def learn(self, comm: SerialComm) -> None:
-        """Update the costs from the times of all processes; recent times count more."""
         seconds, done = comm.allreduce(self._spent)
         self._spent //= 2
         if (seconds[:-1] > 0).all() and (done > 0).all():
@@ -75,8 +74,8 @@ class Subdomain(WholeDomain):
         s = simulation.setup
         self.load = Load(len(s.blocks))
         self.control = s.control
-        self.at_once = False  # whether what fixes publish is added up in each step
-        self.due: set[int] = set()  # else which of these values are, when the last is over
+        self.at_once = False  # sum published values in each step
+        self.due: set[int] = set()  # else slots to sum after the last step
         linked = Linked(address_of_python(self.answer, ranks.CALL), self.tiles.foreign)
         simulation.setup = s._replace(control=s.control._replace(ranks=linked))
         self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
@@ -174,7 +173,7 @@ class Subdomain(WholeDomain):
         simulation, tiles = self.simulation, self.tiles
         s = simulation.setup
         clock = s.control.clock[0]
-        sorted_next = clock.drift > clock.drift_limit  # and cut anew then
+        sorted_next = clock.drift > clock.drift_limit  # and repartitioned then
         due = abs(simulation.step - self._learned_at) >= LEARN_EVERY
         due = due and not (tiles.direct or sorted_next)
         if not due or not tiles.balance(partition.work_of(tiles.loads(s.blocks), self.learn())):
@@ -196,7 +195,7 @@ class Subdomain(WholeDomain):
                 self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
             return found
         except BaseException as error:
-            # Nothing can be raised through a kernel, and the others wait.
+            # Exceptions cannot pass through a kernel, and the others wait.
             self.comm.fail(error)
             raise
 
@@ -211,7 +210,7 @@ class Subdomain(WholeDomain):
             self.comm.allreduce_max(self.control.answer[:a])
         elif what == ranks.NUMBER:
             return int(self.comm.allreduce(np.array([a]))[0])
-        return 0  # for the others the time is taken alone
+        return 0  # the other calls only mark the time
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)
@@ -224,7 +223,6 @@ class Subdomain(WholeDomain):
             self.control.answer[k] = rounded(of_all[k])
 
     def _publish(self) -> None:
-        """Sum the published values of the last step over all processes."""
         rows, values = sorted(self.due), self.control.values
         self.due.clear()
         if rows:
@@ -232,7 +230,8 @@ class Subdomain(WholeDomain):
                 rows, self.comm.allreduce(self.control.totals[rows]), strict=True
             ):
                 values[row] = rounded(total)
-            for of, to in getattr(self.simulation.setup.contact, "copies", ()):
+            contact = self.simulation.setup.contact
+            for of, to in contact.copies if isinstance(contact, SeparateFields) else ():
                 values[to : to + 3] = values[of : of + 3]
 
 

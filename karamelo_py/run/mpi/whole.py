@@ -29,7 +29,7 @@ class Whole:
 
     def __init__(self, simulation: Backend, subdomain: Any):
         self.simulation, self.subdomain = simulation, subdomain
-        # With arrays of nodes, and next to no points.
+        # With arrays of nodes, and one point.
         s, self.tiles = lower(simulation.hub, ids=(0, 1), comm=SerialComm())
         control = simulation.control._replace(ranks=s.control.ranks)
         self.setup = s._replace(control=control, contact=simulation.setup.contact)
@@ -78,7 +78,6 @@ class Whole:
             simulation.setup, simulation.tiles, simulation.comm, simulation.domain = own
 
     def gather(self) -> None:
-        """Gather the points of all, component by component and tile after tile, and the nodes."""
         simulation, comm = self.simulation, self.simulation.comm
         totals = simulation.control.totals
         parts = comm.gather(self._own() | {"work": totals[WORK].copy()})
@@ -116,7 +115,7 @@ class Whole:
             "memory": [array[own] for array in subdomain.memory()],
         }
 
-    def _join(self, parts: list[dict[str, Any]]) -> None:
+    def _join(self, parts: list[dict]) -> None:
         whole, tiles = self.setup, self.tiles
         for k, block in enumerate(whole.blocks):
             block.tiling.count[1] = 1 if tiles.direct else SHARES
@@ -125,7 +124,7 @@ class Whole:
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
-            array[nodes] = 0  # also those that no box reaches and no process has
+            array[nodes] = 0  # including nodes that no box reaches
         memory = self.subdomain.memory()
         for part in parts:
             for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
@@ -155,7 +154,6 @@ class Whole:
             one[nodes] = rows
 
     def _hand_back(self, nodes: np.ndarray, rows: list) -> None:
-        """Copy the changes of the first process into the arrays of the present step."""
         s, found = self.simulation.setup, self.simulation.comm.scatter(self._shares())
         here = np.isin(nodes, numbers(s.spans))
         for (_, array), own in zip(of_nodes(s), rows, strict=True):
