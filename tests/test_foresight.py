@@ -616,8 +616,10 @@ def test_a_large_step_of_a_later_run_is_told_before_the_first(
     assert ("| set_dt(0.1)" in result.err) == told
 
 
-@pytest.mark.parametrize(("origin", "warns"), [(0, False), (800, False), (20000, True)])
-def test_single_precision_far_from_the_origin_is_told(run_interpreted, origin, warns):
+@pytest.mark.parametrize(
+    ("origin", "kind"), [(0, ""), (800, ""), (1300, "warning"), (20000, "error")]
+)
+def test_single_precision_far_from_the_origin(run_interpreted, origin, kind):
     """A block at rest in map coordinates: in single precision at 2e5 cells it never moves."""
     script = f"""
     precision(single)
@@ -629,8 +631,9 @@ def test_single_precision_far_from_the_origin_is_told(run_interpreted, origin, w
     fix(g, body_force, all, 0, -9.81)
     run(1)
     """
-    err = run_interpreted(script, command="check").err
-    assert ("cells from the origin, where positions in single precision" in err) == warns
+    err = run_interpreted(script, command="check", status=int(kind == "error")).err
+    assert ("points lie up to" in err) == bool(kind)
+    assert re.search(f"{kind}:( run:)? points lie up to", err) or not kind
 
 
 PLATES = (INPUTS / "defaults" / "in.plates").read_text("utf-8")

@@ -293,30 +293,37 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Warn if single precision cannot resolve the motion in a step.
+    """Warn if single precision cannot resolve the motion in a step, or refuse it.
 
-    If nothing moves yet, compare with the cell size: a block that falls at 50 000 cells from the
-    origin is wrong by 3.5 % of its path, and at 200 000 it does not move.
+    Compare with the cell size too: a block that falls at 50 000 cells from the origin is wrong by
+    3.5 % of its path, and at 200 000 it does not move.
+
+    Raises
+    ------
+    ScriptError
+        If positions have a spacing of 1/500 cell or more.
     """
     if s.hub.settings.precision != "single":
         return
     x = max((max(-one.low.min(), one.high.max()) for one in s.motions), default=0.0)
     step, spacing = s.fastest * s.simulation.dt, float(np.spacing(np.float32(x)))
+    far, apart = x / s.hub.domain.h, spacing / s.hub.domain.h
+    hint, code = "precision(double), or a domain around the origin", "single-precision"
+    words = (
+        f"points lie up to {far:.3g} cells from the origin, where positions in single precision "
+        f"have a spacing of {apart:.2g} cells: slow motion will be lost"
+    )
+    if apart > 2e-3:
+        raise ScriptError(words, hint=hint, code=code)
     if 0 < step < 16 * spacing:
         s.hub.warn(
             f"a step moves points by {step:.2g} at most, and in single precision positions have "
             f"a spacing of {spacing:.2g}: motion will be lost to rounding",
-            hint="precision(double), or a domain around the origin",
-            code="single-precision",
+            hint=hint,
+            code=code,
         )
-    elif spacing > 1e-3 * s.hub.domain.h:
-        far, apart = x / s.hub.domain.h, spacing / s.hub.domain.h
-        s.hub.warn(
-            f"points lie up to {far:.3g} cells from the origin, where positions in single "
-            f"precision have a spacing of {apart:.2g} cells: slow motion will be lost",
-            hint="precision(double), or a domain around the origin",
-            code="single-precision",
-        )
+    elif apart > 1e-3:
+        s.hub.warn(words, hint=hint, code=code)
 
 
 def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:

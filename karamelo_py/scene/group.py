@@ -182,8 +182,8 @@ class NodeGroup(AnyGroup):
         self._found = None
         return len(self._find(region, solids))
 
-    def warn_past_domain(self) -> None:
-        """Warn if the group looks like a wall at an upper edge but lies past it."""
+    def refuse_past_domain(self) -> None:
+        """Refuse a group that looks like a wall at an upper edge but lies past it."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return
@@ -194,11 +194,11 @@ class NodeGroup(AnyGroup):
             if nearest[k] > end + domain.tolerance:
                 low, h = domain.lo[k], domain.h
                 cells = int((end - low) / h)
-                self.hub.warn(
+                raise ScriptError(
                     f"the nodes of group '{self.id}' lie at {'xyz'[k]} = {nearest[k]:g}, past the "
-                    f"end of the domain at {end:g}: its side is no multiple of the cells ({h:g}), "
-                    "and what is held there is held too far out",
-                    hint=f"end the domain at {low + max(cells, 1) * h:g} or {nearest[k]:g}",
+                    f"end of the domain at {end:g}: its side is no multiple of the cells ({h:g})",
+                    argument="group",
+                    expected=f"a domain that ends at {low + max(cells, 1) * h:g} or {nearest[k]:g}",
                 )
 
     def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:

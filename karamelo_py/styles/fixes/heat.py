@@ -99,7 +99,7 @@ class TemperatureNodes(HeatFix):
 
     def defined(self) -> None:
         if self.hub.domain.h is not None:
-            self.group.warn_past_domain()
+            self.group.refuse_past_domain()
 
 
 def hold_point(capacity, T, face, supply, value, other, dt):

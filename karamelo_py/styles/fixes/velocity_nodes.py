@@ -189,10 +189,10 @@ class VelocityNodes(Fix):
         return next(iter(bounds), "")
 
     def defined(self) -> None:
-        """Warn of walls outside the domain, and of nodes with two different velocities."""
+        """Refuse walls outside the domain, and warn of nodes with two different velocities."""
         if self.hub.domain.h is None:
             return
-        self.group.warn_past_domain()
+        self.group.refuse_past_domain()
         if self.bound:
             return
         for other in self.hub.fixes.values():
