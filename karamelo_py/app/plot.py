@@ -31,13 +31,13 @@ def read_text(path: Path, expected: str | None = None) -> str:
         return ""
 
 
-def read_rows(path: Path) -> list[dict[str, float]]:
+def read_rows(path: str | Path) -> list[dict[str, float]]:
     """Read the rows of a log by column; words are NaN.
 
     Lines that begin with # rename the columns. A line cut off by a killed run is skipped.
     """
     names: list[str] = []
-    rows = []
+    path, rows = Path(path), []
     # A line without an end may be cut: 2.4 of 2.4e+10.
     lines = read_text(path).rpartition("\n")[0].splitlines()
     for cells in filter(

@@ -37,8 +37,7 @@ class Placement(NamedTuple):
 
 
 class Filled:
-    """Selected positions (n, d) in a box of cells, computed on request; stores a bit per candidate.
-    """
+    """Selected positions (n, d) in a box of cells, computed on request; stores bits."""
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
                  places: np.ndarray):  # fmt: skip

@@ -55,8 +55,7 @@ def begin(gmsh: ModuleType) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[Path]:
-    """Yield a link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may run programs.
-    """
+    """Yield a link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may act."""
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name
         try:
