@@ -116,7 +116,7 @@ def test_fixes(monkeypatch, own_cache, method):
     """
     script = WATER.replace("ulmpm", method)
     (hub, one), (other_hub, other) = begun(script), begun(script)
-    hooks = one.hooks, one.python.functions
+    hooks = one.hooks, one.fixes.lasting.functions
     forget()
     monkeypatch.setenv("KARAMELO_PY_CACHE", own_cache)
     steps = StepsOnCard(Emulator(), one.setup, ((hub.update.scheme, type(one.visits))), hooks)
@@ -172,5 +172,5 @@ def test_code_is_kept(monkeypatch, own_cache):
         if again:
             monkeypatch.setattr(Emulator, "_compiled", made_again)
         hub, one = begun(WATER)
-        hooks = one.hooks, one.python.functions
+        hooks = one.hooks, one.fixes.lasting.functions
         StepsOnCard(Emulator(), one.setup, ((hub.update.scheme, type(one.visits))), hooks)

@@ -102,12 +102,17 @@ def name_of(kind: type) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
+def _trait(kind: type, name: str) -> Any:
+    """Return a trait of a field; one that is not derived from `Field` has its defaults."""
+    return getattr(kind, name, getattr(Field, name))
+
+
 def is_kept(kind: type) -> bool:
-    return kind.kept
+    return _trait(kind, "kept")
 
 
 def columns_of(kind: type) -> tuple[str, ...]:
-    return kind.columns
+    return _trait(kind, "columns")
 
 
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
@@ -120,10 +125,9 @@ def rows_of_points(
 ) -> np.ndarray:
     """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
-    No vector load then crosses a line, and the dozens of rows that a visit traverses in parallel
-    fall into different cache sets for any n; contiguous rows would collide for 512 or 512 000
-    points. Rows always have gaps: arrays without gaps are another type, and would need another
-    compilation.
+    No vector load crosses a line, and the dozens of rows that a visit traverses in parallel fall
+    into different cache sets; contiguous rows would collide for n = 512 or 512 000. Rows always
+    have gaps: arrays without gaps are another type, and would need another compilation.
 
     `room` (k,) is used if it is long enough (`length_of_rows`).
     """
@@ -174,7 +178,8 @@ def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def _start(kind: type, kin: Any, real: type) -> np.ndarray:
-    return np.array(kind.start(kin) if callable(kind.start) else [kind.start], real)
+    start = _trait(kind, "start")
+    return np.array(start(kin) if callable(start) else [start], real)
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:

@@ -1,9 +1,8 @@
 """Formulas as stack programs, and the compiled evaluator that runs them over blocks of points.
 
-No formula is compiled. The evaluator runs the program once per block; each operation is a loop over
-the points of the block. Values common to all points (time, constants, and their combinations) are
-computed once per block: such instructions have the flag `UNIFORM`, and `SPREAD` expands the result
-to a row. Shared subexpressions are stored in rows after the stack.
+No formula is compiled: the evaluator loops over the points of a block for each operation. Values
+common to all points are computed once per block: such instructions have the flag `UNIFORM`, and
+`SPREAD` expands the result to a row. Shared subexpressions are stored in rows after the stack.
 """
 
 from typing import NamedTuple
@@ -85,7 +84,7 @@ def _binary(op, n, a, b):
 def _powers(n, a, b):
     """Raise the first `n` numbers of `a` to powers, without branches if all exponents agree.
 
-    Each result equals `_power`, whatever the other exponents.
+    Each result equals `_power`.
     """
     power = b[0]
     same = True

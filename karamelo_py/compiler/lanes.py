@@ -1,13 +1,13 @@
 """Several points at once: lanes of a vector register as a number type of point functions.
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
-for each of 4 or 8 consecutive points. Lanes add, multiply and compare like numbers; node numbers in
-lanes gather from node arrays (nodes, components). Point functions are unaware of it; those that a
-class lists in ``scalarised`` are called lane by lane. Each lane has the bits of the same operations
-on numbers; sums at nodes differ from sums over single points by round-off.
+for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
+components). Point functions are unaware of it; those that a class lists in ``scalarised`` are
+called lane by lane. Each lane has the bits of the same operations on numbers; sums at nodes differ
+from sums over single points by round-off.
 
-The last group of a tile may have fewer points than lanes: missing lanes load the first point, and
-store and contribute nothing. Interpreted kernels process points one by one.
+In the last group of a tile, missing lanes load the first point, and store and contribute nothing.
+Interpreted kernels process points one by one.
 """
 
 import operator
@@ -207,7 +207,7 @@ def _room_for(points, numbers):
     return array(points, numbers), codegen
 
 
-def _masked(builder: ir.IRBuilder, p: Any, width: int) -> Any:
+def _masked(builder: ir.IRBuilder, p: Any, width: int) -> ir.Value:
     numbers = Lanes(types.int64, width)
     count = splat(builder, builder.extract_value(p, 1), numbers)
     all_of_them = ir.Constant(llvm.register_type(numbers), list(range(width)))
@@ -225,7 +225,9 @@ def _of_present(p, value):
     return select(_present(p), value, real(0, value))
 
 
-def _either(builder: ir.IRBuilder, condition: Any, first: Callable, second: Callable) -> Any:
+def _either(
+    builder: ir.IRBuilder, condition: ir.Value, first: Callable, second: Callable
+) -> ir.Value:
     """Branch: the value of `first` if the condition holds, else of `second`."""
     results = []
     with builder.if_else(condition) as branches:
@@ -241,11 +243,16 @@ def _either(builder: ir.IRBuilder, condition: Any, first: Callable, second: Call
 
 
 def _all_or_masked(
-    builder: ir.IRBuilder, pointer: Any, p: Any, lanes: Lanes, whole: Callable, partly: Callable
-) -> Any:
+    builder: ir.IRBuilder,
+    pointer: ir.Value,
+    p: Any,
+    lanes: Lanes,
+    whole: Callable,
+    partly: Callable,
+) -> ir.Value:
     """Read or write all lanes if all have a point, as in nearly all groups; else masked.
 
-    `partly` gets the LLVM name of the vectors, the address, the alignment and the mask.
+    `partly` gets LLVM's name of the vectors, address, alignment and mask.
     """
     size = lanes.scalar.bitwidth // 8
     vector = llvm.register_type(lanes)
@@ -259,7 +266,9 @@ def _all_or_masked(
     return _either(builder, full, lambda: whole(at, size), masked)
 
 
-def _points_at(builder: ir.IRBuilder, array: types.Array, value: Any, at: Any, index: Any) -> tuple:
+def _points_at(
+    builder: ir.IRBuilder, array: types.Array, value: ir.Value, at: Any, index: ir.Value
+) -> tuple:
     """Return the address of an item whose last index is a group, and the group."""
     kinds, values = _indices(builder, at, index)
     first = builder.extract_value(values[-1], 0)
@@ -269,7 +278,7 @@ def _points_at(builder: ir.IRBuilder, array: types.Array, value: Any, at: Any, i
     return llvm.item_pointer(builder, array, value, indices, size), values[-1]
 
 
-def _indices(builder: ir.IRBuilder, at: Any, value: Any) -> tuple[list, list]:
+def _indices(builder: ir.IRBuilder, at: Any, value: ir.Value) -> tuple[list, list]:
     if isinstance(at, types.BaseTuple):
         return list(at), llvm.unpack(builder, value)
     return [at], [value]
@@ -323,7 +332,7 @@ def _store_points(array, at, value):
     return types.void(array, at, value if isinstance(value, Lanes) else lanes), codegen
 
 
-def ask(builder: ir.IRBuilder, pointer: Any, ahead: Any) -> None:
+def ask(builder: ir.IRBuilder, pointer: ir.Value, ahead: ir.Value) -> None:
     at = builder.gep(builder.bitcast(pointer, llvm.NOTHING), [ahead])
     kinds = [llvm.NOTHING, I32, I32, I32]
     function = llvm.external(builder, "llvm.prefetch.p0", ir.VoidType(), kinds)

@@ -82,7 +82,7 @@ def constant(builder: ir.IRBuilder, kind: types.Type, value: Any) -> ir.Constant
     return ir.Constant(register_type(kind), value if isinstance(value, float) else int(value))
 
 
-def _constant_array(builder: ir.IRBuilder, kind: types.Array, value: np.ndarray) -> Any:
+def _constant_array(builder: ir.IRBuilder, kind: types.Array, value: np.ndarray) -> ir.Value:
     value = np.ascontiguousarray(value)
     item = memory_type(kind.dtype)
     value = value.view(np.uint8) if value.dtype == np.bool_ else value
@@ -100,7 +100,7 @@ def in_module(builder: ir.IRBuilder, content: ir.Constant, name: str) -> ir.Glob
     return variable
 
 
-def cast(builder: ir.IRBuilder, value: Any, kind: types.Type, wanted: types.Type) -> Any:
+def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types.Type) -> ir.Value:
     if isinstance(wanted, types.Literal):
         wanted = types.unliteral(wanted)
     if kind == wanted:
@@ -151,24 +151,24 @@ def scalar_of(kind: types.Type) -> types.Type:
     return kind.scalar if isinstance(kind, Lanes) else kind
 
 
-def splat(builder: ir.IRBuilder, value: Any, lanes: Lanes) -> Any:
+def splat(builder: ir.IRBuilder, value: ir.Value, lanes: Lanes) -> ir.Value:
     none = ir.Constant(register_type(lanes), ir.Undefined)
     one = builder.insert_element(none, value, I32(0))
     return shuffle(builder, one, none, [0] * lanes.width)
 
 
-def lane(builder: ir.IRBuilder, value: Any, k: int) -> Any:
+def lane(builder: ir.IRBuilder, value: ir.Value, k: int) -> ir.Value:
     return builder.extract_element(value, I32(k))
 
 
-def pack(builder: ir.IRBuilder, values: list, lanes: Lanes) -> Any:
+def pack(builder: ir.IRBuilder, values: list, lanes: Lanes) -> ir.Value:
     made = ir.Constant(register_type(lanes), ir.Undefined)
     for k, value in enumerate(values):
         made = builder.insert_element(made, value, I32(k))
     return made
 
 
-def shuffle(builder: ir.IRBuilder, a: Any, b: Any, order: list[int]) -> Any:
+def shuffle(builder: ir.IRBuilder, a: ir.Value, b: ir.Value, order: list[int]) -> ir.Value:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(order)), order))
 
 
@@ -182,31 +182,37 @@ def overloaded(kind: ir.Type) -> str:
 # --- memory ---------------------------------------------------------------------------------------
 
 
-def room(builder: ir.IRBuilder, kind: ir.Type) -> Any:
+def room(builder: ir.IRBuilder, kind: ir.Type) -> ir.Value:
     """Allocate stack memory of the present function, once for all iterations of a loop."""
     with builder.goto_entry_block():
         return builder.alloca(kind)
 
 
-def at(builder: ir.IRBuilder, pointer: Any, *indices: int) -> Any:
+def at(builder: ir.IRBuilder, pointer: ir.Value, *indices: int) -> ir.Value:
     return builder.gep(pointer, [I32(index) for index in indices], inbounds=True)
 
 
 def put(
-    builder: ir.IRBuilder, kind: types.Type, value: Any, pointer: Any, align: int | None = None
+    builder: ir.IRBuilder,
+    kind: types.Type,
+    value: ir.Value,
+    pointer: ir.Value,
+    align: int | None = None,
 ) -> None:
     value = _converted(builder, kind, value, memory_type, lambda truth: builder.zext(truth, I8))
     builder.store(value, pointer, align=align)
 
 
-def get(builder: ir.IRBuilder, kind: types.Type, pointer: Any, align: int | None = None) -> Any:
+def get(
+    builder: ir.IRBuilder, kind: types.Type, pointer: ir.Value, align: int | None = None
+) -> ir.Value:
     value = builder.load(pointer, align=align)
     return _converted(builder, kind, value, register_type, lambda byte: builder.trunc(byte, I1))
 
 
 def _converted(
-    builder: ir.IRBuilder, kind: types.Type, value: Any, to: Callable, truth: Callable
-) -> Any:
+    builder: ir.IRBuilder, kind: types.Type, value: ir.Value, to: Callable, truth: Callable
+) -> ir.Value:
     if register_type(kind) == memory_type(kind):
         return value
     if not isinstance(kind, types.BaseTuple):
@@ -219,11 +225,11 @@ def _converted(
 # --- tuples and arrays ----------------------------------------------------------------------------
 
 
-def make_tuple(builder: ir.IRBuilder, kind: types.Type, items: Sequence) -> Any:
+def make_tuple(builder: ir.IRBuilder, kind: types.Type, items: Sequence) -> ir.Value:
     return make_struct(builder, register_type(kind), items)
 
 
-def make_struct(builder: ir.IRBuilder, kind: ir.Type, items: Sequence) -> Any:
+def make_struct(builder: ir.IRBuilder, kind: ir.Type, items: Sequence) -> ir.Value:
     """Build a structure, or an array in registers."""
     made = ir.Constant(kind, ir.Undefined)
     for k, item in enumerate(items):
@@ -231,14 +237,14 @@ def make_struct(builder: ir.IRBuilder, kind: ir.Type, items: Sequence) -> Any:
     return made
 
 
-def unpack(builder: ir.IRBuilder, value: Any) -> list:
+def unpack(builder: ir.IRBuilder, value: ir.Value) -> list:
     count = len(value.type.elements) if hasattr(value.type, "elements") else value.type.count
     return [builder.extract_value(value, k) for k in range(count)]
 
 
 def make_array(
     builder: ir.IRBuilder, kind: types.Array, data: Any, shape: Sequence, strides: Sequence
-) -> Any:
+) -> ir.Value:
     made = register_type(kind)
     parts = [data, *(make_struct(builder, made.elements[1], part) for part in (shape, strides))]
     return make_struct(builder, made, parts)
@@ -247,7 +253,7 @@ def make_array(
 class ArrayParts:
     """Parts of an array, extracted on access."""
 
-    def __init__(self, builder: ir.IRBuilder, kind: types.Array, value: Any):
+    def __init__(self, builder: ir.IRBuilder, kind: types.Array, value: ir.Value):
         self.builder, self.kind, self.value = builder, kind, value
 
     @functools.cached_property
@@ -264,8 +270,8 @@ class ArrayParts:
 
 
 def item_pointer(
-    builder: ir.IRBuilder, kind: types.Array, value: Any, indices: Sequence, last: Any = None
-) -> Any:
+    builder: ir.IRBuilder, kind: types.Array, value: ir.Value, indices: Sequence, last: Any = None
+) -> ir.Value:
     """Return the address of an item; `last` is the last stride, if known."""
     parts = ArrayParts(builder, kind, value)
     if kind.layout == "C":
@@ -278,7 +284,7 @@ def item_pointer(
     return byte_pointer(builder, parts.data, functools.reduce(builder.add, products))
 
 
-def byte_pointer(builder: ir.IRBuilder, pointer: Any, offset: Any) -> Any:
+def byte_pointer(builder: ir.IRBuilder, pointer: ir.Value, offset: ir.Value) -> ir.Value:
     address = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
     return builder.bitcast(address, pointer.type)
 
@@ -295,7 +301,7 @@ def external(
     return declared if declared is not None else ir.Function(builder.module, kind, name)
 
 
-def call(builder: ir.IRBuilder, name: str, result: ir.Type, values: list) -> Any:
+def call(builder: ir.IRBuilder, name: str, result: ir.Type, values: list) -> ir.Value:
     """Call a function of LLVM (whose name contains the type) or of the C library."""
     kinds = [value.type for value in values]
     if name.startswith("llvm."):
@@ -315,7 +321,7 @@ def of_library(name: str) -> Callable:
 
 
 @contextmanager
-def counted(builder: ir.IRBuilder, count: Any) -> Iterator[Any]:
+def counted(builder: ir.IRBuilder, count: ir.Value) -> Iterator[Any]:
     """Write a loop over the numbers below `count`; its body is written within this context."""
     before = builder.block
     head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))

@@ -2,10 +2,10 @@
 
 The arguments of a loop stay in memory; the body is a function of their address and an index.
 
-Waking sleeping threads takes as long as a small loop. A kernel with many loops is therefore run by
-a *team* (`by_team`): its first thread executes the kernel, the others wait for its loops. Each
-thread has a fixed range of the indices of a loop, the same in each step, and takes indices of
-threads that make no progress (work stealing).
+Waking threads takes as long as a small loop. A kernel with many loops is therefore run by a *team*
+(`by_team`): its first thread executes the kernel, the others wait for its loops. Each thread has a
+fixed range of the indices of a loop, and takes indices of threads that make no progress (work
+stealing).
 """
 
 import ctypes
@@ -67,7 +67,7 @@ def _many_threads(lowering: Any) -> bool:
 # --- shared memory words ----------------------------------------------------------------------
 
 
-def _word(builder: ir.IRBuilder, address: Any) -> Any:
+def _word(builder: ir.IRBuilder, address: Any) -> ir.Value:
     return builder.inttoptr(address, I64.as_pointer())
 
 
@@ -262,16 +262,16 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 
 # --- teams ------------------------------------------------------------------------------------
 
-# Only the leader writes _STATE: it waits, leads, has ended. Why a loop is done exactly once:
+# Only the leader writes _STATE: it waits, leads, has ended. Every index is processed exactly once:
 # 1. A ticket is the number of the loop and the indices left in a range. An index is taken by a
-#    compare-and-swap of the ticket, so by one thread; a ticket of another loop is never equal.
+#    compare-and-swap of the ticket, so by one thread; tickets of other loops are never equal.
 # 2. The leader releases task, arguments and count before the tickets, and every swap continues that
-#    release: who has taken an index has acquired the words of its loop.
-# 3. A taken index is missing in _DONE until it is finished, and the leader stays in the loop until
-#    _DONE and its own indices are the count: the words cannot change meanwhile, and by acquiring
-#    _DONE it sees all that the others stored.
-# 4. It takes what is left itself, and so waits for taken indices, never for a thread: one that was
-#    preempted, woke late or left, since no leader came in time, delays nothing and takes nothing.
+#    release: a thread that takes an index has acquired the words of its loop.
+# 3. _DONE lacks a taken index until it is finished, and the leader stays in the loop until _DONE
+#    plus its own indices is the count: the words do not change meanwhile, and by acquiring _DONE
+#    it sees all stores of the others.
+# 4. The leader takes the remaining indices itself: it waits for taken indices, never for a thread
+#    that was preempted, woke late or left.
 # Words, each in a separate cache line.
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
@@ -293,8 +293,8 @@ def new_team(threads: int) -> np.ndarray:
 def _take_part(team, k):
     """Process indices of the present loop, those of thread `k` first; return their number.
 
-    Data of a thread is in its caches, and moving it may cost more than the work. So others take
-    from a range only if it does not shrink for a while.
+    Data of a thread is in its caches, so others take from a range only if it does not shrink for a
+    while.
     """
     size = read(team + _SIZE)
     epoch = read(team + _TICKETS + 64 * k) >> 32

@@ -112,7 +112,7 @@ def _transposed(builder: ir.IRBuilder, rows: list) -> list:
     ]
 
 
-def _record(builder: ir.IRBuilder, kind: Any, pointer: Any, components: int) -> Any:
+def _record(builder: ir.IRBuilder, kind: Any, pointer: ir.Value, components: int) -> ir.Value:
     """Cast an address to that of a vector of components."""
     vector = ir.VectorType(llvm.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())

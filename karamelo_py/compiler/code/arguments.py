@@ -127,7 +127,7 @@ class ArgumentBuffer:
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
         """Write the arguments to memory; return it and the address of the outermost tuple.
 
-        `at` is the address that the memory will be copied to, if it is not used in place.
+        `at` is the address that the memory will be copied to, if any.
         """
         memory = bytearray(max(plan.text.size, 1))
         if at is None:

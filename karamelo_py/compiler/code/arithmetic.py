@@ -99,7 +99,7 @@ def _binary(kind_of: Callable, write: Callable) -> Callable:
 
 
 def _sum(of_reals: str, of_whole: str) -> Callable:
-    def write(builder: ir.IRBuilder, kind: types.Type, *values: Any) -> Any:
+    def write(builder: ir.IRBuilder, kind: types.Type, *values: ir.Value) -> ir.Value:
         return getattr(builder, of_whole if _is_whole(kind) else of_reals)(*values)
 
     return _binary(common, write)
@@ -119,7 +119,7 @@ def _shift(write: Callable) -> Callable:
     return _binary(lambda a, b: common(a, a) if _is_whole(a) and _is_whole(b) else None, write)
 
 
-def _shifted_right(builder: ir.IRBuilder, kind: types.Integer, *values: Any) -> Any:
+def _shifted_right(builder: ir.IRBuilder, kind: types.Integer, *values: ir.Value) -> ir.Value:
     return (builder.ashr if kind.signed else builder.lshr)(*values)
 
 
@@ -138,7 +138,7 @@ def _truth_of(kind: types.Type) -> types.Type:
 
 
 def _compared(sign: str, kind: types.Type) -> Callable:
-    def compared(builder: ir.IRBuilder, values: list) -> Any:
+    def compared(builder: ir.IRBuilder, values: list) -> ir.Value:
         if not _is_whole(kind):
             compare = builder.fcmp_unordered if sign == "!=" else builder.fcmp_ordered
         else:
@@ -151,7 +151,7 @@ def _compared(sign: str, kind: types.Type) -> Callable:
 
 def _mixed(sign: str, first_signed: bool) -> Callable:
 
-    def compared(builder: ir.IRBuilder, values: list) -> Any:
+    def compared(builder: ir.IRBuilder, values: list) -> ir.Value:
         values = [v if v.type.width == 64 else builder.sext(v, llvm.I64) for v in values]
         negative = builder.icmp_signed("<", values[not first_signed], llvm.I64(0))
         below = builder.icmp_signed(
@@ -165,14 +165,14 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 def _whole_division(remainder: bool) -> Callable:
     """Make Python's integer division; x // 0 is 0."""
 
-    def write(builder: ir.IRBuilder, kind: types.Type, *values: Any) -> Any:
+    def write(builder: ir.IRBuilder, kind: types.Type, *values: ir.Value) -> ir.Value:
         of = _whole_parts if _is_whole(kind) else _real_parts
         return of(builder, kind, *values)[remainder]
 
     return _binary(common, write)
 
 
-def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: Any, y: Any) -> tuple[Any, Any]:
+def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.Value) -> tuple:
     zero, one = x.type(0), x.type(1)
     safe = isinstance(y, ir.Constant) and y.constant not in (0, -1)
     bad = None
@@ -195,7 +195,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: Any, y: Any) -> 
     return tuple(builder.select(bad, zero, part) for part in (quotient, rest))
 
 
-def _real_parts(builder: ir.IRBuilder, kind: types.Float, x: Any, y: Any) -> tuple[Any, Any]:
+def _real_parts(builder: ir.IRBuilder, kind: types.Float, x: ir.Value, y: ir.Value) -> tuple:
     """Divide like Python's floats (Objects/floatobject.c); division by 0 gives NumPy's results."""
     real = x.type
     zero, one = real(0.0), real(1.0)
@@ -234,7 +234,7 @@ def _power(a: types.Type, b: types.Type) -> Operation | None:
 
 
 def _product(kind: types.Type, exponent: int) -> Callable:
-    def power(builder: ir.IRBuilder, values: list) -> Any:
+    def power(builder: ir.IRBuilder, values: list) -> ir.Value:
         multiply = builder.mul if _is_whole(kind) else builder.fmul
         factor, left, made = values[0], abs(exponent), None
         while left:
@@ -252,7 +252,7 @@ def _alone(a: types.Type) -> types.Type:
     return common(a, a)
 
 
-def _negative(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
+def _negative(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
     return builder.neg(value) if _is_whole(kind) else builder.fneg(value)
 
 
@@ -262,7 +262,7 @@ def _inverted(a: types.Type) -> types.Type | None:
     return a if isinstance(a, types.Boolean) else common(a, a)
 
 
-def _not(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
+def _not(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
     return builder.not_(value)
 
 
@@ -272,7 +272,7 @@ def _sized(a: types.Type) -> types.Type | None:
     return common(a, a) if isinstance(a, types.Boolean) else a
 
 
-def _size(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
+def _size(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
     if not _is_whole(kind):
         return llvm.call(builder, "llvm.fabs", value.type, [value])
     below = builder.icmp_signed("<", value, value.type(0))
@@ -288,7 +288,7 @@ def _extreme(sign: str) -> Callable:
         kind = common(*kinds)
         better = _compared(sign, kind)
 
-        def extreme(builder: ir.IRBuilder, values: list) -> Any:
+        def extreme(builder: ir.IRBuilder, values: list) -> ir.Value:
             best = values[0]
             for value in values[1:]:
                 best = builder.select(better(builder, [value, best]), value, best)
@@ -299,7 +299,7 @@ def _extreme(sign: str) -> Callable:
     return operation
 
 
-def _as_it_is(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
+def _as_it_is(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
     return value
 
 
@@ -325,21 +325,21 @@ def _of_reals(name: str, count: int = 1) -> Callable:
 
 
 def _rounding(name: str) -> Callable:
-    def rounded(builder: ir.IRBuilder, kind: types.Type, value: Any) -> Any:
+    def rounded(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
         return builder.fptosi(llvm.call(builder, name, value.type, [value]), llvm.I64)
 
     return _unary(_real_of, rounded, types.int64)
 
 
-def _is_no_number(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
+def _is_no_number(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
     return builder.fcmp_unordered("uno", x, x)
 
 
-def _is_infinite(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
+def _is_infinite(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
     return builder.fcmp_ordered("==", _size(builder, kind, x), x.type(math.inf))
 
 
-def _is_finite(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
+def _is_finite(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
     rest = builder.fsub(x, x)
     return builder.fcmp_ordered("ord", rest, rest)
 
@@ -348,7 +348,7 @@ def _frexp(a: types.Type) -> Operation:
     kind = _real_of(a)
     result = types.Tuple((kind, types.int32))
 
-    def parts(builder: ir.IRBuilder, values: list) -> Any:
+    def parts(builder: ir.IRBuilder, values: list) -> ir.Value:
         room = llvm.room(builder, llvm.I32)
         fraction = llvm.call(builder, "frexp", values[0].type, [*values, room])
         return llvm.make_tuple(builder, result, [fraction, builder.load(room)])
@@ -373,7 +373,7 @@ def _numpy_extreme(sign: str) -> Callable:
         if _is_whole(kind):
             return _extreme(sign)(a, b)
 
-        def extreme(builder: ir.IRBuilder, values: list) -> Any:
+        def extreme(builder: ir.IRBuilder, values: list) -> ir.Value:
             first, second = values
             chosen = builder.fcmp_unordered(sign, first, second)
             ordered = builder.fcmp_ordered("ord", second, second)
@@ -399,7 +399,7 @@ _TOLD = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.c_int64)
 machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of_python))
 
 
-def _gamma(builder: ir.IRBuilder, kind: types.Type, x: Any) -> Any:
+def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
     """Call Python's gamma function, whose bits do not depend on the C library."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)

@@ -89,7 +89,7 @@ def passing(function: ir.Function) -> ir.Function:
     return function
 
 
-def failure_at(builder: ir.IRBuilder) -> Any:
+def failure_at(builder: ir.IRBuilder) -> ir.Value:
     """Return the address of the present `Failure`, or 0."""
     function = builder.function
     return function.args[-1] if hasattr(function, "passes_failure") else llvm.I64(0)

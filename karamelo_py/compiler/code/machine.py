@@ -12,9 +12,8 @@ from collections.abc import Callable
 
 from llvmlite import binding as llvm
 
-# The loop over the nodes of a stencil must be unrolled, even for 27: weights are then in registers,
-# not on the stack. Quadratic splines in 3D are 1.7 times as fast. In loops of hundreds of
-# instructions, a counter for each array takes registers from the numbers.
+# Loops over up to 27 nodes of a stencil must be unrolled to have weights in registers: quadratic
+# splines in 3D are 1.7 times as fast. In long loops, a counter for each array costs registers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
 # At 0 compiling takes about half of the time, and steps up to four times; bits stay equal.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3

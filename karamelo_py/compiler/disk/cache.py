@@ -1,11 +1,11 @@
 """Compiled kernels on disk, in two levels.
 
-A file ``.kernel`` has the name, result and callees of a kernel. Its key is a hash of the function,
-the argument types and the sources of all that write kernels. If there is none, the kernel is
-traced, and its machine code looked up by a hash of the LLVM text, in a file ``.code``.
+A file ``.kernel`` has name, result and callees of a kernel. Its key is a hash of the function, the
+argument types and the sources of all that write kernels. Without it, the kernel is traced, and its
+machine code looked up by a hash of the LLVM text, in a file ``.code``.
 
-Files become code: only those that no other user can write, with a correct checksum, are read.
-Whatever is wrong with them, the kernel is compiled, and the user warned once.
+Files become code: only those that no other user can write, with a correct checksum, are read. With
+any defect the kernel is compiled, and the user warned once.
 """
 
 import contextlib
@@ -34,9 +34,9 @@ from karamelo_py.compiler.disk import lock
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.choices import name_of
 
-ROOM = 400e6  # bytes; of what takes more, the files that were used least recently are forgotten
+ROOM = 400e6  # bytes
 
-_began = time.time()  # sources that are newer may not be what Python has read
+_began = time.time()
 _VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
 _INSTALLED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
 _NAMED = (python.FunctionType, python.ModuleType, type)  # their sources say what they are
@@ -88,7 +88,7 @@ def _stamp(name: str) -> str:
             with contextlib.suppress(Unknown, RecursionError):
                 values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
-        if not one.startswith(__package__.partition(".")[0]):  # its rooms import as they may
+        if not one.startswith(__package__.partition(".")[0]):  # checked by its import contract
             named = choices.modules_of(*(v for _, v in plain if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
     return short_hash(*(words[one] for one in sorted(words)))
@@ -125,7 +125,7 @@ def _words(thing: Any) -> str:
         raise Unknown(repr(thing))
     parts = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
     for cell in function.__closure__ or ():
-        with contextlib.suppress(ValueError):  # it is empty as yet
+        with contextlib.suppress(ValueError):  # an empty cell
             parts.append(cell.cell_contents)
     code = [
         (c.co_firstlineno, c.co_code, c.co_names, [k for k in c.co_consts if isinstance(k, _PLAIN)])
@@ -137,7 +137,7 @@ def _words(thing: Any) -> str:
 def _class(one: type, by_name: bool = False) -> str:
     """Describe a class by name, fields and plain attributes.
 
-    Raises `Unknown` for a class that its name does not lead to: one of a plug-in, or any `by_name`.
+    Raises `Unknown` for a class not found by its name, if it is of a plug-in or `by_name`.
     """
     first, *rest = one.__qualname__.split(".")
     named = _names_in(one.__module__).get(first)
@@ -211,7 +211,7 @@ class KernelFiles:
             if any(_stamp(name) != stamp for name, stamp in stamps.items()):
                 return None
             self._load(unit)
-        except (Unknown, FileNotFoundError):  # code was taken away, or a module is not there
+        except (Unknown, FileNotFoundError):  # code or a module is missing
             return None
         except Exception:
             _damaged(path)
@@ -251,7 +251,7 @@ def _content(path: Path) -> bytes | None:
     """Read a file; warn of a damaged one and delete it. None if nothing can be read."""
     try:
         content = files.read(path)
-    except (FileNotFoundError, NotADirectoryError):  # told of where a file is to be written
+    except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
         files.report_error(error)

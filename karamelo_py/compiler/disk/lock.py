@@ -1,7 +1,7 @@
 """Lock by which one process compiles a kernel while others wait for its file.
 
-The system releases it when its process ends. It only saves work: on read-only folders, file systems
-without locks, and after a timeout, each process compiles.
+It only saves work: on read-only folders, file systems without locks, and after a timeout, each
+process compiles. The system releases it when its process ends.
 """
 
 import contextlib

@@ -1,9 +1,8 @@
 """Tuples of arrays stored in memory and passed as one pointer.
 
-A setup has about forty arrays of seven to nine numbers: three hundred arguments of each call, and
-half of the code to compile. Therefore a kernel holds its setup when it starts: a tuple with arrays
-becomes a pointer to its items, and so do nested tuples. Its type is still a tuple type (items by
-name and index, selection by class); tuples without arrays remain values.
+A setup has about forty arrays of seven to nine numbers: three hundred arguments, and half of the
+code to compile. So a kernel holds its setup when it starts: a tuple with arrays becomes a pointer
+to its items, and so do nested tuples. Its type is still a tuple type.
 """
 
 import hashlib
@@ -99,7 +98,7 @@ def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
     return HeldValue(held, room)
 
 
-def item_of(builder: ir.IRBuilder, held: HeldTuple, pointer: Any, k: int) -> Any:
+def item_of(builder: ir.IRBuilder, held: HeldTuple, pointer: ir.Value, k: int) -> ir.Value:
     return llvm.get(builder, held[k], llvm.at(builder, pointer, 0, k))
 
 
@@ -118,7 +117,7 @@ def _at_hand(lowering: Any, held: Any) -> Any:
     return HeldValue(held._kind, _copy(lowering.builder, held._kind, held._value))
 
 
-def _copy(builder: ir.IRBuilder, held: HeldTuple, source: Any) -> Any:
+def _copy(builder: ir.IRBuilder, held: HeldTuple, source: ir.Value) -> ir.Value:
     room = llvm.room(builder, source.type.pointee)
     builder.store(builder.load(source), room)
     for k, item in enumerate(held):

@@ -49,7 +49,7 @@ def _index(lowering: Any, thing: Any, count: Any) -> Any:
     return _from_the_end(lowering.builder, value, count)
 
 
-def _from_the_end(builder: ir.IRBuilder, value: Any, count: Any) -> Any:
+def _from_the_end(builder: ir.IRBuilder, value: ir.Value, count: ir.Value) -> ir.Value:
     negative = builder.icmp_signed("<", value, llvm.I64(0))
     return builder.select(negative, builder.add(value, count), value)
 

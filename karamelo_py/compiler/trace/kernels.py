@@ -1,7 +1,7 @@
 """Kernels: loops called by Python and other kernels, traced as a whole and cached on disk.
 
-A kernel is one LLVM function for arguments of some types; its name contains the hash of its text.
-Python calls its entry with the address of the arguments. Other kernels refer to its name.
+A kernel is one LLVM function for argument types; its name contains the hash of its text, and other
+kernels refer to it. Python calls its entry with the address of the arguments.
 """
 
 import contextvars

@@ -198,7 +198,7 @@ def _where(condition, a, b):
 OF_REALS |= {fma, where}
 
 
-def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> Any:
+def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> ir.Value:
     bits = builder.bitcast(mask, ir.IntType(mask.type.count))
     return builder.icmp_signed(sign, bits, ir.Constant(bits.type, wanted))
 
@@ -227,7 +227,7 @@ def _any(mask):
     return types.boolean(mask), lambda builder, bits: _all_bits(builder, bits, "!=", 0)
 
 
-def all_same(builder: ir.IRBuilder, value: Any) -> Any:
+def all_same(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
     first = llvm.shuffle(builder, value, value, [0] * value.type.count)
     return _all_bits(builder, builder.icmp_signed("==", value, first), "==", -1)
 
@@ -252,7 +252,7 @@ def _lanes_changed(thing: Any, change: Callable) -> Any:
     return mapped(changed, thing)
 
 
-def _room(builder: ir.IRBuilder, lanes: Lanes) -> Any:
+def _room(builder: ir.IRBuilder, lanes: Lanes) -> ir.Value:
     kind = ir.VectorType(llvm.memory_type(lanes.scalar), lanes.width)
     return builder and llvm.room(builder, kind)
 
@@ -270,7 +270,7 @@ def _from_memory(builder: ir.IRBuilder, stored: Value) -> Value:
     return Value(stored._kind, bits if bits.type == wanted else builder.trunc(bits, wanted))
 
 
-def _lane_address(builder: ir.IRBuilder, stored: Value, k: Any) -> Any:
+def _lane_address(builder: ir.IRBuilder, stored: Value, k: ir.Value) -> ir.Value:
     scalar = llvm.memory_type(stored._kind.scalar)
     return builder.gep(builder.bitcast(stored._value, scalar.as_pointer()), [k])
 

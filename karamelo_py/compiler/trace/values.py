@@ -111,8 +111,7 @@ _replacements: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("ca
 def in_one(called: dict[Any, Callable]) -> Iterator[None]:
     """Write GPU modules within this context, which contain all that they call.
 
-    Kernels are inlined, and so are functions otherwise called by address: `called` has the function
-    for each signature.
+    `called` has the inlined function for each signature called by address.
     """
     before = _replacements.set(tuple(called.items()))
     try:
@@ -158,7 +157,7 @@ class Intrinsic:
     """A function of values, defined by its signature for types and its code.
 
     ``definition(*types)`` returns ``result(*arguments)`` and ``codegen(builder, *values)``, or None
-    if it is not defined. If it is not defined otherwise, integer types with known values are tried.
+    if not defined; integer types with known values are tried last.
     """
 
     def __init__(self, definition: Callable):
@@ -291,7 +290,7 @@ class HeldValue:
 
 def implementations(kind: type) -> dict[Callable, Callable] | None:
     """Return the functions that a number type implements, or None."""
-    return getattr(kind, "implements", None)
+    return kind.implements if hasattr(kind, "implements") else None
 
 
 def implemented(function: Callable, arguments: tuple) -> Callable | None:
