@@ -48,9 +48,6 @@ class Unknown(Exception):
     """A kernel depends on a thing without a name that is the same in another process."""
 
 
-# --- first level: by the sources ------------------------------------------------------------------
-
-
 def short_hash(*words: str) -> str:
     return hashlib.sha256("|".join(words).encode()).hexdigest()[:32]
 
@@ -226,9 +223,6 @@ class KernelFiles:
 
 def _without_code(unit: Any) -> Any:
     return unit._replace(code=b"", needs=tuple(map(_without_code, unit.needs)))
-
-
-# --- second level: by the LLVM text --------------------------------------------------------------
 
 
 def machine_code(name: str, make: Callable[[], bytes]) -> bytes:

@@ -105,8 +105,6 @@ class Flow:
     def __init__(self, lowering: Any):
         self.lowering, self.builder = lowering, lowering.builder
 
-    # --- branches
-
     def _block(self) -> Any:
         return self.builder and self.builder.append_basic_block("way")
 
@@ -200,8 +198,6 @@ class Flow:
         if self.builder:
             exceptions.fail(self.builder, kind, arguments)
 
-    # --- loops
-
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
@@ -292,8 +288,6 @@ class Flow:
             return Value(kind, builder and builder.add(counter._value, step._value, flags=("nsw",)))
 
         return Counter(start, goes_on, after)
-
-    # --- operations that differ from Python's for values
 
     def negate(self, thing: Any) -> Any:
         return emit(operator.not_, thing) if is_value(thing) else not thing

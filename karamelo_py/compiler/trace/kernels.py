@@ -74,12 +74,11 @@ class Compilation:
     @contextmanager
     def told_to(self, listener: Any) -> Iterator[None]:
         """Call ``on_start(name)`` and ``on_end()`` of a listener within this context."""
-        before = self._listeners.get()
-        self._listeners.set((*before, listener))
+        before = self._listeners.set((*self._listeners.get(), listener))
         try:
             yield
         finally:
-            self._listeners.set(before)
+            self._listeners.reset(before)
 
     @contextmanager
     def __call__(self, name: str = "") -> Iterator[None]:
@@ -254,9 +253,6 @@ def noinline(function: Callable) -> Callable:
         not_inlined.add(function)
         shared(function)
     return function
-
-
-# --- functions called by address ------------------------------------------------------------------
 
 
 def address_of(function: Callable, signature: types.Type) -> int:

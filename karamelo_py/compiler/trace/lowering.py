@@ -53,8 +53,6 @@ class Lowering:
         self.regardless = False  # whether it continues when a called function raises
         self.read: dict[tuple, Any] = {}  # items already read from held tuples in this branch
 
-    # --- values in point functions, and their types
-
     def wrapped(self, kind: types.Type, value: Any) -> Any:
         """Wrap a value for traced functions."""
         if _is_of_values(type(kind)):
@@ -123,8 +121,6 @@ class Lowering:
             return first.copy(layout="A", readonly=True)
         return None
 
-    # --- operations
-
     def call(self, function: Callable, arguments: tuple) -> Any:
         if function in traced.BUILTINS:
             return traced.BUILTINS[function](self, *arguments)
@@ -192,8 +188,6 @@ class Lowering:
             value = self.builder and item_of(self.builder, held._kind, held._value, k)
             self.read[key] = self.wrapped(held._kind[k], value), held  # keeps its id unique
         return self.read[key][0]
-
-    # --- separate functions
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
         """Return the separate function of the present module for `run`."""

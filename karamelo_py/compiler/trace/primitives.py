@@ -241,9 +241,6 @@ def _branch(value):
     )
 
 
-# --- lane after lane ---------------------------------------------------------------------------
-
-
 def _lanes_changed(thing: Any, change: Callable) -> Any:
 
     def changed(item: Any) -> Any:
