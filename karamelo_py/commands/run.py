@@ -24,7 +24,7 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 
 
 def carry_out(hub: Hub, **length: Any) -> None:
-    """Carry out a run command of a `length` (see `RunLoop`), or what stands for it.
+    """Carry out a run command of a `length` (see `RunLoop`), or what replaces it.
 
     A rehearsal notes the run, a `Pause` stops before it, and ``check`` reports instead. A run that
     was over in the restart file of a resumed script is skipped.

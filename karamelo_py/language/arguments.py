@@ -22,9 +22,8 @@ _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 class Argument:
-    """One unevaluated argument of a call.
-
-    `text` is the argument as written, without surrounding blanks, and `place` its place.
+    """One unevaluated argument of a call: its `text` as written, without surrounding blanks, and
+    `place`.
     """
 
     def __init__(self, raw: Raw, interpreter: Any):
@@ -54,8 +53,7 @@ class Argument:
     def word(self) -> str | None:
         """Return it as a word: bare, quoted, or in a text variable; None for arithmetic.
 
-        ``neo-hookean`` or ``dump.*.gz`` are words, unless they contain a known name, which makes
-        them arithmetic.
+        ``neo-hookean`` or ``dump.*.gz`` are words, unless they contain the name of a value.
         """
         quoted = _QUOTED.fullmatch(self.text)
         if quoted:
@@ -70,7 +68,7 @@ class Argument:
         return None if meaningful else self.text
 
     def words(self, literals: Sequence[str] = ()) -> str:
-        """Return its text where only a word fits, even if it looks like arithmetic."""
+        """Return its text, even if it looks like arithmetic."""
         if self.text in literals:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
@@ -90,7 +88,6 @@ class Argument:
         return self.text
 
     def value(self, hub: Scene | None) -> Value:
-        """Evaluate to a number, text or formula."""
         if self.is_null:
             raise ScriptError(
                 "NULL cannot be used here", place=self.place, expected="a number or a formula"
@@ -98,7 +95,6 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def value_with(self, seeds: Sequence[str]) -> Value:
-        """Evaluate with `seeds` as the variables of a formula."""
         interpreter = self._interpreter
         script = copy(interpreter)
         script.variables = interpreter.variables | {name: Expression.seed(name) for name in seeds}
@@ -126,16 +122,15 @@ class Argument:
         return [name for name, value in variables if isinstance(value, float)]
 
     def knows(self, name: str) -> bool:
-        """Tell if a name has a meaning at this place."""
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
-        """Return the last occurrence of `text` in it as an argument."""
+        """Return the last occurrence of `text` in it."""
         start = self._raw.source.text.rindex(text, self._raw.start, self._raw.end)
         return self._from(start, start + len(text))
 
     def keyword(self) -> tuple[str, Argument] | None:
-        """Name and value if it is written ``name = value``."""
+        """Return name and value of ``name = value``."""
         match = _KEYWORD.match(self.text)
         if not match:
             return None
@@ -143,7 +138,7 @@ class Argument:
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """Return the first argument that may be two with a missing comma."""
+    """Return the first argument that may lack a comma."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 

@@ -1,7 +1,6 @@
 """Argument lists that depend on the dimension, as in dimension() and block.
 
-A signature gives the kinds of arguments; here are their *names* in 1D, 2D and 3D, for errors that
-show the form of the dimension in use.
+A signature has the kinds of arguments; here are their names in 1D, 2D and 3D, for errors.
 """
 
 import math
@@ -20,11 +19,11 @@ _HUGE = 1e20
 
 
 class Forms:
-    """The forms of one argument list, by dimension.
+    """The forms of an argument list, by dimension.
 
-    `pattern` is the form of a call, with ``{names}`` and perhaps ``{dimension}``; `names` has the
-    argument names for each supported dimension. Some arguments are one of a few `words`; INF and
-    EDGE mean the `open_ends` (-inf for a lower end, inf for an upper end).
+    `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are those of each
+    supported dimension. Some arguments are one of a few `words`; INF and EDGE mean the `open_ends`
+    (-inf for a lower end, inf for an upper end).
     """
 
     def __init__(
@@ -45,7 +44,7 @@ class Forms:
         return self.pattern.format(dimension=dimension, names=names)
 
     def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
-        """Read the values of `arguments` by name, for `dimension`."""
+        """Return values by name, for `dimension`."""
         if dimension not in self.names:
             dimensions = " or ".join(map(str, sorted(self.names)))
             expected = f"a domain with {dimensions} dimensions"
@@ -82,7 +81,7 @@ class Forms:
         )
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
-        """Format the call with the words of the script, and names for missing arguments."""
+        """Format the call with the words of the script, and names for missing ones."""
         names = self.names[dimension]
         words = [argument.text for argument in arguments][: len(names)]
         line = re.sub(r"\[.*?\]", "", self.pattern)
@@ -125,10 +124,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """Evaluate `argument` to a finite constant number.
-
-    A number that only a run can give is NaN in a rehearsal, and accepted.
-    """
+    """Evaluate `argument` to a finite constant; in a rehearsal, NaN is a result of a run."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

@@ -18,10 +18,7 @@ def wrong_count(
     arguments: Sequence[Argument],
     keywords: Sequence[str],
 ) -> ScriptError:
-    """Make the error for too few or too many arguments of `name`, written in the `form` shown.
-
-    Those `given` by position do not fit, or `keywords` that must be given are missing.
-    """
+    """Make the error for too few or too many `arguments` of `name`, or missing `keywords`."""
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()
@@ -44,14 +41,14 @@ def wrong_count(
 
 
 def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
-    """Write the hint for an argument too many: a word of a keyword, or what is done otherwise."""
+    """Write the hint for an argument too many."""
     words = {word: f"{p.name}={word}" for p in expected if p.keyword for word in p.kind.words}
     word = text if text in words else nearest(text, words)
     return words.get(word or "") or table()["surplus"].get(name)
 
 
 def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list[Parameter]:
-    """List the parameters that were left out, by words that fit only further back."""
+    """List parameters that were left out, by words that fit only further back."""
     missing, rest = [], list(arguments)
     for slot in slots:
         words = () if slot.shown == slot.name else slot.kind.words
@@ -63,7 +60,7 @@ def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
-    """List what is missing; an ID directly after another missing word is not listed."""
+    """List what is missing, but no ID directly after another missing word."""
     words = {p.shown for p in slots if p.shown != p.name}
     return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
@@ -71,7 +68,7 @@ def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str
 def _filled(
     slots: Sequence[Parameter], arguments: Sequence[Argument], missing: Sequence[Parameter]
 ) -> tuple[Argument, str | None]:
-    """Find the argument given instead of the first missing one; fill words into all arguments."""
+    """Find the argument instead of the first missing one; fill words into all arguments."""
     rest, before = iter(arguments), next(k for k, slot in enumerate(slots) if slot in missing)
     words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
     if True in words:
@@ -80,7 +77,6 @@ def _filled(
 
 
 def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]) -> ScriptError:
-    """Make the error for ``word = value`` that no parameter is called."""
     by_name = [p.name for p in expected if p.keyword]
     longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
@@ -148,7 +144,7 @@ def misfit(
 def guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
 ) -> Place | None:
-    """Find the place of the argument that an error names, or else of the word at fault."""
+    """Find the place of the argument that an error names, or of the word at fault."""
     if isinstance(error.argument, int) and error.argument < len(arguments):
         plain = [argument for argument in arguments if argument.keyword() is None]
         return (arguments if error.argument >= 0 else plain)[error.argument].place

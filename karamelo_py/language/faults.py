@@ -23,8 +23,7 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 def as_script_error(name: str, where: str, code: Any, place: Place | None) -> Iterator[None]:
     """Convert an exception of a style (``fix drag``) to an error of the script at `place`.
 
-    `where` is the active part, such as a hook; the traceback is searched for the file of `code`, a
-    class or function.
+    `where` is the active part, such as a hook; the last line in the file of `code` is named.
     """
     try:
         yield
@@ -36,10 +35,7 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
 
 
 def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:
-    """Make the error of a script that uses a faulty style (``fix drag``).
-
-    Names the package; `more` is appended to the hint.
-    """
+    """Make the error of a script that uses a faulty style (``fix drag``), with its package."""
     family, _, style = name.rpartition(" ")
     family = family or "command"
     package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
@@ -50,7 +46,7 @@ def fault(name: str, message: str, place: Place | None, more: str = "") -> Scrip
 
 
 def cause_of(error: BaseException) -> str:
-    """Describe an exception in one line; for code that cannot be compiled, with the user's line."""
+    """Describe an exception in one line, with the user's line if it cannot be compiled."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -61,7 +57,7 @@ def cause_of(error: BaseException) -> str:
 
 
 def _others() -> tuple[str, ...]:
-    """List folders that are not the user's: this program, Python's library, installed packages."""
+    """List the folders of this program, Python's library and installed packages."""
     libraries = map(sysconfig.get_path, ("stdlib", "purelib", "platlib"))
     return (str(Path(__file__).parents[1]), *libraries)
 

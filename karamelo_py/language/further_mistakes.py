@@ -1,8 +1,7 @@
 """Find further, independent mistakes of a script after the first.
 
-The rest of the script is tried. What a wrong statement would have defined is recorded; statements
-that use it are skipped, and what they would define is recorded in turn. Names of commands and
-styles in them are still checked, because they depend on nothing.
+What a wrong statement would have defined is recorded. Statements that use it are skipped, and what
+they would define is recorded in turn. Names of commands and styles are checked even there.
 """
 
 import re
@@ -66,7 +65,7 @@ class Dependents:
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:
-        """Guess the command that an unknown one means; else record what it may have defined."""
+        """Guess the command that is meant; else record what it may have defined."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
@@ -88,10 +87,9 @@ class Dependents:
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Find mistakes in the statements after the one that failed, in order.
+    """Find mistakes after the statement that failed with the error `first`, in order.
 
-    The interpreter is past that statement, whose error is `first`. Its hub is used for trials and
-    must not be used afterwards.
+    The hub of the interpreter is used for trials and must not be used afterwards.
     """
     errors = first.others
     seen = {error.message: error for error in (first, *errors)}
@@ -146,10 +144,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Find further mistakes in a script with a syntax error: syntax, and names.
-
-    If there are too many, the last one gives the number of the rest.
-    """
+    """Find further mistakes in syntax and names; if too many, the last one counts the rest."""
     errors = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
     more = len(errors) - MOST_OF_TEXT
     besides = [ScriptError(f"and {plural(more, 'more mistake')} after these")] if more > 0 else []
@@ -161,8 +156,8 @@ def misnamed(
 ) -> list[ScriptError]:
     """Find wrong names of commands and styles in statements.
 
-    Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
-    are valid, even if the definition of a `wanting` name failed.
+    Karamelo's forms material(ID, eos, strength) and solid(ID, box, region, ...) without a style are
+    valid, even if the definition of a `wanting` name failed.
     """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}

@@ -10,11 +10,7 @@ from karamelo_py.language import signature
 
 @dataclass(frozen=True)
 class Help:
-    """The help about a command or style.
-
-    Has the `syntax`, the first line and the rest of the docstring, parameters with their kinds, and
-    further sections by title, such as Example, Notes, See Also.
-    """
+    """Help about a command or style; `sections` by title, such as Example, Notes, See Also."""
 
     name: str
     syntax: str
@@ -29,7 +25,7 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Make the help for a command or style, from its signature and docstring, and its bases."""
+    """Make the help from the signature and docstring of a command or style, and of its bases."""
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     noun = name.removeprefix("delete_").replace("_", " ")

@@ -28,7 +28,7 @@ class _Frame:
 
 
 def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
-    """Return the code of an error that was raised without one, by what it marks."""
+    """Return the code of an error that has none, by what it marks."""
     code = "operand"
     if isinstance(statement, syntax.CommandCall):
         code = "not-possible"
@@ -70,7 +70,6 @@ class Interpreter:
 
     @property
     def waits(self) -> bool:
-        """Tell if a script is between its first and last statement."""
         return bool(self.frames)
 
     def include(self, name: str) -> None:
@@ -98,16 +97,15 @@ class Interpreter:
             self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
-        """Return the file meant by ``include(name)`` in a script in `folder`."""
+        """Return the file of ``include(name)`` in a script in `folder`."""
         path = folder / name
         elsewhere = self.hub.folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
-        """Execute everything after the present statement on another hub.
+        """Execute everything after the present statement on another hub, with copies of variables.
 
-        Variables there are copies. This finds mistakes late in a script before a long run: the
-        first, and later independent ones.
+        This finds mistakes late in a script before a long run.
         """
         other = self._copy(hub)
         try:
@@ -135,7 +133,7 @@ class Interpreter:
 
     @property
     def folders(self) -> list[Path]:
-        """Folders in which files to read are looked for: of the output, current, of the script."""
+        """Folders of input files: of the output, current, of the script."""
         return [self.hub.folder, Path(), self.folder]
 
     def _run(self, text: str, name: str, path: Path | None = None) -> None:
@@ -153,7 +151,7 @@ class Interpreter:
             raise
 
     def go_on(self) -> None:
-        """Execute the rest of all scripts in progress, such as a waiting one (`Pause`)."""
+        """Execute the rest of all scripts in progress."""
         try:
             self._finish()
         except Pause:
@@ -222,7 +220,7 @@ class Interpreter:
             raise
         except RecursionError:
             message, hint = "this is nested too deeply", "use more names"
-            raise ScriptError(message, place=statement.place, hint=hint) from None
+            raise ScriptError(message, place=statement.place, hint=hint, code="syntax") from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
@@ -335,7 +333,7 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """Tell if a name has any meaning here, as a call or in later lines."""
+        """Tell if a name has any meaning, as a call or in later lines."""
         meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             meaningful

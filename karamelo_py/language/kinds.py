@@ -24,7 +24,7 @@ _LARGEST_INTEGER = 2**53
 
 
 def _rounding(value: float) -> float:
-    """Return the tolerance for a result such as 0.3/0.1 to count as an integer."""
+    """Return the tolerance for a result such as 0.3/0.1 to be an integer."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
 
 
@@ -48,7 +48,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Require a number from `lo` to `hi`; ends named by `open` (True: both) are excluded."""
+    """Require a number from `lo` to `hi`, without the ends named by `open` (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -64,7 +64,7 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """Annotation: a file to read, searched in the current folder, then in the script's folder."""
+    """Annotation: a file to read, in the current folder or the script's folder."""
 
     script_kind = "the name of a file"
     # Supported endings in lower case; None: any.
@@ -150,9 +150,9 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """The kind of an argument: description and conversion.
+    """Description and conversion of an argument.
 
-    If there are `words`, only these fit; `family` is the family of styles that it names.
+    With `words`, only these fit; `family` is the family of styles that it names.
     """
 
     text: str
@@ -191,7 +191,7 @@ def _to_number(hub: Any, argument: Argument) -> float:
 
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
-    """Suggest only numbers for an unknown name, not values that change in a run."""
+    """Suggest only numbers for an unknown name."""
     name, alike, numbers = error.name or "", error.alike, argument.numbers()
     if error.code != "unknown-name" or alike is None or "value" in argument.text:
         return
@@ -232,7 +232,6 @@ class StyleOf:
     script_kind = "a word"
 
     def from_script(self, hub: Any, argument: Argument) -> str:
-        """Read the name as written, or the content of a text variable."""
         if registry.knows(self.family, argument.text):
             return argument.text
         joined = "-".join(argument.text.split())
@@ -316,7 +315,6 @@ def kind_of(annotation: Any) -> Kind:
 
 
 def is_raw(kind: Kind) -> bool:
-    """Tell if arguments of this kind are passed unevaluated."""
     return kind is _RAW
 
 
@@ -368,7 +366,6 @@ class Parameter:
 
     @property
     def shown(self) -> str:
-        """Write it as in a line of syntax."""
         if self.keyword:
             return f"{self.name}={'|'.join(self.kind.words) or self.name}"
         if len(self.kind.words) == 1:

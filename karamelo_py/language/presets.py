@@ -17,7 +17,7 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Text by name, as given; assignments of these names in the script are skipped."""
+    """Texts by name; assignments of these names in the script are skipped."""
 
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
@@ -79,7 +79,7 @@ class Presets(dict[str, str]):
         return {name: None for word in words for name in self._made_of.get(word, ())}
 
     def blame(self, statement: Statement, error: ScriptError) -> None:
-        """Add a remark if a mistake may come from presets: numbers, or texts instead of numbers."""
+        """Add a remark if a mistake may come from a preset."""
         place = error.place
         if place not in (None, statement.place) and not error.hint:
             marked = place.text[place.column - 1 : place.column - 1 + place.length]

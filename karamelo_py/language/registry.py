@@ -63,12 +63,11 @@ def families() -> list[str]:
 
 
 def names(family: str) -> list[str]:
-    """List all styles of `family`, sorted."""
     return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
 
 
 def knows(family: str, name: str) -> bool:
-    """Tell if `family` has a style of this name (which may be broken)."""
+    """Tell if `family` has a style of this name, perhaps a broken one."""
     return name in _families().get(family, {}) or _of_module(family, name) is not None
 
 
@@ -186,6 +185,5 @@ def foreign() -> list[tuple[str, str]]:
 
 
 def forget() -> None:
-    """Search packages again (tests install and remove them)."""
     _families.cache_clear()
     _loaded.clear()

@@ -13,10 +13,7 @@ _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
 def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
-    """Return the text of a statement without blanks, comments and line ends.
-
-    Keywords in `without` are omitted, too.
-    """
+    """Return a statement without blanks, comments, line ends, and keywords in `without`."""
     text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
     for word in without:
         text = re.sub(rf",{word}=[^,()]*", "", text)
@@ -25,9 +22,8 @@ def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
 
 @dataclass
 class Record:
-    """The statements executed so far, in order.
+    """The statements executed so far, without those that only control output (``may_differ``).
 
-    Commands that only control how a run continues or what it writes (``may_differ``) are omitted.
     `values` has the results of value(...) by statement number.
     """
 
@@ -38,16 +34,15 @@ class Record:
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
     def forget_from(self, number: int) -> None:
-        """Remove the statements from `number` on, which were not executed, and their values."""
+        """Remove the statements from `number` on, and their values."""
         del self.statements[number:]
         self.values = {k: numbers for k, numbers in self.values.items() if k < number}
 
 
 class Replay:
-    """Compares a repeated script with the record of the first time.
+    """Compares a repeated script with the record in a `file`.
 
-    The record ends at the restart state; its last statement may have been in progress (`within`): a
-    run. Messages name the `file` of the record.
+    The record ends at the restart state; its last statement may be an unfinished run (`within`).
     """
 
     def __init__(self, record: Record, within: bool, file: str):
@@ -62,7 +57,7 @@ class Replay:
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, place: Place | None) -> None:
-        """Take the next statement, `text`; refuse it if it differs from the record."""
+        """Take the next statement; refuse it if it differs from the record."""
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]
@@ -75,7 +70,7 @@ class Replay:
             raise error
 
     def _was_over(self, run: str, place: Place | None) -> ScriptError:
-        """Make the error for a changed length of a run that ended before the state of the file."""
+        """Make the error for a changed length of a run that was over."""
         behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
         return ScriptError(
             f"{self.file} was written when this run was over, by {run}",
@@ -98,11 +93,10 @@ class Replay:
         )
 
     def value(self) -> float:
-        """Return the recorded result of the next value(...) in the present statement."""
+        """Return the recorded result of the next value(...)."""
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, place: Place | None = None) -> ScriptError:
-        """Make the error for a script that differs from the one that wrote the file."""
         return ScriptError(
             f"{self.file} was written by another script: {message}",
             place=place,

@@ -39,7 +39,7 @@ class Advice(NamedTuple):
 
     @property
     def code(self) -> str:
-        """The kind for programs: the name in kebab case, without the names of the script."""
+        """The name in kebab case, without the names of the script."""
         return code_of(self.name)
 
 
@@ -55,7 +55,7 @@ _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 def known_failure(
     part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare what is known to go wrong with a part, by a name; it is reported once.
+    """Declare a known failure of a part, by a name; it is reported once.
 
     With a `cause`, it is noise: reported if its share is above 1, and as the cause of a gain.
     """
@@ -65,7 +65,7 @@ def known_failure(
 
 
 def known_failures() -> Iterator[tuple[type, str, str, str]]:
-    """List the known failures of parts that are loaded: part, name, reason and fix."""
+    """List the known failures of loaded parts: part, name, reason and fix."""
     for (kind, part), some in _rules.items():
         for _, *words in some if kind == "failure" else ():
             name, reason, cure = (re.sub(r"\{[^{}]+\}", "…", text) for text in words)
@@ -83,7 +83,7 @@ def gain(part: type, *, when: When, cause: str, cure: str) -> None:
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    """Tell what the rules of one kind say of a part (or of a field, which is a class)."""
+    """Yield what the rules of one kind say of a part (or of a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
             result = when(part, scene)

@@ -47,9 +47,9 @@ __all__ = [
 
 @cache
 def parameters(target: Callable) -> list[Parameter]:
-    """List the parameters of a command or style, without the hub; for a record, its fields.
+    """List the parameters of a command or style, without the hub.
 
-    Raises TypeError if the signature is not supported, which is a fault of its author.
+    Raises TypeError if the signature is not supported, a fault of its author.
     """
     record = is_record(target)
     try:
@@ -69,7 +69,7 @@ def parameters(target: Callable) -> list[Parameter]:
 def is_record(target: Any) -> bool:
     """Tell if a style is a NamedTuple, a tag that needs no hub.
 
-    Its fields are its arguments, or the parameters of its classmethod ``given``. A method
+    Its fields, or the parameters of its classmethod ``given``, are its arguments. A method
     ``checked`` returns a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
@@ -90,10 +90,10 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 def call(
     target: Callable, hub: Any, arguments: Sequence[Argument], name: str, converted: Any = None
 ) -> Any:
-    """Call a command or make a style with the hub and script arguments; store values in `given`.
+    """Call a command or make a style with script arguments; store their values in `converted`.
 
-    `name` is the user's name for it: ``run``, or ``fix body_force``. Raises ScriptError with a
-    place for anything wrong with the arguments or in the target itself.
+    `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a place, for anything wrong
+    in the arguments or in the target.
     """
     try:
         expected = parameters(target)
@@ -154,9 +154,8 @@ def style_of(
 def remade(
     hub: Any, family: str, style: str, values: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
-    """Make a law again from its values `given`, changed by ``name=value`` arguments.
-
-    Returns the law and its values.
+    """Make a law again from its `values`, changed by ``name=value`` arguments; return it and its
+    values.
     """
     target, name = registry.find(family, style), f"{family} {style}"
     expected = {p.name: p for p in parameters(target)}
@@ -300,17 +299,16 @@ def syntax(target: Callable, name: str) -> str:
 
 
 def variants_of(style: Any) -> Mapping[str, Any]:
-    """Return the words that choose another class (or style, by its name) instead of a style."""
+    """Return the words that choose another class, or style by name, instead of a style."""
     return getattr(style, "variants", {})
 
 
 def default_variant(style: Any) -> str | None:
-    """Return the variant without any of these words."""
     return getattr(style, "default_variant", None)
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """List parameters for help, including the word that selects a variant of a style."""
+    """List parameters for help, with the word that selects a variant."""
     variants = variants_of(target)
     if not variants:
         return parameters(target)

@@ -98,7 +98,7 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
 
 
 def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None]:
-    """Guess the meaning of a name in an expression: a hint, and the known name if there is one."""
+    """Guess the meaning of a name: a hint, and the known name if there is one."""
     statement, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
         alone = isinstance(statement, Assignment) and statement.right.code.strip() == name
@@ -148,7 +148,7 @@ def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Yield what later statements define: command ("" for a variable), ID and line.
+    """Yield later statements: what they define ("" for a variable), ID and line.
 
     Starts with the innermost script, `back` statements before its next one.
     """
@@ -168,7 +168,7 @@ def line_below(script: Any, kind: str, ID: str) -> int | None:
 
 
 def _needs(script: Any, name: str, other: str) -> bool:
-    """Tell if the variable `name`, as defined later, depends on `other`."""
+    """Tell if the later variable `name` depends on `other`."""
     set_there = [s for s, kind, *_ in _ahead(script) if not kind]
     below = {s.name: set(re.findall(r"\w+", s.right.code)) for s in reversed(set_there)}
     reached: set[str] = set()
@@ -315,7 +315,7 @@ def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | Non
 
 
 def size_of_cells(script: Any) -> tuple[str, int | None]:
-    """Find the cell size that a later solid is given, and the line that sets it."""
+    """Find the cell size of a later solid, and the line that sets it."""
     solids = (words_of(s) for s, kind, *_ in _ahead(script) if kind == "solid")
     size = next((words[5 if len(words) == 7 else -1] for words in solids if len(words) > 4), "h")
     return size, line_below(script, "", size)

@@ -53,8 +53,6 @@ class ScriptError(Exception):
     ----------
     message
         What is wrong, in one sentence without a full stop.
-    place
-        The place; filled in by a caller if the raiser does not know it.
     argument
         Name or index of the argument at fault (from 0; negative from the last one without a name);
         `karamelo_py.language.signature.call` converts it to a place.
@@ -94,14 +92,10 @@ class ScriptError(Exception):
 
     @property
     def sentence(self) -> str:
-        """The message, after the command or style that raises it."""
         return f"{self.command}: {self.message}" if self.command else self.message
 
     def render(self) -> str:
-        """Format the message for the user: place, marked line, expectation, fix.
-
-        Further mistakes follow.
-        """
+        """Format the message and further mistakes for the user."""
         physics = {"code": self.code, "cause": self.cause, "resume": self.resume}
         text = render_message(
             "error", self.sentence, self.place, self.expected, self.hint, **physics
@@ -124,7 +118,7 @@ def render_message(
 ) -> str:
     """Format an error or a warning (`kind`) for the user.
 
-    With a `code` of a run it is a physics message: likely cause, fix, and the command that resumes.
+    With the `code` of a run: likely cause, fix, and the command that resumes.
     """
     physics = bool(code) and not codes().get(code, {}).get("script")
     lines = [f"{kind}: {message}"]
@@ -185,7 +179,6 @@ def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") ->
 
 
 def plural(count: float, noun: str) -> str:
-    """Format ``1 cell``, ``2 cells``."""
     return f"{count:g} {noun}" if count == 1 else f"{count:.0f} {noun}s"
 
 
@@ -238,23 +231,20 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
 
 @cache
 def table() -> dict[str, Any]:
-    """Read other_programs.toml, on the first error."""
     path = Path(__file__).with_name("other_programs.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 @cache
 def codes() -> dict[str, dict[str, Any]]:
-    """Read codes.toml: the meaning of each message code."""
     path = Path(__file__).with_name("codes.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def of_karamelo(name: str) -> bool:
-    """Tell whether `name` is a Karamelo command, which no variable can be called."""
+    """Tell if `name` is a Karamelo command, which no variable can be called."""
     return name in table()["karamelo"].split()
 
 
 def instead(family: str, name: str) -> str | None:
-    """Translate a command or style of another program; None for other words."""
     return table()["instead"].get(family, {}).get(name)

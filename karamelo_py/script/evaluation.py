@@ -12,10 +12,7 @@ from karamelo_py.script.terms import REWRITTEN, applied
 
 
 class NameScope(Protocol):
-    """Resolves names and calls of commands; implemented by the interpreter.
-
-    It `hides` a function whose name the script uses for something else.
-    """
+    """Resolves names and calls of commands; a variable `hides` a function of its name."""
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value: ...
 
@@ -107,7 +104,6 @@ def usage(name: str) -> str:
 
 
 def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) -> float | Expression:
-    """Apply an operation: to numbers at once, else as a formula."""
     if any(isinstance(value, Expression) for value in values):
         terms = [Expression(value)._term for value in values]
         try:

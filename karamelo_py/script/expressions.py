@@ -1,7 +1,7 @@
 """Values of expressions: numbers, texts, and formulas that are evaluated repeatedly.
 
-Operations on numbers are evaluated at once. With a variable operand (a position, the time, a
-published value) the result is a formula, with constants folded in.
+An operation with a variable operand (a position, the time, a published value) gives a formula, with
+constants folded in.
 """
 
 from __future__ import annotations
@@ -39,7 +39,6 @@ class Expression:
 
     @classmethod
     def seed(cls, name: str) -> Expression:
-        """Make the formula that consists of a name."""
         return cls(terms.Term("name", (), name))
 
     @classmethod
@@ -80,7 +79,7 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Tell if it is visibly the same number as another everywhere."""
+        """Tell if it is visibly the same number everywhere."""
         return terms.alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
@@ -111,10 +110,7 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Evaluate at positions `x` with reference positions `x0`, (n,).
-
-        Positions are (n, 1 to 3); missing directions are 0, and `x0` defaults to `x`.
-        """
+        """Evaluate (n,) at positions `x` (n, 1 to 3) and reference positions `x0`, by default `x`."""
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 

@@ -21,7 +21,6 @@ SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
 
 
 def refused() -> type[Exception]:
-    """Return the exception class of a text that a grammar does not allow."""
     from lark.exceptions import UnexpectedInput
 
     return UnexpectedInput
@@ -57,7 +56,6 @@ def parser_of(start: str) -> Any:
 
 
 def literal(word: str, start: int) -> float:
-    """Read a number that starts at `start`."""
     value = float(word)
     if math.isinf(value):
         raise Mistake(f"the number {word} is too large", start, start + len(word), "below 1.8e308")

@@ -1,7 +1,6 @@
 """Syntax errors in the user's terms: characters, quotes and parentheses, then expressions.
 
-For expressions, Lark's parser, fed token by token, gives the position where it stopped, what it had
-read and what was open; the user's mistake is inferred from these.
+Lark's parser, fed token by token, tells where it stopped, what it had read and what was open.
 """
 
 import re
@@ -55,7 +54,7 @@ def check_characters(text: str) -> None:
 
 
 def in_script(text: str) -> Mistake:
-    """Return the mistake in the quotes or parentheses of a script."""
+    """Return the mistake in quotes or parentheses."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
         word, start = match[0], match.start()
@@ -74,7 +73,6 @@ def in_script(text: str) -> Mistake:
 
 
 def open_quote(text: str, start: int) -> Mistake:
-    """Make the mistake of a quote that starts at `start` and has no end."""
     end = text.find("\n", start)
     hint = "comments begin with #" if _SLASHES.search(text, 0, start) else 'add the missing "'
     end = len(text) if end < 0 else end
@@ -82,7 +80,6 @@ def open_quote(text: str, start: int) -> Mistake:
 
 
 def open_parenthesis(text: str, start: int) -> Mistake:
-    """Make the mistake of an unclosed parenthesis at `start`."""
     before = re.search(r"[^\W\d]\w*[ \t]*$", text[:start])
     begin = before.start() if before else start
     opened = f"the call of {before[0].rstrip()}" if before else "this parenthesis"
@@ -99,7 +96,6 @@ _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
 
 
 def _type(part: Any) -> str:
-    """Return the type of a token; trees and characters have none."""
     return getattr(part, "type", "")
 
 

@@ -43,10 +43,9 @@ def read_script(path: Path) -> str:
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """Parse the statements of a script.
+    """Parse the statements of a script; arguments of calls stay unparsed.
 
-    Arguments of calls stay unparsed; everything else is checked. Further syntax errors are in
-    `others` of the first one, and correct statements in its `statements`.
+    The first syntax error has further ones in `others`, and correct statements in `statements`.
     """
     # Ignore a byte order mark, and normalise line ends.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
@@ -104,7 +103,6 @@ def _tree(code: str) -> syntax.Node:
 
 
 def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> syntax.Statement:
-    """Build a statement from its kind, name, start, end and parts."""
     kind, name, start, end, parts = span
     place = source.place(start, start + max(len(name), 1))
     whole = syntax.Raw(source, start, end)

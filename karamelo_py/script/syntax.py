@@ -23,7 +23,7 @@ class Source:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
     def place(self, start: int, end: int) -> Place:
-        """Return the place of the characters from offset `start` up to `end`."""
+        """Return the place of the characters from `start` up to `end`."""
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
@@ -53,7 +53,6 @@ class Mistake(Exception):
     hint: str | None = None
 
     def error(self, source: Source, offset: int = 0) -> ScriptError:
-        """Convert to an error with a place."""
         place = source.place(offset + self.start, offset + self.end)
         expected, hint = self.expected, self.hint
         return ScriptError(self.message, place=place, expected=expected, hint=hint, code="syntax")
@@ -135,7 +134,6 @@ class Raw:
 
     @property
     def place(self) -> Place:
-        """The place in the script."""
         return self.source.place(self.start, self.end)
 
 

@@ -131,7 +131,6 @@ def applied(operation: str, *operands: Term) -> Term:
 
 
 def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Term) -> Term:
-    """Make the quotient of two polynomials of `r`."""
     terms = []
     for coefficients in polynomials:
         term = constant(coefficients[0])
@@ -154,7 +153,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Tell if two terms are equal everywhere, up to the order of operands of + and *."""
+    """Tell if two terms are equal, up to the order of operands of + and *."""
     numbers: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -182,7 +181,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Tell if a term can be written out with its shared parts repeated."""
+    """Tell if a term can be written out with shared parts repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -192,7 +191,6 @@ def is_short(root: Term) -> bool:
 
 
 def text_of(term: Term) -> str:
-    """Format a term in script syntax."""
     operation, operands = term.operation, term.operands
     if operation == "number":
         return number_text(term.value)
@@ -281,7 +279,7 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """Choose terms to store: those with several users, and what the stack cannot hold."""
+        """Choose terms to store: with several users, or too deep for the stack."""
         kept = set()
         if not self.bare:
             kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}

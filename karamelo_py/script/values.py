@@ -12,7 +12,7 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Tell whether values with these suffixes occupy consecutive slots in this order."""
+    """Tell if values with these suffixes have consecutive slots."""
     places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not places or places == list(range(places[0], places[0] + len(suffixes)))
 
@@ -69,7 +69,6 @@ class Values:
         return self._slots[name]
 
     def names(self) -> list[str]:
-        """List all published names in order of publication."""
         return list(self._slots)
 
     def __contains__(self, name: object) -> bool:
