@@ -110,7 +110,7 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Evaluate (n,) at positions `x` (n, 1 to 3) and reference positions `x0`, by default `x`."""
+        """Evaluate (n,) at positions `x` (n, 1 to 3), first at `x0`, by default also `x`."""
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 
