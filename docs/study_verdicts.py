@@ -197,7 +197,8 @@ def adviser_of(table: Table, family: Family, target: float) -> Adviser:
     others = [name for name in table.variables if name != family.along]
     choices = dict.fromkeys(tuple(row[name] for name in others) for row in table.rows)
     runs = [ChoiceRuns(dict(zip(others, choice, strict=True))) for choice in choices]
-    return Adviser(Replay(table), (family.along, fine), runs, family.accuracy, COST, target)
+    goal = {"accuracy": family.accuracy, "cost": COST, "target": target}
+    return Adviser(Replay(table), (family.along, fine), runs, **goal)
 
 
 def judge(table: Table, accuracy: str, target: float) -> Verdict:
@@ -234,9 +235,12 @@ def foretold(table: Table, accuracy: str) -> list[tuple[bool, bool]]:
         for choice in adviser.choices:
             adviser.go_on(choice)
         for choice in adviser.choices:
-            known = adviser.xs[:step], choice.rows, accuracy, COST, choice.highest
+            known = adviser.xs[:step], choice.rows, accuracy, COST
             (next_run,) = Replay(table).run([{**choice.values, **adviser.at(step)}])
-            error, said = abs(errors([next_run], accuracy)[0]), forecast(x, *known)
+            error, said = (
+                abs(errors([next_run], accuracy)[0]),
+                forecast(x, *known, highest=choice.highest),
+            )
             if step > 2 and said and np.isfinite(error):
                 doubts = adviser.doubts(Candidate(choice, step, said.cost, said.error, said))
                 found.append((bool(doubts), bool(said.low <= error <= said.high)))

@@ -180,7 +180,7 @@ def cantilever(target, known=()):
     ]  # fmt: skip
     study = Recorded(rows, ("kind", "refine"), known)
     choices = [ChoiceRuns({"kind": kind, "basis": "linear"}) for kind in DEFLECTION]
-    adviser = Adviser(study, ("refine", REFINE), choices, "off", COST, target)
+    adviser = Adviser(study, ("refine", REFINE), choices, accuracy="off", cost=COST, target=target)
     adviser.pilot(3)
     return adviser, adviser.best(), study
 
@@ -209,7 +209,9 @@ def test_a_choice_whose_last_error_alone_has_grown_is_followed():
     ]  # fmt: skip
     study = Recorded(rows, ("kind", "refine"))
     choices = [ChoiceRuns({"kind": kind}) for kind in off]
-    adviser = Adviser(study, ("refine", [*"12345"]), choices, "err", COST, 5e-3)
+    adviser = Adviser(
+        study, ("refine", [*"12345"]), choices, accuracy="err", cost=COST, target=5e-3
+    )
     adviser.pilot(3)
     best = adviser.best()
     assert (best.choice.values["kind"], best.step) == ("cheap", 3)
@@ -250,12 +252,12 @@ def test_doubts_of_a_forecast():
     assert best.forecast is not None and best.choice.values["kind"] == "tlmpm"
     assert not adviser.doubts(best) and sureness(adviser, best).startswith("almost sure: expected")
     best.choice.warnings = ("points cross cells",)
-    assert adviser.doubts(best) == ["its runs are warned of: points cross cells"]
+    assert adviser.doubts(best) == ["its runs warn: points cross cells"]
     said = sureness(adviser, best)
     assert said.startswith("not sure: expected") and "lies between" not in said
     best.choice.warnings = ()
     best.choice.values["kind"] = "ulmpm"
-    assert "gradients of the basis linear jump" in adviser.doubts(best)[0]
+    assert "gradient of the linear basis jumps" in adviser.doubts(best)[0]
     best.choice.values["kind"] = "tlmpm"
     adviser.choices[0].values["kind"] = "tlmpm"  # what turns round is of its kind
     (doubt,) = adviser.doubts(best)
@@ -302,7 +304,7 @@ def follow(rows, target, capsys):
     study = Recorded(rows)
     fine = list(dict.fromkeys(row["refine"] for row in rows))
     choices = [ChoiceRuns({"basis": basis}) for basis in BASES]
-    adviser = Adviser(study, ("refine", fine), choices, ERROR, COST, target)
+    adviser = Adviser(study, ("refine", fine), choices, accuracy=ERROR, cost=COST, target=target)
     adviser.pilot(3)
     status = carry_out(adviser, adviser.best(), Path("in.scene"))
     return status, chosen(capsys.readouterr().out), study.asked

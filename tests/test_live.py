@@ -400,14 +400,14 @@ def test_frames_are_bounded(monkeypatch):
     columns = {name: np.arange(25.0) for name in ("x", "y", "seq")}
     kept = KeptFrames()
     for step in range(30):
-        kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
+        kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", read=columns.__getitem__))
     listed = kept.listed()
     states = [0, 4, 8, 12, 16, 20, 24, 28, 29]
     assert [frame[1] for frame in listed] == states  # evenly, and the newest
     assert listed[-1][4] == 25
     monkeypatch.setattr(frames, "SEEN", 1e9)
     for step in (30, 31):  # a page may be about to ask for them
-        kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", columns.__getitem__))
+        kept.add(Frame.of_columns(step, 0.1 * step, "xy", "seq", read=columns.__getitem__))
     assert [frame[1] for frame in kept.listed()] == [*states, 30, 31]
     assert kept.answer({"k": "-1"}) is None
     for column in ("x", "y"):  # chosen one after the other, where no state came in between
@@ -422,7 +422,7 @@ def test_points_are_thinned_alike_in_each_state(monkeypatch):
     solid = np.repeat([1, 2, 3], [60_000, 300, 40_000])
     columns = {"id": 1 + np.arange(len(solid)), "type": solid, "x": np.linspace(0, 1, len(solid))}
     columns["y"] = columns["z"] = 0 * columns["x"]
-    first = Frame.of_columns(0, 0.0, "xyz", "id", columns.__getitem__)
+    first = Frame.of_columns(0, 0.0, "xyz", "id", read=columns.__getitem__)
     assert first.of == 100_300 and first.numbers.dtype == np.float32
     taken = np.bincount(solid[first.numbers[3].astype(int) - 1])
     assert taken[2] == 300
@@ -430,7 +430,8 @@ def test_points_are_thinned_alike_in_each_state(monkeypatch):
     places = first.numbers[0][first.numbers[3] <= 60_000]  # even, not the first ones
     assert np.allclose(np.histogram(places, 6)[0], len(places) / 6, atol=125)
     order = np.random.default_rng(3).permutation(len(solid))
-    again = Frame.of_columns(1, 0.1, "xyz", "id", {n: c[order] for n, c in columns.items()}.get)
+    ordered = {n: c[order] for n, c in columns.items()}
+    again = Frame.of_columns(1, 0.1, "xyz", "id", read=ordered.get)
     assert np.array_equal(np.sort(again.numbers[3]), first.numbers[3])
 
 

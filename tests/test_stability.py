@@ -127,7 +127,8 @@ def test_steps_beyond_those_that_conduction_bears_have_failed(folder, capsys):
     assert main(["stability", "in.bar", *words]) == 0
     assert list(pandas.read_csv(folder / "map.csv")["class"]) == ["stable", "failed"]
     out = capsys.readouterr().out
-    assert "whatever they gained" in out and "first step that a run survived is 0.5 times" in out
+    assert "whatever energy they gained" in out
+    assert "first step that a run survived is 0.5 times" in out
 
 
 def test_what_limits_the_step_stands_in_the_map(folder):
@@ -236,12 +237,12 @@ def test_the_line_of_the_own_step_is_whole():
     map = stability.Map(None, {"f": ["0.5", "1", "2"], "y": ["0", "1", "2"]}, ["f", "y"])
     ends = {0: (0, 2), 1: (0, 1), 2: ()}
     steps = {0: 1.2, 1: 1.5}
-    map.found = {
+    map.results = {
         (i, j): {"dt": map.x[i], "own_dt": steps[j]} for j, cells in ends.items() for i in cells
     }
     assert map.line("own_dt") == [pytest.approx(1.2), pytest.approx(1.5), None]
-    map.found[0, 2] = map.found.pop((0, 1))
-    map.found[1, 2] = map.found.pop((1, 1))
+    map.results[0, 2] = map.results.pop((0, 1))
+    map.results[1, 2] = map.results.pop((1, 1))
     assert map.line("own_dt") == pytest.approx([1.2, 1.35, 1.5])  # no run in the middle row
 
 
@@ -250,9 +251,9 @@ def test_an_axis_that_scales_both_steps_has_no_line(drift):
     """Of a ratio that round-off alone, or next to nothing, turns: 1 is reached nowhere near."""
     map = stability.Map(None, {"N": ["4", "8"]}, ["N"])
     for ratio in (0.4, 2.5):
-        map.found = {(i, 0): {"dt": ratio, "own_dt": 1 + drift * i} for i in range(2)}
+        map.results = {(i, 0): {"dt": ratio, "own_dt": 1 + drift * i} for i in range(2)}
         assert map.line("own_dt") == [None]
-    map.found = {(i, 0): {"dt": 1 + drift * i, "own_dt": 1} for i in range(2)}
+    map.results = {(i, 0): {"dt": 1 + drift * i, "own_dt": 1} for i in range(2)}
     assert map.line("own_dt") == [4 if drift == 1e-3 else None]
 
 

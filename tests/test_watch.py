@@ -615,12 +615,12 @@ def test_stress_that_matter_loses_on_its_way_is_told_after_the_run(run_script):
     text = text.replace("eos(bulk", "region(both, union, flyer, target)\neos(bulk")
     text = text.replace("region, flyer, solid, flyer", "region, flyer, all")
     result = run_script(text)
-    told = re.search(r"stress lost across cells: matter has moved through (\S+) cells", result.err)
+    told = re.search(r"across cells: stressed material moved through (\S+) cells", result.err)
     assert float(told[1]) == pytest.approx(3.5 / 2, rel=0.15)
     assert result.log.ratio[-1] < 0.7
-    assert re.search(r"^  stress +matter moved through", result.out, re.M)
+    assert re.search(r"^  stress +stressed material moved", result.out, re.M)
     right = run_script(text, "-var", "basis", "cpgimp", folder="right")
-    assert "stress" not in right.err and "matter moved" not in right.out
+    assert "stress" not in right.err and "material moved" not in right.out
     assert right.log.ratio[-10:].mean() == pytest.approx(1, abs=0.01)  # Rankine & Hugoniot
 
 
@@ -629,4 +629,4 @@ def test_stress_that_loads_hold_is_not_lost(run_script):
     """A column that sinks under its weight by two cells: what moves there gains stress."""
     text = (INPUTS / "in.column").read_text("utf-8")
     result = run_script(re.sub(r"^(dump|plot|save_plot)\(.*\n", "", text, flags=re.M))
-    assert "matter moved through" not in result.out
+    assert "material moved through" not in result.out

@@ -1,4 +1,4 @@
-"""Parts of a scene before a run and the motion of its solids: facts that need no judgement."""
+"""Facts of a scene that need no judgement: its parts and motions."""
 
 from functools import cached_property
 from math import isfinite
@@ -18,17 +18,14 @@ from karamelo_py.script.expressions import Expression
 
 
 class Body(NamedTuple):
-    """A solid with points, and its motion."""
+    """A solid with points."""
 
     motion: BodyMotion
     solid: Solid
 
 
 class BasicFacts:
-    """Parts of a scene before a run of `duration`, and how its solids move.
-
-    An infinite duration, of a run that a condition ends, counts as 300 steps.
-    """
+    """Parts and motions of a scene before a run of `duration` (300 steps if it is infinite)."""
 
     def __init__(self, hub: Hub, simulation: Simulation, duration: float):
         self.hub, self.simulation = hub, simulation
@@ -65,13 +62,12 @@ class BasicFacts:
 
     @cached_property
     def waves(self) -> float:
-        """Speed of the fastest wave."""
         clock = self.simulation.control.clock[0]
         return float(clock.rate) - self.simulation.fastest(clock.common[0])
 
     @cached_property
     def weights(self) -> list[np.ndarray]:
-        """Mean accelerations (d,) of the solids by each fix that accelerates points."""
+        """Mean accelerations (d,) of the solids, by each fix that accelerates."""
         weights = []
         for fix in self.hub.fixes.values():
             if fix.accelerates and self.waves > 0 and self.motions:
@@ -85,7 +81,6 @@ class BasicFacts:
 
 
 def is_zero(formula: Any) -> bool:
-    """Return True if a formula is None or always 0."""
     if formula is None:
         return True
     formula = Expression(formula)

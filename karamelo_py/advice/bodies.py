@@ -45,7 +45,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """Return True if a body of this law vibrates: not fluids and flowing materials."""
+    """Return True if a body of this law vibrates: not fluids, not flowing materials."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -59,7 +59,6 @@ def yields(law: Any) -> bool:
 
 
 def vibrating(facts: BasicFacts) -> list[Body]:
-    """List the bodies that may vibrate."""
     return [body for body in facts.bodies if facts.waves > 0 and rings(body.solid.material.whole)]
 
 
@@ -76,7 +75,7 @@ def drift_of(facts: BasicFacts) -> Noise | None:
         velocity = body.motion.drift(facts.hub.domain.axisymmetric)
         if np.linalg.norm(velocity) <= SLOW * facts.waves:
             continue
-        free_speed = float(np.linalg.norm(velocity[~held(facts, body)]))
+        free_speed = float(np.linalg.norm(velocity[~fixed_directions(facts, body)]))
         ends = yields(body.solid.material.whole)
         time = min(facts.duration, _free_time(facts, body.motion)) if ends else facts.duration
         path = free_speed * time / facts.spacing
@@ -88,7 +87,7 @@ def drift_of(facts: BasicFacts) -> Noise | None:
 
 
 def _thrown(facts: BasicFacts) -> bool:
-    """Return True if nothing strains the only body: uniform velocity and weight, no stress."""
+    """Return True if nothing strains the only body."""
     return (
         len(facts.motions) == 1
         and bool((facts.motions[0].fast == facts.motions[0].slow).all())
@@ -113,7 +112,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
     for body in vibrating(facts):
         spin, reach = body.motion.spin, body.motion.reach
         speed, angle = spin * reach / facts.waves, spin * facts.duration
-        if speed <= SLOW or held(facts, body).any():
+        if speed <= SLOW or not is_free(facts, body):
             continue
         cells = angle * reach / facts.spacing
         torn = angle / TORN[facts.moments] if facts.sparse else 0.0
@@ -127,31 +126,31 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 def lag_of(facts: BasicFacts) -> Lag:
     """Estimate the lag of a free rotation in the total frame.
 
-    The grid has the angular momentum of the point positions. It lacks the part within the
-    stencils of the points, sum m tr D, of sum m r^2.
+    Of the angular momentum, sum m r^2, the grid lacks the part within stencils, sum m tr D.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.axisymmetric:
         return most
     for body in facts.bodies:
         motion = body.motion
-        if motion.spin * facts.duration > most.turns * 2 * np.pi and not held(facts, body).any():
+        turns = motion.spin * facts.duration / (2 * np.pi)
+        if turns > most.turns and is_free(facts, body):
             axis = motion.turning / (motion.spin or 1.0)
             spread = np.zeros((3, 3))
             spread[: facts.d, : facts.d] = motion.spread
             squared = (np.trace(spread) - axis @ spread @ axis) / motion.mass
             away = 2 * (SPREAD if facts.linear else SPREAD_OF_OTHERS) * facts.spacing**2
-            most = Lag(min(away / squared, 1.0), motion.spin * facts.duration / (2 * np.pi))
+            most = Lag(min(away / squared, 1.0), turns)
     return most
 
 
 def sides(body: Body) -> np.ndarray:
-    """Return the lengths (d,) of a body, whose outer points lie half a point inside."""
+    """Return the lengths (d,) of a body; outer points lie half a point inside."""
     return body.motion.high - body.motion.low + 2 * body.solid.half_size.max(axis=0)
 
 
-def held(facts: BasicFacts, body: Body) -> np.ndarray:
-    """Return the directions (d,) in which fixes hold nodes at a body, which then cannot drift."""
+def fixed_directions(facts: BasicFacts, body: Body) -> np.ndarray:
+    """Return the directions (d,) in which fixes hold nodes at a body."""
     directions = np.zeros(facts.d, np.bool_)
     for fix, x in fixes_at(facts, body):
         if len(x):
@@ -159,13 +158,16 @@ def held(facts: BasicFacts, body: Body) -> np.ndarray:
     return directions
 
 
+def is_free(facts: BasicFacts, body: Body) -> bool:
+    return not fixed_directions(facts, body).any()
+
+
 def lattice_at(facts: BasicFacts, body: Body) -> Lattice:
-    """Return the lattice that a body uses."""
     return facts.hub.lattices[facts.method.lattice_of(facts.hub, body.solid)]
 
 
 def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
-    """Yield each fix that prescribes velocities, and positions (n, d) of its nodes at a body."""
+    """Yield fixes that prescribe velocities, and positions (n, d) of their nodes at a body."""
     lattice, low, high = lattice_at(facts, body), body.motion.low, body.motion.high
     for fix in facts.hub.fixes.values():
         if not fix.prescribes_velocity:
@@ -177,9 +179,9 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Return True if smooth plates hold all sides of a box but one: it deforms evenly.
+    """Return True if smooth plates hold all sides of a box but one, so that it deforms evenly.
 
-    Each plate is a fix that holds all nodes of one side in the direction across it.
+    A plate is a fix that holds all nodes of one side across it.
     """
     h, low, high = lattice_at(facts, body).h, body.motion.low, body.motion.high
     box = sides(body).prod() * facts.hub.domain.thickness
@@ -204,7 +206,7 @@ def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
 
 
 def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
-    """Return the time until a body meets another, or the edge of the domain."""
+    """Return the time until a body meets another, or the domain's edge."""
     d, domain = facts.d, facts.hub.domain
     ways = zip(motion.velocity, motion.low, motion.high, domain.lo[:d], domain.hi[:d], strict=True)
     first = min(
@@ -218,7 +220,7 @@ def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
 
 
 def _meeting(motion: BodyMotion, other: BodyMotion) -> float:
-    """Return the time at which the boxes around two bodies meet; infinite if never."""
+    """Return when the boxes around two bodies meet, or inf."""
     begin, end = 0.0, inf
     v = motion.velocity - other.velocity
     for speed, gap, over in zip(v, other.low - motion.high, other.high - motion.low, strict=True):

@@ -1,9 +1,8 @@
 """Stress that a linear basis loses when stressed material moves through the grid.
 
-The gradient of a linear basis jumps at cell faces. Points that cross them change the strain rates
-of cells, and the volumes of points drift away from the available space: in the updated frame,
-pressure falls by 10 to 35 % in each cell that stressed material moves through, at any speed and
-strain. GIMP and splines lose 0 to 0.3 %.
+Its gradient jumps at cell faces, so points that cross them change the strain rates of cells, and
+their volumes drift: in the updated frame, pressure falls by 10 to 35 % per cell of motion, at any
+speed and strain. GIMP and splines lose 0 to 0.3 %.
 """
 
 from collections.abc import Iterator, Sequence
@@ -27,14 +26,14 @@ LOADED = 0.5  # of the energy: if loads supply more, they maintain the stress
 
 
 class Crossing(NamedTuple):
-    """The path of stressed material through the grid."""
+    """Path of stressed material through the grid."""
 
     cells: float
     speed: float
 
     @property
     def lost(self) -> float:
-        """Fraction of the stress that is lost on the way."""
+        """Lost fraction of the stress."""
         return 1 - exp(-PER_CELL * self.cells)
 
     @property
@@ -43,7 +42,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """Return True if stress is lost in the scene; gases and liquids have separate rules."""
+    """Return True if stress is lost; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -51,7 +50,7 @@ def loses(facts: BasicFacts) -> bool:
 
 
 def expected(facts: BasicFacts) -> Crossing:
-    """Estimate the remaining path of material under impact or initial stress."""
+    """Estimate the remaining path under impact or initial stress."""
     most = Crossing(0.0, 0.0)
     if not (facts.waves > 0 and loses(facts)):
         return most
@@ -61,7 +60,7 @@ def expected(facts: BasicFacts) -> Crossing:
 
 
 def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Yield speed and duration of the motion if there is initial stress."""
+    """Yield speed and duration if there is initial stress."""
     points = facts.simulation.points
     stored = points.total("stored")
     if facts.simulation.step or not stored > 0:
@@ -75,8 +74,8 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
     """Yield the longest path, as speed and duration, of each solid that meets others.
 
-    By acoustic impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until
-    waves have gone through the thinner solid and returned.
+    By impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
+    returned through the thinner solid.
     """
     bodies = [b for b in facts.bodies if not can(b.solid.material.law, constrained_velocity)]
     if not bodies:
@@ -99,7 +98,7 @@ def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 class BodyBoxes(NamedTuple):
-    """The boxes around n bodies, and their motion, arrays (n, d)."""
+    """Boxes around n bodies and their motion, arrays (n, d)."""
 
     centre: np.ndarray
     velocity: np.ndarray
@@ -112,7 +111,7 @@ def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
 
 
 def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
-    """Return when a body meets each of the boxes ahead of it, (n, d): infinite if never."""
+    """Return when a body meets each box ahead of it, (n, d); inf if never."""
     faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
     ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)
@@ -129,9 +128,9 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 
 def measured(facts: BasicFacts) -> Crossing:
-    """Return the path measured by the watch so far, as a mean over the stressed material.
+    """Return the path so far, as a mean over stressed material.
 
-    It is 0 if loads do most of the work: they maintain the stress and restore losses.
+    It is 0 if loads do most of the work: they maintain the stress.
     """
     clock = facts.simulation.control.clock[0]
     matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(facts)
@@ -140,19 +139,18 @@ def measured(facts: BasicFacts) -> Crossing:
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
-    """Describe the lost stress at the end of a run, and warn of it unless already done."""
+    """Describe the lost stress after a run, and warn of it once."""
     crossing, hub = measured(facts), facts.hub
     if crossing.lost <= TOLD:
         return {}
-    path = f"{crossing.cells:.2g} cells of the grid while it was stressed"
-    loss = f"some {crossing.percent:.0f} % of its pressure with a linear basis"
+    path = f"stressed material moved through {crossing.cells:.2g} cells"
+    loss = f"about {crossing.percent:.0f} % of its pressure is lost"
     if hub.update.first_time(CROSSING):
         hub.warn(
-            f"{CROSSING}: matter has moved through {path}, and lost {loss} "
-            f"({when(facts.simulation)})",
+            f"{CROSSING}: {path}, {loss} ({when(facts.simulation)})",
             place=hub.update.method.place,
             hint=CURE,
             code=code_of(CROSSING),
             cause="points crossing cells: the gradient of a linear basis is discontinuous",
         )
-    return {"stress": f"matter moved through {path}: lost {loss}"}
+    return {"stress": f"{path}: {loss}"}

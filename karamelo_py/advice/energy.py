@@ -23,7 +23,7 @@ def not_watched(why: str) -> str:
 
 
 def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    """Return the likely cause of an energy gain and its fix; an empty cause if none is known."""
+    """Return the likely cause of an energy gain ("" if unknown) and its fix."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
@@ -100,12 +100,11 @@ def _step_of(hub: Hub, simulation: Simulation, share: float) -> str:
 
 
 def swelling(points: PointTable) -> np.ndarray:
-    """Return the volumes (n,) relative to the initial ones."""
+    """Return volumes (n,) over initial ones."""
     return points.particle("volume") / points.reference_volume
 
 
 def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
-    """Describe a spurious energy gain; None without one."""
     clock = simulation.control.clock[0]
     if not simulation.energy_watch.has_grown():
         return None
@@ -121,7 +120,7 @@ def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
 
 
 def taken_by(hub: Hub) -> list[str]:
-    """Name the script's choices that dissipate energy without a record."""
+    """Name choices that dissipate energy without a record."""
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
@@ -138,7 +137,7 @@ def taken_by(hub: Hub) -> list[str]:
 
 
 def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | None:
-    """Describe a loss above the fraction `within` that no chosen damping explains; else None."""
+    """Describe a loss above the fraction `within` unless chosen damping explains it."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
@@ -154,7 +153,6 @@ def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | 
 
 
 def cause_of_loss(hub: Hub) -> tuple[str, str]:
-    """Return the likely cause of an energy loss and its fix."""
     update, method = hub.update, hub.update.method
     if update.scheme.traits.damps:
         name = registry.name_of("scheme", type(update.scheme))
@@ -182,7 +180,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Return the cause and fix of inelastic collisions; None without contact."""
+    """Return cause and fix of inelastic collisions, if contact is possible."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
             "contact that removes penetrations within one step: the grid carries only the part of "
@@ -198,7 +196,7 @@ def collides(hub: Hub) -> tuple[str, str] | None:
 
 
 def words_of_change(hub: Hub, share: float) -> str:
-    """Describe an energy change of `share` % at the end of a run, and known dissipation."""
+    """Describe an energy change of `share` %, and known dissipation."""
     takers, by = taken_by(hub), ""
     words = "the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:

@@ -12,7 +12,7 @@ import numpy as np
 
 from karamelo_py.advice import settling
 from karamelo_py.advice.basics import BasicFacts, is_zero
-from karamelo_py.advice.bodies import drift_of, held, lag_of, pressed_evenly, turn_of
+from karamelo_py.advice.bodies import drift_of, is_free, lag_of, pressed_evenly, turn_of
 from karamelo_py.advice.crossing import expected
 from karamelo_py.advice.neighbours import bent_row, parting, uneven
 from karamelo_py.compiler.fields import declared
@@ -31,37 +31,38 @@ SEQ = methodcaller("particle", "seq")
 
 
 class Vibration(NamedTuple):
-    """Strain amplitude of a uniformly stretched solid, and the number of periods in the run."""
+    """Strain amplitude and number of periods of a vibrating solid."""
 
     strain: float
     periods: float
 
 
 class SceneFacts(BasicFacts):
-    """Facts of a scene before a run of `duration`; each is computed when a rule asks for it."""
+    """Facts of a scene before a run of `duration`, computed when a rule asks."""
 
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Yield each part once, with the material that owns it (None unless part of a law)."""
+        """Yield each part once, with its material if it is part of a law."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
-        parts += [(part, material) for material in materials for part in law_parts(material.law)]
-        parts += [(part, None) for part in (self.method, self.basis, self.transfer, self.scheme)]
+        parts += [
+            (law_part, material) for material in materials for law_part in law_parts(material.law)
+        ]
+        parts += [
+            (law_part, None) for law_part in (self.method, self.basis, self.transfer, self.scheme)
+        ]
         yield from parts
-        owners = [part for part, _ in parts]
+        owners = [law_part for law_part, _ in parts]
         kinds = declared(owners, "point_fields") + declared(owners, "node_fields")
         yield from ((kind, None) for kind in dict.fromkeys(kinds))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
-        """Yield the advice of one kind from the rules of all parts.
-
-        With `of_laws`, only of laws and of fixes that set the initial state.
-        """
-        foreign = {part.kind: part for part in foreign_parts(self.hub)}
-        for part, owner in self.parts():
-            if of_laws and owner is None and not (isinstance(part, Fix) and part.first_step_only):
+        """Yield the advice of one kind; with `of_laws`, of laws and initial states only."""
+        foreign = {piece.kind: piece for piece in foreign_parts(self.hub)}
+        for piece, owner in self.parts():
+            if of_laws and owner is None and not (isinstance(piece, Fix) and piece.first_step_only):
                 continue
-            with attributed(self.hub, foreign.get(type(part))):
-                advice = list(rules.advice(kind, part, owner, self))
+            with attributed(self.hub, foreign.get(type(piece))):
+                advice = list(rules.advice(kind, piece, owner, self))
             yield from advice
 
     text = cached_property(lambda self: script_text(self.hub))
@@ -83,25 +84,24 @@ class SceneFacts(BasicFacts):
 
     @property
     def reads_temperature(self) -> bool:
-        """True if the script names a temperature of points."""
         return bool(re.search(r"average_temperature|(\b|_)T(max)?\b", self.text))
 
     @cached_property
     def turn(self) -> float:
-        """Rotation, in radians, of the solid that rotates most, as if it were free."""
+        """Rotation, in radians, of the solid that rotates most."""
         if self.d == 1 or self.hub.domain.axisymmetric:
             return 0.0
         return max((motion.spin for motion in self.motions), default=0.0) * self.duration
 
     @property
     def locks(self) -> bool:
-        """True if linear cells hold several points, whose volumes lock in isochoric flow."""
+        """True if linear cells hold several points, so that isochoric flow locks."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
         return self.hats and self.d > 1 and not free
 
     @property
     def grid_viscosity(self) -> float:
-        """Kinematic viscosity of velocities taken from the grid: `PIC` (1 - alpha) h^2/dt."""
+        """Kinematic viscosity of velocities from the grid, `PIC` (1 - alpha) h^2/dt."""
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
@@ -111,7 +111,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def moving_walls(self) -> bool:
-        """True if a rigid solid moves or a fix leads points of one."""
+        """True if a rigid solid moves or is led by a fix."""
         rigid = [
             can(solid.material.law, constrained_velocity) for solid in self.hub.solids.values()
         ]
@@ -123,8 +123,7 @@ class SceneFacts(BasicFacts):
     @cached_property
     def free_turns(self) -> float:
         """Revolutions of the unheld solid that rotates most."""
-        rotates = self.turn > TURN
-        free = [b.motion.spin for b in self.bodies if rotates and not held(self, b).any()]
+        free = [b.motion.spin for b in self.bodies if self.turns and is_free(self, b)]
         return max(free, default=0.0) * self.duration / (2 * pi)
 
     @cached_property
@@ -138,7 +137,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Vibration of the solid with the largest strain amplitude, rate L/(2 c)."""
+        """Vibration with the largest strain amplitude, rate L/(2 c)."""
         most = Vibration(0.0, 0.0)
         for motion in self.motions if self.waves > 0 else ():
             strain = motion.rate * motion.size / (2 * self.waves)
@@ -148,17 +147,17 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def sag(self) -> float:
-        """Largest strain of a solid under its own weight, g L/c^2."""
+        """Strain of a solid under its own weight, g L/c^2."""
         sizes = [motion.high - motion.low for motion in self.motions]
         strains = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
         return max((float(strain.max()) for strain in strains), default=0.0)
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain of the slenderest solid, by its weight or its motion.
+        """Bending strain by weight or motion of the slenderest solid.
 
-        A cantilever of length L and height H strains by 3 g L^2/(H c^2) at the clamp. A beam whose
-        kinetic energy becomes strain energy reaches sqrt(3) v/c.
+        A cantilever of length L and height H strains by 3 g L^2/(H c^2); a beam whose kinetic
+        energy becomes strain energy by sqrt(3) v/c.
         """
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:
@@ -172,20 +171,20 @@ class SceneFacts(BasicFacts):
 
     @property
     def falls(self) -> float:
-        """Duration over sqrt(L/g), about the time in which a solid falls by its size."""
+        """Duration over sqrt(L/g), in which a solid falls by its size."""
         sizes = [np.maximum(motion.high - motion.low, 1e-300) for motion in self.motions]
         rates = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(rate.max()) for rate in rates), default=0.0)
 
     @property
     def passes(self) -> float:
-        """Relative motion of points at present velocities, over twice the longest side."""
+        """Path of points past each other at present velocities, over twice the longest side."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 
     @cached_property
     def pressure_ratio(self) -> float:
-        """Largest over smallest pressure of all points; 1 if any is in tension."""
+        """Largest over smallest pressure; 1 with tension."""
         points = self.simulation.points
         low = -points.largest(lambda some: some.particle("s11"))[0]
         high = points.largest(lambda some: -some.particle("s11"))[0]
@@ -193,7 +192,7 @@ class SceneFacts(BasicFacts):
 
 
 def script_text(hub: Hub) -> str:
-    """Read the script and its included files, also those after the next run, without comments."""
+    """Read the script and all includes, without comments."""
     lines: list[str] = []
     for path in dict.fromkeys([*hub.interpreter.files, *hub.interpreter.files_ahead]):
         with suppress(ScriptError):  # the file may be gone by now

@@ -1,12 +1,12 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-Parts of a scene declare theirs as rules (`karamelo_py.language.rules`); this module has those that
-no single part knows. `karamelo-py check` reports them, and a run once, before its first step.
+Parts declare theirs as rules (`karamelo_py.language.rules`); these are those that no single part
+knows. Each is reported once, by `check` or before the first step.
 """
 
 from collections.abc import Iterable, Iterator
 from math import fsum, inf, isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,8 @@ from karamelo_py.run.no_number import refuse_endless_speeds
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.errors import Place, ScriptError
 
 LOOK = 100  # steps: shorter runs only inspect a scene
 ENDLESS = 1e8  # steps
@@ -40,18 +41,17 @@ UNITS = (
 
 
 def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
-    """Warn once if nothing can move in a run of `duration`."""
     if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
         hub.warn(
-            "nothing moves in this run: no point has a velocity or a stress, and no fix a load",
+            "nothing moves in this run: all velocities, stresses and loads are zero",
             hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
-            "load, in front of it",
+            "load, before it",
             code="nothing-moves",
         )
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Return True if nothing can move; False with parts of plug-ins, which may do anything."""
+    """Return True if nothing can move; plug-ins may do anything."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -72,7 +72,7 @@ def _rests(hub: Hub, simulation: Simulation) -> bool:
 
 
 def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None:
-    """Warn of a run to `end_time` that takes more than `ENDLESS` steps."""
+    """Warn of a run of more than `ENDLESS` steps."""
     span = end_time - simulation.time
     if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
         return
@@ -90,7 +90,6 @@ def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None
 
 
 def mixed_units(hub: Hub, simulation: Simulation) -> str:
-    """Describe wave speed and cell size, for a step that does not fit them."""
     speed = stable_step.fastest_wave(simulation)
     return (
         f"waves move at {speed:.3g} through cells of {hub.domain.h:g}. The units of densities, "
@@ -99,14 +98,13 @@ def mixed_units(hub: Hub, simulation: Simulation) -> str:
 
 
 class Step(NamedTuple):
-    """The step requested for a run, and the scene that its stable limit depends on.
+    """The step requested for run number `run`, and the scene that its limit depends on.
 
-    `run` is the number of the run, `span` its length in time and in steps, infinite if a condition
-    ends it.
+    `span` is the run's length in time and in steps, infinite if a condition ends it.
     """
 
     run: int
-    place: Any
+    place: Place | None
     fixed_dt: float | None
     dt_factor: float | None
     halves: bool
@@ -115,7 +113,7 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """Return the step that the script asks for now; with `halves`, a run in trouble halves it."""
+    """Return the step requested now; with `halves`, a run in trouble halves it."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
@@ -127,14 +125,13 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
 
 
 def later_steps(hub: Hub) -> list[Step]:
-    """List the steps of the runs after the present one."""
     return [step for step in hub.later if step.run > hub.begun]
 
 
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn once (or `again`) of a step of this or a later run above the stable limit."""
+    """Warn once (or `again`) of a step above the limit, in this or a later run."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.clock[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -171,17 +168,18 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
     if solid and s.speed > IMPOSSIBLE:
         yield Advice(
             "units of velocities",
-            f"points move at {s.fastest:.3g}, {s.speed:.3g} times the speed of waves "
-            f"({s.waves:.3g}), which no solid sustains when it hits another or a wall. The units "
-            "of velocities, densities and moduli may be mixed",
+            f"points move at {s.fastest:.3g}, {s.speed:.3g} x the wave speed ({s.waves:.3g}): no "
+            "solid survives an impact at that speed. The units of velocities, densities and moduli "
+            "may be mixed",
             UNITS,
         )
 
 
 def _other_units(s: SceneFacts) -> Iterator[Advice]:
-    """Find materials whose numbers do not fit the units of the script."""
-    units: Any = s.hub.output.units
-    for solid in s.hub.solids.values() if units else ():
+    units = s.hub.output.units
+    if units is None:
+        return
+    for solid in s.hub.solids.values():
         law = solid.material.law
         density = units.si(DENSITY) / float(specific_volume(law))
         speed = units.si(VELOCITY) * stable_step.elastic_speed(s.simulation, solid)[0]
@@ -194,8 +192,8 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
         if odd:
             yield Advice(
                 f"units of material '{solid.material.id}'",
-                f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}, such as no real "
-                "material has",
+                f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}: no real material "
+                "has such values",
                 f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "
                 f"1 GPa is {1e9 / units.si(STRESS):.3g} {units.name(STRESS)}",
                 place=solid.material.place,
@@ -203,7 +201,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Warn of what will go wrong in a run of `duration` and the runs after it; once each."""
+    """Warn once of what will go wrong in a run of `duration` and later ones."""
     _warn_about_groups(hub, simulation)
     refuse_endless_speeds(simulation)
     scene = SceneFacts(hub, simulation, duration)
@@ -222,7 +220,6 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 
 
 def warn_about_factor(hub: Hub) -> None:
-    """Warn once that dt_factor has no effect on implicit steps."""
     update = hub.update
     # With set_dt, dt_factor has warned already.
     idle = update.dt_factor is not None and update.fixed_dt is None
@@ -263,7 +260,6 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
 
 
 def warn_about_laws(hub: Hub, simulation: Simulation, duration: float) -> None:
-    """Warn once of what will go wrong with the laws of a run with implicit steps."""
     _tell(hub, SceneFacts(hub, simulation, duration).advice("failure", of_laws=True))
 
 
@@ -275,7 +271,7 @@ def _tell(hub: Hub, advice: Iterable[Advice]) -> None:
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Return the summed duration of later runs of the same scene, if known."""
+    """Return the duration of later runs of the same scene, where known."""
     present = step_of(hub, False).scene
     later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -283,7 +279,7 @@ def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:
-    """Return the time since the fixes of the scene last changed."""
+    """Return the time since the fixes last changed."""
     fixes, update = list(hub.fixes.values()), hub.update
     before, since = update.moving
     if any(all(fix is not other for other in before) for fix in fixes):
@@ -326,8 +322,8 @@ def _warn_about_precision(s: SceneFacts) -> None:
         s.hub.warn(words, hint=hint, code=code)
 
 
-def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
-    """Return True if no point lies within reach of the nodes of a fix, taken as a box."""
+def _out_of_reach(hub: Hub, simulation: Simulation, fix: Fix) -> bool:
+    """Return True if no point lies within reach of a fix's nodes, taken as a box."""
     x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
     method, setup = hub.update.method, simulation.setup
     reach = (method.basis.traits.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)
@@ -341,7 +337,7 @@ def _out_of_reach(hub: Hub, simulation: Simulation, fix: Any) -> bool:
 
 
 def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
-    """Warn once of groups of nodes without nodes, or out of reach of all points."""
+    """Warn once of node groups without nodes or points."""
     for fix in hub.fixes.values():
         of_mass = any(
             hook.uses_share or moment in HEAT_STAGES

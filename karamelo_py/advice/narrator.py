@@ -29,13 +29,13 @@ from karamelo_py.script.errors import render_message
 
 
 class Narrator(Listener):
-    """Listener that tells the user about a run."""
+    """Tells the user about a run."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
 
     def begun(self, run: RunLoop, simulation: Simulation, *, resumed: bool = False) -> None:
-        """Warn of what is known to go wrong in this run, and of a very long one."""
+        """Warn of what is known to go wrong."""
         hub, halve = self.hub, run.rollback.point.halve
         self.smaller = ""
         if resumed:
@@ -57,7 +57,7 @@ class Narrator(Listener):
             known_failures.warn_about_length(hub, simulation, run.end_time)
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
-        """Start the record of this run, and print the banner."""
+        """Start the record, and print the banner."""
         hub, why = self.hub, unknown_work(self.hub)
         # For the first state: a failed one has no meaningful limit.
         if simulation.steps.too_large:
@@ -117,7 +117,7 @@ class Narrator(Listener):
         boundary.tell_of_bounces(hub, simulation)
 
     def _tell_of_limit(self, simulation: Simulation) -> None:
-        """Note a limit of the step that rules for the first time, or has halved."""
+        """Note a limit that is new, or has halved."""
         name, limit, before = simulation.steps.ruling_limit, simulation.steps.limit, self.least
         if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
             return
@@ -130,7 +130,7 @@ class Narrator(Listener):
         self.hub.console.say(render_message("note", words))
 
     def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
-        """Warn once of an energy loss above a fraction of the largest energy."""
+        """Warn once of a loss above a fraction of the largest energy."""
         hub, watch = self.hub, simulation.energy_watch
         loss = None if watch.told_of_loss else energy.words_of_loss(hub, simulation, within)
         if loss is not None:
@@ -143,7 +143,7 @@ class Narrator(Listener):
         return explain.trouble(self.hub, simulation, status, self.smaller * too_large)
 
     def ended(self, run: RunLoop, simulation: Simulation, first_step: int, wall: float) -> None:
-        """Complete the record of this run, and print the closing table."""
+        """Complete the record, and print the closing table."""
         self._tell_of_loss(simulation, energy.LOSS)
         steps = simulation.step - first_step
         stages = [(name, float(passed)) for name, (passed, _) in run.timings.on.items()]

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.advice.basics import BasicFacts
-from karamelo_py.advice.bodies import held, vibrating
+from karamelo_py.advice.bodies import fixed_directions, vibrating
 from karamelo_py.advice.crossing import BodyBoxes, boxes_of, meetings
 from karamelo_py.points.laws import can, constrained_velocity, specific_volume
 from karamelo_py.run import stable_step
@@ -20,7 +20,7 @@ STEPS = 500  # the first of them broke after 800
 
 
 class Uneven(NamedTuple):
-    """The pair of bodies whose step exceeds the limit of the light one most."""
+    """The pair of bodies that exceeds the light one's step most."""
 
     heavy: str = ""
     light: str = ""
@@ -29,19 +29,19 @@ class Uneven(NamedTuple):
 
     @property
     def of_step(self) -> float:
-        """Fraction of the present step that is stable."""
+        """Stable fraction of the present step."""
         return HOLDS / self.courant
 
 
 def _one_row(solid: Solid, axis: int) -> bool:
-    """Return True if all points of a solid lie in one row across an axis."""
+    """Return True if all points lie in one row across an axis."""
     ends = [(x[:, axis].min(), x[:, axis].max()) for _, x in solid.pieces() if len(x)]
     low, high = np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]
     return bool(high - low < 1e-6 * solid.h)
 
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
-    """Find a slender elastic body of one row of points that its weight bends between supports."""
+    """Find a slender elastic body, one row of points, that its weight bends."""
     if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.axisymmetric:
         return None
     for body in facts.bodies:
@@ -51,13 +51,13 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
         slender = sides.max() > max(SLENDER * sides[axis], 2 * solid.h)
         if solid not in facts.elastic or not slender or not _one_row(solid, axis):
             continue
-        if any(g[axis] != 0 for g in facts.weights) and held(facts, body).any():
+        if any(g[axis] != 0 for g in facts.weights) and fixed_directions(facts, body).any():
             return {"solid": solid.id, "cells": sides[axis] / solid.h, "place": solid.place}
     return None
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Find two bodies on one grid that begin within a cell of each other, and move apart."""
+    """Find bodies on one grid that begin within a cell of each other and part."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None
@@ -83,10 +83,10 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def uneven(facts: BasicFacts) -> Uneven:
-    """Find a pair of elastic bodies that touch, or will meet, with too long a step; else none.
+    """Find a pair of elastic bodies that touch, or will meet, with too long a step.
 
-    A node at which nearly all mass is light may feel a heavy point, whose stiffness acts on that
-    mass: for the node, the step is too long by sqrt(rho_heavy / rho_light).
+    At a node of mostly light mass, the stiffness of a heavy point makes it too long by
+    sqrt(rho_heavy / rho_light).
     """
     most, dt = Uneven(), facts.simulation.dt
     if not (facts.moves and facts.linear and facts.waves > 0 and dt * STEPS < facts.duration):
@@ -113,7 +113,7 @@ def uneven(facts: BasicFacts) -> Uneven:
 
 
 def _touch(motion: BodyMotion, boxes: BodyBoxes, h: float, duration: float) -> np.ndarray:
-    """Return which of n bodies lie within a cell of one, or meet it within `duration`, (n,)."""
+    """Return which of n bodies touch one within `duration`, (n,)."""
     touching = (np.maximum(motion.low - boxes.high, boxes.low - motion.high) < h).all(axis=1)
     # Mirrored: bodies at the back are ahead.
     mirrored = motion._replace(

@@ -33,7 +33,7 @@ LOADED = 24 << 20  # bytes of compiled loops and of modules imported by steps an
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
-    """Print fields with bytes, stages, tiles, memory and the first dt of a run to `end_time`."""
+    """Print what a run to `end_time` needs: fields, stages, tiles, memory, first dt."""
     program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
@@ -119,7 +119,6 @@ def report(hub: Hub, end_time: float = inf) -> None:
 
 
 def _say_of_gpu(say: Callable, simulation: Simulation) -> None:
-    """Print the GPU of this machine, and the memory of the scene on it."""
     try:
         here = card()
         free, whole = map(_size, here.memory())
@@ -137,14 +136,14 @@ def _size(count: float) -> str:
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
-    """List the used materials whose laws are of the kind of a block's points."""
+    """List the used materials with the kind of law of a block."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
     kind = without_rate(law_kind(block.laws))
     return [material for material in used if law_kind(material.law) == kind]
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print the number of unknowns of an implicit step, at most, and the memory of its matrix.
+    """Print the unknowns of an implicit step, at most, and the memory of its matrix.
 
     Nodes couple if a point sees both.
     """
@@ -156,7 +155,7 @@ def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
-    """List the stages of a step with the fixes that act in them."""
+    """List the stages of a step with their fixes."""
     acting: dict[str, list[str]] = {}
     for fix in hub.fixes.values():
         for name in fix.hooks():

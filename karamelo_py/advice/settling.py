@@ -1,10 +1,9 @@
 """Displacement of soft elastic bodies by a weight that acts from the first step.
 
-Stressed points lose stress where they cross the cells of a linear basis. A body that vibrates under
-a sudden load crosses them again and again, and the load pushes it further down, although reactions
-are right: by 19, 28, 67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24 cells
-(FLIP 0.9; cpgimp and splines within 7 %, a load that grows over 7 periods 1 and 3 % at 0.26 and
-0.32 cells).
+A body that vibrates under a sudden load crosses the cells of a linear basis again and again, loses
+stress, and is pushed further down: by 19, 28, 67 and 165 % for a displacement at rest of 0.26,
+0.32, 0.64 and 1.24 cells (FLIP 0.9; cpgimp and splines within 7 %, a load that grows over 7 periods
+1 and 3 % at 0.26 and 0.32 cells). Reactions are right.
 """
 
 from typing import NamedTuple
@@ -21,7 +20,7 @@ CELLS = 0.25  # displacement at rest: with less, hardly a point crosses a cell
 
 
 class Settling(NamedTuple):
-    """The body whose weight, with its load, moves its points through most cells."""
+    """The body that settles through most cells."""
 
     name: str = ""
     strain: float = 0.0  # mean, at rest
@@ -29,10 +28,10 @@ class Settling(NamedTuple):
 
 
 def expected(facts: BasicFacts) -> Settling:
-    """Estimate how far bodies at rest will settle on their supports.
+    """Estimate how far bodies at rest settle on their supports.
 
-    The free end of a column of length L and mass m, clamped at one end and loaded by m_1, moves by
-    g L^2/c^2 (1/2 + m_1/m); c is the speed of longitudinal waves.
+    The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
+    + m_1/m); c is the speed of longitudinal waves.
     """
     most = Settling()
     if facts.simulation.step or not (facts.waves > 0 and loses(facts)):
@@ -56,17 +55,14 @@ def expected(facts: BasicFacts) -> Settling:
 
 
 def _rests(other: BodyMotion, motion: BodyMotion, k: int, h: float, *, down: bool) -> bool:
-    """Return True if another body lies within a cell of one, on the side that its weight presses.
-
-    The weight acts along direction k, towards its lower end if `down`.
-    """
+    """Return True if `other` lies within a cell of a body along k, on its pressed side."""
     gap = other.low - motion.high if down else motion.low - other.high
     apart = np.maximum(other.low - motion.high, motion.low - other.high)
     return -h < gap[k] < h and bool((np.delete(apart, k) < 0).all())
 
 
 def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
-    """Return True if fixes hold nodes in direction k at one end of a body, and nowhere else."""
+    """Return True if fixes hold a body along k at one end only."""
     h = lattice_at(facts, body).h
     held = [x[:, k] for fix, x in fixes_at(facts, body) if fix.formulas[k] is not None]
     x = np.concatenate(held) if held else np.zeros(0)

@@ -15,6 +15,8 @@ from karamelo_py.points.laws import parameter
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import plural
 
 Words = Iterator[tuple[str, str]]  # cost, and what to write instead
@@ -35,7 +37,6 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 
 def suggestions(hub: Hub, simulation: Simulation) -> list[Advice]:
-    """Find all suggestions for a scene before it runs."""
     rules = _unread, _of_parts, _averaging, _flat, _round, _mirrored, _precision, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
@@ -81,12 +82,12 @@ def _averaging(hub: Hub, simulation: Simulation) -> Words:
 # --- dimensions ----------------------------------------------------------------------------------
 
 
-def _acting(hub: Hub) -> list[Any]:
+def _acting(hub: Hub) -> list[Fix]:
     return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
 
 
-def _given(fix: Any) -> tuple:
-    """Return the formulas of a fix by direction; NaN for one without, which may do anything."""
+def _given(fix: Fix) -> tuple:
+    """Return the formulas of a fix; NaN without any: it may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 
@@ -98,8 +99,8 @@ def _depends(formula: Any, axes: str) -> bool:
     return any(name in formula.names for axis in axes for name in (axis, axis + "0"))
 
 
-def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if of points (or nodes) with equal `key`, all are in the group or none."""
+def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Return True if a group has all points (or nodes) of equal `key`, or none."""
     group = fix.group
     if group is None or group.all:
         return group is not None
@@ -119,7 +120,7 @@ def _alike(hub: Hub, fix: Any, key: Callable[[np.ndarray], np.ndarray]) -> bool:
 
 
 def _flat(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest fewer dimensions if all is the same along a direction in which nothing moves."""
+    """Suggest fewer dimensions for scenes that are uniform along a direction."""
     domain = hub.domain
     d = domain.dimension
     if d == 1 or domain.axisymmetric or len(hub.lattices) > 1:
@@ -141,7 +142,7 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Return True if fixes act with 0 along direction k, and do not depend on it."""
+    """Return True if fixes neither act along k nor depend on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         if len(formulas) <= len(rest) or not is_zero(formulas[k]):
@@ -152,7 +153,7 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
 
 
 def _acts_alike(hub: Hub, rest: list[int]) -> bool:
-    """Return True if fixes act alike on all points with equal coordinates `rest`."""
+    """Return True if fixes act alike at equal coordinates `rest`."""
     for fix in _acting(hub):
         smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
         if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
@@ -161,7 +162,7 @@ def _acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def _layers(hub: Hub, k: int, rest: list[int]) -> int:
-    """Count the equal layers of solids across direction k, between held faces; 0 if unequal."""
+    """Count equal layers across k between held faces; 0 if unequal."""
     most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:
@@ -180,7 +181,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Return True if no node of the planes at `low` and `high` (in cells) moves along k."""
+    """Return True if nodes of the planes `low` and `high` (in cells) do not move along k."""
     lattice = hub.lattices[0]
     fixed = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -197,7 +198,7 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
 
 
 def _round(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest axisymmetry for cylinders about one axis, along which all acts."""
+    """Suggest axisymmetry for cylinders about one axis."""
     if hub.domain.dimension != 3:
         return
     regions = [solid.region for solid in hub.solids.values() if solid.region is not None]
@@ -233,7 +234,7 @@ def _round(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _mirrored(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest half of a scene that is mirrored at a plane of nodes."""
+    """Suggest half of a mirrored scene."""
     domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
     if len(hub.lattices) > 1 or not _acting(hub):
         return
@@ -265,7 +266,7 @@ def _mirrored(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Return for each fix True if it does nothing along direction k and does not depend on it."""
+    """Return for each fix True if it neither acts along k nor depends on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         rest_formulas = [formulas[j] for j in rest if j < len(formulas)]
@@ -274,14 +275,14 @@ def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
         )
 
 
-def _both_sides(solid: Any, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if each point of a solid has a mirror image."""
+def _both_sides(solid: Solid, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
+    """Return True if each point has a mirror image."""
     cells = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
     return bool((np.unique(cells, axis=0, return_counts=True)[1] == 2).all())
 
 
 def _precision(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest single precision for large scenes whose steps are long enough."""
+    """Suggest single precision for large scenes with long steps."""
     if (
         sum(solid.count for solid in hub.solids.values()) < LARGE
         or hub.settings.precision != "double"
@@ -298,7 +299,7 @@ def _precision(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _output(hub: Hub, simulation: Simulation) -> Words:
-    """Find output that takes seconds, and longer than the steps."""
+    """Find output that takes seconds, and more than the steps."""
     span = simulation.control.clock[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):

@@ -194,11 +194,11 @@ def _explain(family: str, name: str) -> int:
 
 def _about(word: str) -> list[tuple[str, str]]:
     """Find styles by a part of their name, then by summary, else by text."""
-    topics = {like: topic for topic, alike in table()["topics"].items() for like in alike}
+    topics = {synonym: topic for topic, alike in table()["topics"].items() for synonym in alike}
     word = topics.get(word.lower(), word)
-    words = [part for part in word.split() if len(part) > 2] or [word]  # without a, of, ...
-    sought = [re.escape(topics.get(part.lower(), part)) for part in words]
-    begins = [re.compile(rf"(?<![^\W_]){part}", re.IGNORECASE) for part in sought]
+    words = [term for term in word.split() if len(term) > 2] or [word]  # without a, of, ...
+    sought = [re.escape(topics.get(term.lower(), term)) for term in words]
+    begins = [re.compile(rf"(?<![^\W_]){term}", re.IGNORECASE) for term in sought]
     matches: list[list[tuple[str, str]]] = [[], [], [], []]
     for family in families():
         for name in registry.names(family):
@@ -256,10 +256,10 @@ class _Page(Console):
     def paragraph(self, text: str, indent: int = 0) -> None:
         """Write wrapped text; empty lines separate paragraphs."""
         width = min(self._rich.width if self.terminal else _WIDEST, _WIDEST) - indent
-        for index, part in enumerate(text.replace("``", "").split("\n\n") if text else ()):
+        for index, block in enumerate(text.replace("``", "").split("\n\n") if text else ()):
             if index:
                 self.say()
-            for line in textwrap.wrap(" ".join(part.split()), width):
+            for line in textwrap.wrap(" ".join(block.split()), width):
                 self.say(" " * indent + line)
 
     def rows(self, listed: Sequence[tuple[str, str, str]]) -> None:

@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return status
 
 
-def _end(number: int, _: Any) -> NoReturn:
+def _end(number: int, _: object) -> NoReturn:
     # All open files are consistent.
     os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
     os._exit(SIGNALLED + number)
@@ -213,7 +213,7 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
     if alias in parser.options():
         close = alias + " N" * (alias != "--only")
     close = close or next(
-        (known for known in parser.options() if known.startswith(option or "?")), None
+        (word_ for word_ in parser.options() if word_.startswith(option or "?")), None
     )
     hint = f"did you mean {close}?" if close else None
     value = words[words.index(option) + 1 :] if option in words else []
@@ -281,7 +281,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         ("run", "Run a script.", RUN), ("check", "Check a script: memory, step, mistakes.", CHECK)
     ):  # fmt: skip
         script = add(name, _run, summary, text)
-        script.set_defaults(checking=name == "check")
+        script.set_defaults(checking=name == "check", restart=None)
         script.add_argument("script", metavar="SCRIPT", nargs="?")
         script.add_argument("-i", "-in", dest="input", metavar="SCRIPT", help=argparse.SUPPRESS)
         add_variables(script, "set a variable, overriding the script")
@@ -324,7 +324,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             )  # fmt: skip
         script.add_argument("--quiet", action="store_true", help="write warnings and errors only")
     summary = "List commands and styles, and where they come from."
-    styles = add("styles", lambda given: _catalogue().print_styles(given.family), summary)
+    styles = add("styles", lambda options: _catalogue().print_styles(options.family), summary)
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
     summary = "Explain a command or a style."
     explain = add("help", lambda o: _catalogue().print_help(o.words, COMMANDS), summary, HELP)
@@ -393,7 +393,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         page = RunPage(hub, script)
         hub.console.say(f"live: {page.server.address}")
     presets = dict(options.var)
-    if getattr(options, "restart", None) is not None:
+    if options.restart is not None:
         from karamelo_py.run.checkpoint.restart_file import Restart
 
         hub.restart = Restart(options.restart, options.out)

@@ -1,8 +1,7 @@
 """karamelo-py --ranks N: mpiexec starts the processes; they report and end as one.
 
-Each process reports over a socket to the `Launcher`, the process started by the user. Rank 0 gets
-the terminal and the signals; the others report only what rank 0 cannot know. Output of mpiexec is
-shown only if no process was started.
+Each reports over a socket to the `Launcher` in the user's process. Rank 0 gets the terminal and the
+signals; others report what rank 0 cannot know. Output of mpiexec is shown only if nothing started.
 """
 
 import errno
@@ -31,6 +30,7 @@ from karamelo_py.script.errors import FAILURES, ScriptError, render_message
 if TYPE_CHECKING:
     from karamelo_py.scene.hub import Hub
 
+Message = dict[str, Any]  # a JSON object
 ERROR = 1
 # Errors of disks and permissions, no fault of the program.
 OF_THE_SYSTEM = tuple(
@@ -88,8 +88,8 @@ def rendered(error: BaseException) -> str:
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
-        place = f"{error.filename}: " if error.filename else ""
-        return render_message("error", f"{place}{error.strerror}")
+        file = f"{error.filename}: " if error.filename else ""
+        return render_message("error", f"{file}{error.strerror}")
     if isinstance(error, MemoryError):
         message = "the scene does not fit into memory"
         hint = "a coarser grid, fewer points per cell, or precision(single)"
@@ -124,10 +124,10 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
     except ImportError:
         raise ScriptError(f"--ranks {ranks} needs mpi4py", hint=mpi.INSTALL) from None
     command = [mpiexec, "-n", str(ranks), sys.executable, "-m", module, *arguments]
-    place = tempfile.gettempdir() if len(tempfile.gettempdir()) < LONGEST_FOLDER else "/tmp"
+    base = tempfile.gettempdir() if len(tempfile.gettempdir()) < LONGEST_FOLDER else "/tmp"
     with (
         tempfile.TemporaryFile() as said,
-        tempfile.TemporaryDirectory(prefix="karamelo-", dir=place) as folder,
+        tempfile.TemporaryDirectory(prefix="karamelo-", dir=base) as folder,
     ):
         return Launcher(ranks, command, f"{folder}/s", said).run()
 
@@ -137,12 +137,12 @@ class Launcher:
 
     def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
-        self.links: dict[socket.socket, dict[str, Any]] = {}  # empty until the rank is known
-        self.reports: dict[int, dict[str, Any]] = {}
-        self.lost: list[dict[str, Any]] = []  # ended without a report, in order
+        self.links: dict[socket.socket, Message] = {}  # empty until the rank is known
+        self.reports: dict[int, Message] = {}
+        self.lost: list[Message] = []  # ended without a report, in order
         self.over = False  # rank 0 has finished
         self.signals: list[int] = []
-        self.process: Any = None
+        self.process: subprocess.Popen | None = None
 
     def run(self) -> int:
         with socket.socket(socket.AF_UNIX) as self.door, mpi.handled_signals(self._pass_on):
@@ -169,7 +169,7 @@ class Launcher:
 
     # --- while they run ---------------------------------------------------------------------------
 
-    def _pass_on(self, number: int, _: Any) -> None:
+    def _pass_on(self, number: int, _: object) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
         for one in filter(None, self.links.values()):  # a stopped one would be waited for
@@ -194,7 +194,7 @@ class Launcher:
                 if one and one["rank"] not in self.reports:
                     self.lost.append(one)
 
-    def _heard(self, link: socket.socket, message: dict[str, Any]) -> None:
+    def _heard(self, link: socket.socket, message: Message) -> None:
         if "over" in message:
             self.over = True
         elif self.links[link]:
@@ -220,8 +220,8 @@ class Launcher:
             return 0
         if self.signals:
             first = signal.Signals(self.signals[0])
-            what = "interrupted" if first == signal.SIGINT else f"ended by {first.name}"
-            self._say(render_message("error", what))
+            message = "interrupted" if first == signal.SIGINT else f"ended by {first.name}"
+            self._say(render_message("error", message))
             return SIGNALLED + self.signals[0]
         status = self.process.returncode
         status = SIGNALLED - status if status < 0 else status or 1
@@ -255,8 +255,8 @@ def _received(link: socket.socket) -> bytes:
     """Read available data; close the link if the other end is closed."""
     data = b""
     with suppress(OSError):
-        while part := link.recv(1 << 16):
-            data += part
+        while chunk := link.recv(1 << 16):
+            data += chunk
             if data.endswith(b"\n"):
                 return data
     link.close()
@@ -312,11 +312,11 @@ def _heed(link: socket.socket) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
-def _line(**message: Any) -> bytes:
+def _line(**message: object) -> bytes:
     return json.dumps(message).encode() + b"\n"
 
 
-def _report(**message: Any) -> None:
+def _report(**message: object) -> None:
     if _link is not None:
         with suppress(OSError):
             _link.sendall(_line(**message))
@@ -327,7 +327,9 @@ def has_terminal() -> bool | None:
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
-def together(asked: int | None, run: Callable[[Any], int], *, debugging: bool = False) -> int:
+def together(
+    asked: int | None, run: Callable[[mpi.MpiComm], int], *, debugging: bool = False
+) -> int:
     """Call `run` as one of the processes (`asked`: their number); return the exit status."""
     size, rank = mpi.launched()
     comm: mpi.MpiComm | None = None

@@ -1,6 +1,6 @@
 """Exit with a message if the program is interrupted during its imports.
 
-An interrupt within an import may surface as any error. Nothing is open yet.
+There, an interrupt may surface as any error; nothing is open yet.
 """
 
 import os

@@ -13,7 +13,10 @@ LIVE = ("--live", "-live")
 class _Variable(argparse.Action):
     """A variable and its value; each variable once."""
 
-    def __call__(self, parser: Any, namespace: Any, values: Any, option: Any = None) -> None:
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
+        option_string: str | None = None,
+    ) -> None:  # fmt: skip
         pairs = getattr(namespace, self.dest)
         for name, value in pairs:
             if name == values[0]:

@@ -34,7 +34,7 @@ def read_text(path: Path, expected: str | None = None) -> str:
 def read_rows(path: str | Path) -> list[dict[str, float]]:
     """Read the rows of a log by column; words are NaN.
 
-    Lines that begin with # rename the columns. A line cut off by a killed run is skipped.
+    A line # renames the columns; a cut line is skipped.
     """
     names: list[str] = []
     path, rows = Path(path), []

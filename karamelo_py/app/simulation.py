@@ -40,7 +40,7 @@ _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
 
 
 class SimulationError(ScriptError):
-    """An error in a script or a command; its text is the whole message, with the place.
+    """An error in a script or a command; its text is the whole message.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class KarameloWarning(UserWarning):
 
 
 class Quiet(Console):
-    """Prints nothing; warnings are Python warnings."""
+    """Console that prints nothing; warnings are Python warnings."""
 
     def __init__(self) -> None:
         super().__init__(quiet=True)
@@ -87,11 +87,11 @@ class Columns(Mapping, dict):  # type: ignore[metaclass]
             hint = f"{close} " if close else ""
             raise NoItem(f"there is no '{name}'; {hint}there are {', '.join(names) or 'none'}")
         with _as_simulation_error():
-            found = self._column(name)
-        if isinstance(found, np.ndarray):
-            found = found.view()
-            found.flags.writeable = False
-        return found
+            values = self._column(name)
+        if isinstance(values, np.ndarray):
+            values = values.view()
+            values.flags.writeable = False
+        return values
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names())
@@ -160,7 +160,7 @@ class PointColumns(Columns):
 
 
 class Variables(MutableMapping):
-    """Script variables: numbers, or texts of formulas; ``variables["q"] = 0`` is q = 0."""
+    """Script variables, numbers or texts of formulas; ``variables["q"] = 0`` is q = 0."""
 
     def __init__(self, sim: Simulation):
         self._sim = sim
@@ -315,8 +315,8 @@ class Simulation:
             raise ScriptError(
                 f"{script!r} is no script", expected=SCRIPT, hint="variables by name, as in N=3"
             )
-        there = os.path.exists(script)  # False for text too long for a name
-        is_text = isinstance(script, str) and not there and any(c in script for c in "\n(=")
+        exists = os.path.exists(script)  # False for text too long for a name
+        is_text = isinstance(script, str) and not exists and any(c in script for c in "\n(=")
         self._name = "a script" if is_text else str(script)
         try:
             if is_text:
@@ -326,7 +326,7 @@ class Simulation:
         except Pause:
             pass
         except ScriptError as error:
-            if isinstance(script, str) and not is_text and not there:
+            if isinstance(script, str) and not is_text and not exists:
                 error.expected = SCRIPT
             raise
 
@@ -387,11 +387,11 @@ class Simulation:
     def _evaluated(self, expression: str, name: str) -> float | str:
         with self._in_one_thread(), _as_simulation_error():
             raw, node = parse_text(expression, name)
-            found = self._interpreter.evaluate(node, raw)
-            if isinstance(found, Expression):
+            value = self._interpreter.evaluate(node, raw)
+            if isinstance(value, Expression):
                 self.hub.refresh_values()
-                return found.evaluate(self.hub.values)
-            return found
+                return value.evaluate(self.hub.values)
+            return value
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("_") or not registry.knows("command", name):
@@ -401,7 +401,7 @@ class Simulation:
             raise AttributeError(f"there is no command '{name}'{hint}")
 
         command = registry.find("command", name)
-        gives = getattr(command, "__annotations__", {}).get("return") not in (None, "None")
+        gives = command.__annotations__.get("return") not in (None, "None")
 
         def call(*arguments: Any, **named: Any) -> Any:
             line = f"{name}({self._words(*arguments, **named)})"
@@ -422,7 +422,6 @@ class Simulation:
         return ", ".join([*words, *(f"{key}={self._word(v)}" for key, v in named.items())])
 
     def _word(self, value: Any) -> str:
-        """Format a value as in a script."""
         if callable(value) and not isinstance(value, type):
             name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
@@ -526,10 +525,10 @@ class Simulation:
         from karamelo_py.styles.dumps.pyplot import PyPlot
 
         with _as_simulation_error():
-            given = [] if field is None else [field]
+            fields = [] if field is None else [field]
             for name in {"label", "title"} & {*look}:
                 look[name] = look[name] and '"{}"'.format(look[name].strip('"'))
-            words = self._words(1, "shown.png", width, height, *given, **look)
+            words = self._words(1, "shown.png", width, height, *fields, **look)
             (call,) = parse(f"show({words})", "Simulation.show")
             arguments = [signature.Argument(raw, self._interpreter) for raw in call.arguments]
             dump = signature.call(PyPlot, self.hub, arguments, "dump pyplot")
@@ -573,7 +572,7 @@ class Simulation:
 
 @contextmanager
 def _as_simulation_error() -> Iterator[None]:
-    """Convert script errors to SimulationError, whose text is the whole message."""
+    """Convert script errors to SimulationError."""
     try:
         yield
     except ScriptError as error:
@@ -584,7 +583,7 @@ def _as_simulation_error() -> Iterator[None]:
 
 
 def _refuse_copies() -> None:
-    """Refuse unconnected processes of mpiexec; the first reports that no scene is distributed."""
+    """Refuse unconnected processes of mpiexec; the first one reports."""
     size, rank = launched()
     if size == 1:
         return
@@ -597,13 +596,12 @@ def _refuse_copies() -> None:
     )
 
 
-def _threads_of(given: Any) -> int | None:
-    """Read a number of threads like `--threads`; None for auto."""
+def _threads_of(threads: Any) -> int | None:
     try:
-        return None if given is None else threads_option(str(given))
+        return None if threads is None else threads_option(str(threads))
     except ArgumentTypeError:
         raise ScriptError(
-            f"threads={given!r} is not a number of threads",
+            f"threads={threads!r} is not a number of threads",
             expected="1, 2, ..., or None: all cores where the scene is large enough",
         ) from None
 

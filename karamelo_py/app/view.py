@@ -4,9 +4,8 @@ import argparse
 import glob
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -40,6 +39,7 @@ Draw pictures or a movie of dumps of points.
 Files are from dump particle, particle/gz, hdf5 and vtk (its .pvd). Pictures and their options are
 as in dump pyplot."""
 DPI = 100
+Look = dict[str, Any]  # options of dump pyplot
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -102,15 +102,13 @@ def run(options: argparse.Namespace) -> int:
             hint=f"-o {options.output.stem}.*{options.output.suffix}",
         )
     with unwarned():
-        picture = look = None
+        drawing: Drawing | None = None
         for snapshot in _all_in(files):
-            if picture is None:
+            if drawing is None:
                 with _telling_of_names(options):
-                    log = _log_beside(files[0], snapshot, options, scene)
-                    look = _look(snapshot, options, scene)
-                    chosen = partial(_chosen, look, scene, log)
-                    picture = _picture(snapshot, files, options, look, scene, chosen)
-            snapshot = chosen(snapshot)
+                    drawing = Drawing(options, files, scene, snapshot)
+                look, picture = drawing.look, drawing.picture
+            snapshot = drawing.chosen(snapshot)
             unit = snapshot.units.get("time", "")
             time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
             # In file order.
@@ -134,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
     if movie:
         frames.save(options.output)
     print(f"{options.output}: {drawn} {'frame' if movie else 'picture'}{'s' * (drawn > 1)}")
-    if look["outlines"] and options.script is None:
+    if drawing.look["outlines"] and options.script is None:
         message = "dumps do not contain walls and tools: only solids are outlined"
         hint = "--script FILE, the script of the run, shows its walls and tools, too"
         print(render_message("note", message, hint=hint), file=sys.stderr)
@@ -174,20 +172,10 @@ def _log_beside(
 ) -> dict[int, dict[str, float]]:
     """Read the log next to a dump, by step, if anything needs it."""
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
-    names_used = re.findall(
-        r"[^\W\d]\w*\b(?! *\()", " ".join(filter(None, formulas))
-    )  # without calls
-    names_known = {
-        *first.columns,
-        *named_sets(scene),
-        "time",
-        "timestep",
-        "step",
-        "and",
-        "or",
-        "not",
-    }
-    if names_known.issuperset(names_used) and not (options.script and options.outlines):
+    text = " ".join(filter(None, formulas))
+    words = re.findall(r"[^\W\d]\w*\b(?! *\()", text)  # without calls
+    known = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
+    if known.issuperset(words) and not (options.script and options.outlines):
         return {}
     rows = []
     for name in ("log.mpm", "log.csv"):
@@ -202,7 +190,7 @@ def _log_beside(
 
 def _tools(scene: Hub) -> list[Any]:
     """List walls and tools of all runs, at their present positions."""
-    fixes = [part for part in dict.fromkeys(scene.in_runs) if isinstance(part, Fix)]
+    fixes = [candidate for candidate in dict.fromkeys(scene.in_runs) if isinstance(candidate, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
         if np.isnan(tool.depth(scene.domain.lo[None, : scene.domain.dimension])).any():
@@ -220,8 +208,8 @@ def _live(folders: list[Path]) -> int:
     from karamelo_py.app.live.folder import FolderPage
 
     if len(folders) > 1:
-        what = f"--live shows one folder, not {len(folders)}"
-        raise ScriptError(what, expected="view --live FOLDER")
+        message = f"--live shows one folder, not {len(folders)}"
+        raise ScriptError(message, expected="view --live FOLDER")
     page = FolderPage(folders[0])
     print(f"live: {page.server.address} (Ctrl-C ends it)", flush=True)
     with suppress(KeyboardInterrupt):
@@ -253,7 +241,7 @@ def _number(path: Path) -> int:
     return int(digits[-1]) if digits else -1
 
 
-def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str, Any]:
+def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> Look:
     """Parse the options of dump pyplot as in a script."""
     columns = list(first.columns)
     names = SimpleNamespace(
@@ -281,99 +269,103 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> dict[str,
     return look
 
 
-def _chosen(
-    look: dict[str, Any], scene: Hub, log: dict[int, dict[str, float]], snapshot: Snapshot
-) -> Snapshot:
-    """Select the points to draw, and add the column of a colouring formula.
+class Drawing:
+    """Look, log and empty picture of dumps, from the first snapshot."""
 
-    Sets the scene to the time of the snapshot and the values of its log.
-    """
-    columns, field, only = snapshot.columns, look["field"], look["only"]
-    values, row = scene.values, log.get(snapshot.step, {})
-    for name in values.names():
-        values.set(name, row.get(name, np.nan))  # known to runs only
-    values.set("time", snapshot.time)
-    values.set("timestep", snapshot.step)
-    formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
-    for name in set().union(*(one.names for one in (*formulas, *filter(None, [look["title"]])))):
-        if name not in GLOBAL_SEEDS and name in values and np.isnan(values.get(name)):
-            raise ScriptError(
-                f"{name} at step {snapshot.step} is not in dumps",
-                expected="a log in the folder of the dumps, with its column and a line for each",
-                hint=f"log_modify(custom, step, time, {name}) in the script of the run",
-            )
-    numbers = columns["id"].astype(np.int64) - 1
+    def __init__(
+        self, options: argparse.Namespace, files: Sequence[Path], scene: Hub, first: Snapshot
+    ):
+        self.options, self.files, self.scene = options, files, scene
+        self.log = _log_beside(files[0], first, options, scene)
+        self.look = _look(first, options, scene)
+        self.picture = self._picture(first)
 
-    def column(name: str) -> np.ndarray:
-        return columns[name] if name in columns else members(scene, name, numbers)
+    def chosen(self, snapshot: Snapshot) -> Snapshot:
+        """Select the points to draw, and add the column of a colouring formula.
 
-    rows = SimpleNamespace(particle=column)
-    if isinstance(field, ColumnFormula):
-        columns = columns | {field.text: field.of(rows)}
-    elif field in named_sets(scene):
-        columns = {field: column(field)} | columns
-    if only is not None:
-        selected = only.holds(rows)
-        columns = {name: of[selected] for name, of in columns.items()}
-    return snapshot._replace(columns=columns)
-
-
-def _picture(
-    first: Snapshot,
-    files: Iterable[Path],
-    options: argparse.Namespace,
-    look: dict[str, Any],
-    scene: Hub,
-    chosen: Callable[[Snapshot], Snapshot],
-) -> Any:
-    """Make an empty picture with position and colours that fit all snapshots."""
-    from karamelo_py.output import outlines, pictures
-
-    # Unused directions are 0.
-    dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
-    if options.script is not None:
-        has = [("dimension", scene.domain.dimension, dimension)]
-        count = sum(solid.count for solid in scene.solids.values())
-        has += [("point", count, max(first.columns["id"], default=0))] if count else []
-        for noun, of_script, of_dump in has:
-            if of_dump > of_script:
+        Sets the scene to the snapshot's time and log.
+        """
+        columns, field, only = snapshot.columns, self.look["field"], self.look["only"]
+        values, row = self.scene.values, self.log.get(snapshot.step, {})
+        for name in values.names():
+            values.set(name, row.get(name, np.nan))  # known to runs only
+        values.set("time", snapshot.time)
+        values.set("timestep", snapshot.step)
+        formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
+        for name in set().union(
+            *(one.names for one in (*formulas, *filter(None, [self.look["title"]])))
+        ):
+            if name not in GLOBAL_SEEDS and name in values and np.isnan(values.get(name)):
                 raise ScriptError(
-                    f"the script has {plural(of_script, noun)}, the dump {of_dump:.0f}",
-                    expected="the script of the run that has written the dump, and its -var",
+                    f"{name} at step {snapshot.step} is not in dumps",
+                    expected="a log in the folder of the dumps, with this column and all steps",
+                    hint=f"log_modify(custom, step, time, {name}) in the script of the run",
                 )
-        dimension = scene.domain.dimension  # points in 3D may all have z = 0
-    first, field = chosen(first), look["field"]
-    column = field.text if isinstance(field, ColumnFormula) else field
-    if column is not None and column not in first.columns:
-        raise unknown_column(f"the dump has no column '{column}'", column, first.columns)
-    column = column or ("type" if dimension > 1 else "x")
-    types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
-    apart = ("field", "only", "title", "dpi")
-    words = {name: value for name, value in look.items() if name not in apart}
-    words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")
-    label, length = labelled(column, first.units.get(column, "")), first.units.get("x", "")
-    made_look = {"label": label} | look_of(column, dimension, **words)
-    made_look["lengths"] = f" ({length})" if length else ""
-    solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
-    lo, hi, span = _all(files, column, look, made_look, chosen)
-    domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
-    if options.script is not None:
-        domain = scene.domain
-        solids = tuple(scene.solids) if solids else ()
-    size = tuple(pixels / DPI for pixels in options.size)
-    made = pictures.make(
-        domain, size, look["dpi"], pictures.Options(column, solids=solids, **made_look)
-    )
-    made.begin_with(span)
-    made.side = outlines.spacing(np.column_stack([first.columns[name] for name in "xyz"]))
-    return made
+        numbers = columns["id"].astype(np.int64) - 1
+
+        def column(name: str) -> np.ndarray:
+            return columns[name] if name in columns else members(self.scene, name, numbers)
+
+        rows = SimpleNamespace(particle=column)
+        if isinstance(field, ColumnFormula):
+            columns = columns | {field.text: field.of(rows)}
+        elif field in named_sets(self.scene):
+            columns = {field: column(field)} | columns
+        if only is not None:
+            selected = only.holds(rows)
+            columns = {name: of[selected] for name, of in columns.items()}
+        return snapshot._replace(columns=columns)
+
+    def _picture(self, first: Snapshot) -> Any:
+        """Make an empty picture with position and colours that fit all snapshots."""
+        from karamelo_py.output import outlines, pictures
+
+        look, scene, with_script = self.look, self.scene, self.options.script is not None
+        # Unused directions are 0.
+        dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
+        if with_script:
+            has = [("dimension", scene.domain.dimension, dimension)]
+            count = sum(solid.count for solid in scene.solids.values())
+            has += [("point", count, max(first.columns["id"], default=0))] if count else []
+            for noun, of_script, of_dump in has:
+                if of_dump > of_script:
+                    raise ScriptError(
+                        f"the script has {plural(of_script, noun)}, the dump {of_dump:.0f}",
+                        expected="the script of the run that wrote the dump, and its -var",
+                    )
+            dimension = scene.domain.dimension  # points in 3D may all have z = 0
+        first, field = self.chosen(first), look["field"]
+        column = field.text if isinstance(field, ColumnFormula) else field
+        if column is not None and column not in first.columns:
+            raise unknown_column(f"the dump has no column '{column}'", column, first.columns)
+        column = column or ("type" if dimension > 1 else "x")
+        types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
+        apart = ("field", "only", "title", "dpi")
+        words = {name: value for name, value in look.items() if name not in apart}
+        words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")
+        label, length = labelled(column, first.units.get(column, "")), first.units.get("x", "")
+        made_look = {"label": label} | look_of(column, dimension, **words)
+        made_look["lengths"] = f" ({length})" if length else ""
+        solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
+        lo, hi, span = _all(self.files, column, look, made_look, self.chosen)
+        domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)
+        if with_script:
+            domain = scene.domain
+            solids = tuple(scene.solids) if solids else ()
+        size = tuple(pixels / DPI for pixels in self.options.size)
+        made = pictures.make(
+            domain, size, look["dpi"], pictures.Options(column, solids=solids, **made_look)
+        )
+        made.begin_with(span)
+        made.side = outlines.spacing(np.column_stack([first.columns[name] for name in "xyz"]))
+        return made
 
 
 def _all(
     files: Iterable[Path],
     column: str,
-    look: dict[str, Any],
-    made_look: dict[str, Any],
+    look: Look,
+    made_look: Look,
     chosen: Callable[[Snapshot], Snapshot],
 ) -> tuple[np.ndarray, np.ndarray, Any]:
     """Return bounds of all snapshots, and limits of a column."""
@@ -398,9 +390,9 @@ def _all(
         ends += [values.min(), values.max()] if len(values) else []
     if count and not left:
         ways = ("only", *(x + end for x in "xyz" for end in ("min", "max")))
-        given = [f"--{way}" for way in ways if look[way] is not None]
+        used = [f"--{way}" for way in ways if look[way] is not None]
         raise ScriptError(
-            f"{', '.join(given)}: no point of these dumps is left",
+            f"{', '.join(used)}: no point of these dumps is left",
             hint="leave it out, or choose more points",
         )
     lo, hi = zip(*corners, strict=True)

@@ -1,8 +1,7 @@
-"""Workloads measured in separate processes: several of them, or with --ranks.
+"""Workloads measured in separate processes, whose memory does not affect each other.
 
-Memory left by earlier workloads would affect the speed. ``python -m karamelo_py.app.bench.apart``
-is the program of such a process: it gets a `Measurement` in JSON, writes results to a file, and
-ends when its parent closes its input.
+``python -m karamelo_py.app.bench.apart`` gets a `Measurement` in JSON, writes results to a file,
+and ends when its input is closed.
 """
 
 import json
@@ -52,30 +51,30 @@ class Measurement(NamedTuple):
 # ---- one process --------------------------------------------------------------------------------
 
 
-def measured(part: Measurement) -> Measured | Solved:
-    workload = WORKLOADS[part.workload]
-    simulation = measure.build(workload, part.threads, part.presets)
-    return measure.measured(simulation, part.seconds, part.triad, workload.lead)
+def measured(job: Measurement) -> Measured | Solved:
+    workload = WORKLOADS[job.workload]
+    simulation = measure.build(workload, job.threads, job.presets)
+    return measure.measured(simulation, job.seconds, job.triad, workload.lead)
 
 
-def measured_apart(part: Measurement) -> Measured | Solved | int:
+def measured_apart(job: Measurement) -> Measured | Solved | int:
     """Measure a workload in a separate process; return its exit status if it failed."""
-    status, results = _found_apart(part)
+    status, results = _found_apart(job)
     if results:
         return Solved(**results) if "stages" in results else Measured(**results)
     if status == ERROR:
         return status
     end = f"with the status {status}" if status >= 0 else f"by {_SIGNALS.get(-status, -status)}"
-    raise ScriptError(f"{part.workload} could not be measured: its process was ended {end}")
+    raise ScriptError(f"{job.workload} could not be measured: its process was ended {end}")
 
 
-def _found_apart(part: Measurement) -> tuple[int, dict[str, Any]]:
+def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
     """Measure in separate processes; return exit status and results."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
-        words = [json.dumps(part._replace(file=str(file)))]
-        if part.ranks > 1:
-            status = launch(part.ranks, words, module=MODULE)
+        words = [json.dumps(job._replace(file=str(file)))]
+        if job.ranks > 1:
+            status = launch(job.ranks, words, module=MODULE)
         else:
             # A separate session: Ctrl-C reaches this process only.
             with subprocess.Popen(
@@ -100,16 +99,16 @@ class Scaled(NamedTuple):
     imbalance: float  # mean fraction of longer waits
 
 
-def scaled(part: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
+def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
     """Measure a workload with 1 and several processes and as many threads, then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
-        yield measured_with_ranks(part._replace(ranks=n))
-        if n > 1 and n * part.threads <= available:
-            yield measured_with_ranks(part._replace(threads=n * part.threads))
+        yield measured_with_ranks(job._replace(ranks=n))
+        if n > 1 and n * job.threads <= available:
+            yield measured_with_ranks(job._replace(threads=n * job.threads))
     for n in counts[1:]:
-        larger = part.presets | grown(WORKLOADS[part.workload].script, part.presets, n)
-        yield measured_with_ranks(part._replace(ranks=n, presets=larger), weak=True)
+        larger = job.presets | grown(WORKLOADS[job.workload].script, job.presets, n)
+        yield measured_with_ranks(job._replace(ranks=n, presets=larger), weak=True)
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
@@ -122,21 +121,21 @@ def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]
     return {name: repr(value / times ** (1 / d))}
 
 
-def measured_with_ranks(part: Measurement, *, weak: bool = False) -> Scaled:
-    status, found = _found_apart(part._replace(scaling=True))
-    if not found:
+def measured_with_ranks(job: Measurement, *, weak: bool = False) -> Scaled:
+    status, results = _found_apart(job._replace(scaling=True))
+    if not results:
         why = f"ended by signal {abs(status) % 128}" if not 0 <= status < 128 else "see above"
         raise ScriptError(
-            f"{part.workload} could not be measured with {part.ranks} x {part.threads}: {why}"
+            f"{job.workload} could not be measured with {job.ranks} x {job.threads}: {why}"
         )
-    return Scaled(part.ranks, part.threads, weak, **found)
+    return Scaled(job.ranks, job.threads, weak, **results)
 
 
-def _share(part: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
-    workload = WORKLOADS[part.workload]
-    simulation = measure.build(workload, part.threads, part.presets, comm)
+def _share(job: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
+    workload = WORKLOADS[job.workload]
+    simulation = measure.build(workload, job.threads, job.presets, comm)
     simulation.compile()
-    count, times = measure.repeated(simulation, part.seconds, workload.lead)
+    count, times = measure.repeated(simulation, job.seconds, workload.lead)
     taken, waits = min(times, key=lambda one: one[0])
     least = float(np.min(waits))
     return {
@@ -161,22 +160,22 @@ def line(row: Scaled, one: Scaled) -> str:
 
 
 def main() -> int:
-    part = Measurement(*json.loads(sys.argv[1]))
+    job = Measurement(*json.loads(sys.argv[1]))
     keep_to_oneself()
-    if part.ranks > 1:
-        return together(part.ranks, lambda comm: _measure(part, comm))
+    if job.ranks > 1:
+        return together(job.ranks, lambda comm: _measure(job, comm))
     # The input closes when the parent no longer waits.
     threading.Thread(target=lambda: (os.read(0, 1), os._exit(0)), daemon=True).start()
-    status, text = outcome_of(lambda: _measure(part), debugging=part.debug)
+    status, text = outcome_of(lambda: _measure(job), debugging=job.debug)
     if text:
         print(text, file=sys.stderr, flush=True)
     return status
 
 
-def _measure(part: Measurement, comm: MpiComm | None = None) -> int:
-    found = _share(part, comm) if part.scaling else measured(part)._asdict()
+def _measure(job: Measurement, comm: MpiComm | None = None) -> int:
+    results = _share(job, comm) if job.scaling else measured(job)._asdict()
     if comm is None or comm.leads:
-        Path(part.file).write_text(json.dumps(found), encoding="utf-8")
+        Path(job.file).write_text(json.dumps(results), encoding="utf-8")
     return 0
 
 

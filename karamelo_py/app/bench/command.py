@@ -1,7 +1,6 @@
 """karamelo-py bench: speed of this machine on known scenes.
 
-Speeds are of the fastest repetition. Compare them within one bench only: machines are shared and
-clocks change.
+Compare speeds within one bench only: machines are shared and clocks change.
 """
 
 import json
@@ -11,13 +10,13 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
 from math import inf
 from pathlib import Path
-from typing import Any
 
 import karamelo_py
 from karamelo_py.app.bench import apart, measure, on_card
 from karamelo_py.app.bench.measure import WORKLOADS
 from karamelo_py.app.options import above_zero, add_variables, threads_option
 from karamelo_py.app.plot import read_text
+from karamelo_py.app.studies.case import Record
 from karamelo_py.app.studies.variables import out_file
 from karamelo_py.compiler.gpu import NoCard, bandwidth, card
 from karamelo_py.output.files import write_whole
@@ -75,10 +74,14 @@ def run(options: Namespace) -> int:
             raise ScriptError(
                 f"-var {variable}: no scene has a variable '{variable}'", expected="N or coarser"
             )
+    workloads = {
+        name: {n: value for n, value in options.var if n in words}
+        for name, words in words_of.items()
+    }
     out = out_file(options.o, ".json") if options.o else None
     earlier = read(options.against) if options.against else None
     if options.gpu:
-        return _on_card(options, chosen, words_of, out, earlier)
+        return _on_card(options, workloads, out, earlier)
     from numba import config
 
     available = config.NUMBA_NUM_THREADS
@@ -86,15 +89,14 @@ def run(options: Namespace) -> int:
     triad = measure.bandwidth(threads)
     print(f"threads {threads}, triad bandwidth {triad / 1e9:.1f} GB/s (256 MiB arrays)")
     about = {"commit": commit(), "threads": threads, "triad": triad, "seconds": options.seconds}
-    record: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
-    for name in chosen:
-        presets = {n: value for n, value in options.var if n in words_of[name]}
-        part = apart.Measurement(name, threads, presets, options.seconds, triad, options.debug)
+    record: dict = {"kind": KIND, **surroundings(), **about, "workloads": {}}
+    for name, presets in workloads.items():
+        job = apart.Measurement(name, threads, presets, options.seconds, triad, options.debug)
         if options.ranks:
-            one = _scaling(part, options.ranks, available)
+            one = _scaling(job, options.ranks, available)
         else:
             act = apart.measured_apart if len(chosen) > 1 else apart.measured
-            measured = act(part)
+            measured = act(job)
             if isinstance(measured, int):
                 return measured
             _print(name, measured, published=not presets)
@@ -105,7 +107,7 @@ def run(options: Namespace) -> int:
     return _ended(record, earlier, out)
 
 
-def _ended(record: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Path | None) -> int:
+def _ended(record: Record, earlier: Record | None, out: Path | None) -> int:
     """Compare with an earlier bench, and name the file."""
     if earlier:
         print("\n" + "\n".join(comparison(record, earlier)))
@@ -115,7 +117,7 @@ def _ended(record: Mapping[str, Any], earlier: Mapping[str, Any] | None, out: Pa
 
 
 def _on_card(
-    options: Namespace, chosen: Any, words_of: Mapping[str, set], out: Path | None, earlier: Any
+    options: Namespace, workloads: Mapping[str, dict], out: Path | None, earlier: Record | None
 ) -> int:
     try:
         gpu = card()
@@ -124,9 +126,8 @@ def _on_card(
     copied = bandwidth(gpu)
     print(f"{gpu.name}, copies of memory {copied / 1e9:.0f} GB/s, read and written")
     about = {"commit": commit(), "card": gpu.name, "bandwidth": copied, "seconds": options.seconds}
-    record: dict[str, Any] = {"kind": KIND, **surroundings(), **about, "workloads": {}}
-    for name in chosen:
-        presets = {n: value for n, value in options.var if n in words_of[name]}
+    record: dict = {"kind": KIND, **surroundings(), **about, "workloads": {}}
+    for name, presets in workloads.items():
         for variables in on_card.sizes_of(name, presets):
             one = on_card.measured(name, variables, gpu, copied, options.seconds)
             on_card.say(name, one, variables)
@@ -144,11 +145,11 @@ def _counts(text: str) -> list[int]:
     return [int(word) for word in words]
 
 
-def _scaling(part: apart.Measurement, ranks: list[int], available: int) -> dict[str, Any]:
+def _scaling(job: apart.Measurement, ranks: list[int], available: int) -> dict:
     """Measure and print the scaling of a workload; return its record."""
     rows: list[apart.Scaled] = []
-    print(f"\n{part.workload}: {WORKLOADS[part.workload].title}\n{apart.HEADING}")
-    for row in apart.scaled(part, ranks, available):
+    print(f"\n{job.workload}: {WORKLOADS[job.workload].title}\n{apart.HEADING}")
+    for row in apart.scaled(job, ranks, available):
         rows.append(row)
         print(apart.line(row, rows[0]), flush=True)
     first, *_ = scaling = [row._asdict() for row in rows]
@@ -209,7 +210,7 @@ def commit() -> str | None:
         return None
 
 
-def read(path: Path) -> dict[str, Any]:
+def read(path: Path) -> dict:
     expected = "a file that karamelo-py bench -o has written"
     text = read_text(path, expected)
     try:
@@ -223,7 +224,7 @@ def read(path: Path) -> dict[str, Any]:
     return record
 
 
-def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
+def comparison(now: Record, then: Record) -> list[str]:
     """Return lines that compare two benches."""
     lines = [f"{'workload':<24} {'then':>10} {'now':>10} {'ratio':>7}   (best, million/s)"]
     ours, theirs = now["workloads"], then["workloads"]
@@ -240,10 +241,10 @@ def comparison(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
     return [line.rstrip() for line in [*lines, *_differences(now, then)]]
 
 
-def _differences(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[str]:
+def _differences(now: Record, then: Record) -> list[str]:
     """List differences of machine, threads and versions."""
 
-    def about(record: Mapping[str, Any]) -> dict[str, Any]:
+    def about(record: Record) -> dict:
         keys = ("processor", "cores", "system", "commit", "threads")
         versions = record.get("versions") or {}
         return {key: record.get(key) for key in keys} | {

@@ -49,7 +49,7 @@ def _read_workloads() -> dict[str, Workload]:
     texts = tables["scenes"]
 
     def workload(
-        title: str, scenes: Sequence[str], variables: Mapping[str, str | int],
+        *, title: str, scenes: Sequence[str], variables: Mapping[str, str | int],
         method: str = "ulmpm, FLIP, linear, 1", scheme: str = "musl", precision: str = "double",
         **rest,
     ) -> Workload:  # fmt: skip
@@ -118,10 +118,10 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """Return what takes at least half of a step, the first of these.
+        """Return what takes at least half of a step: ``overhead``, ``nodes``, ``memory``.
 
-        ``overhead`` (the rest), ``nodes``, ``memory`` (of the bandwidth of arrays as large as the
-        scene), else ``arithmetic`` (instructions or latency); ``unknown`` if not `told_apart`.
+        Memory is relative to arrays as large as the scene. Else ``arithmetic`` (instructions or
+        latency), or ``unknown`` if not `told_apart`.
         """
         if not self.told_apart:
             return "unknown"
@@ -244,7 +244,7 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Returns the steps per repetition, and for each the seconds taken and waited by each process.
+    Returns the steps per repetition, and the seconds taken and waited by each process.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -350,8 +350,8 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
     """Return bytes per particle-step without caches, bytes of the scene, and parallel regions.
 
-    Point fields count once per sweep that reads and once per sweep that writes them; node fields in
-    loops over nodes; tile buffers when written and summed.
+    Point fields count per sweep that reads and that writes them; node fields in node loops; tile
+    buffers when written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])

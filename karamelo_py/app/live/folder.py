@@ -70,9 +70,9 @@ class FolderPage:
                 if self._seen.get(path) == changed:
                     continue
                 count = self._read.get(path, 0)
-                for place, snapshot in enumerate(read(path, count), count):
-                    self._add(path, place, snapshot)
-                    self._read[path] = place + 1
+                for index, snapshot in enumerate(read(path, count), count):
+                    self._add(path, index, snapshot)
+                    self._read[path] = index + 1
                 self._seen[path], files = changed, files + 1
             except (ScriptError, OSError):  # being written, or deleted
                 continue
@@ -90,7 +90,7 @@ class FolderPage:
                 self._widths[kind] = _width(paths[0])
         return kinds[max(kinds, key=self._widths.__getitem__)] if kinds else []
 
-    def _add(self, path: Path, place: int, snapshot: Snapshot) -> None:
+    def _add(self, path: Path, index: int, snapshot: Snapshot) -> None:
         columns = snapshot.columns
         if not len(columns.get("x", ())):  # no points, or no positions
             return
@@ -100,7 +100,7 @@ class FolderPage:
             self._dimension = 3 if "z" in directions else 1 + len(directions)
             preferred = [name for name in ("seq", "type") if name in columns]
             self._column = [*preferred, *self._columns][0]
-        self._states.append((path, place, snapshot.step, float(snapshot.time), len(columns["x"])))
+        self._states.append((path, index, snapshot.step, float(snapshot.time), len(columns["x"])))
 
     def _news(self, seen: int) -> tuple[int, dict]:
         log = self._log
@@ -138,11 +138,11 @@ class FolderPage:
         k = number_in(words)
         if not 0 <= k < len(self._states):
             return None
-        path, place, step, moment, _ = self._states[k]
-        columns = next(read(path, place)).columns
+        path, index, step, moment, _ = self._states[k]
+        columns = next(read(path, index)).columns
         count, axes = len(columns["x"]), "xyz"[: self._dimension]
         columns = {"id": np.arange(count), "type": np.zeros(count), **columns}
-        frame = Frame.of_columns(step, moment, axes, self._column, columns.__getitem__)
+        frame = Frame.of_columns(step, moment, axes, self._column, read=columns.__getitem__)
         return frame.numbers.tobytes()
 
     def _choose(self, words: Mapping[str, str]) -> None:
@@ -168,5 +168,5 @@ def _width(path: Path) -> int:
         return 0
 
 
-def _number(value: Any) -> Any:
+def _number(value: object) -> float | None:
     return float(value) if np.issubdtype(np.asarray(value).dtype, np.number) else None

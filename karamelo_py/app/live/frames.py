@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Frame(NamedTuple):
 
     @classmethod
     def of_columns(
-        cls, step: int, time: float, axes: str, column: str, read: Callable[[str], np.ndarray]
+        cls, step: int, time: float, axes: str, column: str, *, read: Callable[[str], np.ndarray]
     ) -> Frame:
         """Make a frame from columns (n,) that ``read(name)`` returns."""
         columns = [np.asarray(read(name)) for name in (*axes, column)]
@@ -43,7 +43,7 @@ class Frame(NamedTuple):
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
     """Select about `POINTS` of the points (n,), the same ones in each state.
 
-    Solids of up to 10 % of an equal part stay complete; the others are thinned by one factor.
+    Solids of up to 10 % of an equal part stay complete.
     """
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
@@ -101,7 +101,7 @@ def number_in(words: Mapping[str, str]) -> int:
     return int(text) if text.isdecimal() and len(text) < 19 else -1
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> object:
     """Return None for numbers that JSON lacks."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None

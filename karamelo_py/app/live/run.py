@@ -87,7 +87,7 @@ class RunPage(Rhythmic, Listener):
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
         """Send the last news, with an error that ends the run, and wait for open pages to close.
 
-        With `waits`, at a terminal, also wait for the first page.
+        With `waits`, at a terminal, wait for a first page.
         """
         server = self.server
         error = sys.exception()
@@ -117,7 +117,7 @@ class RunPage(Rhythmic, Listener):
     def _taken(self) -> Frame:
         update, read = self.hub.update, self.hub.fields.particle
         axes = "xyz"[: self.hub.domain.dimension]
-        return Frame.of_columns(update.step, update.time, axes, self._column, read)
+        return Frame.of_columns(update.step, update.time, axes, self._column, read=read)
 
     def _wait(self) -> None:
         shown, left = self._column, time.perf_counter()

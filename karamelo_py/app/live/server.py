@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from socket import socket
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
@@ -36,15 +37,16 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
 }
 
+Request = socket | tuple[bytes, socket]
 Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
 
 
 class Server:
     """Serves a page to browsers on this machine, at the URL `address`.
 
-    ``news(seen)`` returns the new `seen` and the news since the old one (0 at first); called in
-    server threads when a page opens and after each `changed`. `answers` are responses (bytes, JSON
-    or None) to further addresses by name, `actions` (POST) functions by name; both get the query.
+    ``news(seen)`` returns the new `seen` and the news since the old one (0 at first), in server
+    threads, after each `changed`. `answers` (bytes, JSON or None) and `actions` (POST) are
+    functions of the query, by name.
     """
 
     def __init__(
@@ -93,7 +95,7 @@ class Server:
         self._http.shutdown()
         self._http.server_close()
 
-    def events(self, write: Callable[[bytes], Any]) -> None:
+    def events(self, write: Callable[[bytes], object]) -> None:
         """Write news as they come until the page is closed."""
         key, seen, version = threading.get_ident(), 0, -1
         try:
@@ -127,21 +129,21 @@ class _Quiet(ThreadingHTTPServer):
 
     daemon_threads = True
 
-    def __init__(self, *given: Any):
-        self._open: set[Any] = set()
-        super().__init__(*given)
+    def __init__(self, *arguments: Any):
+        self._open: set[Request] = set()
+        super().__init__(*arguments)
 
-    def verify_request(self, request: Any, client: Any) -> bool:
+    def verify_request(self, request: Request, client: object) -> bool:
         if len(self._open) >= MOST:
             return False
         self._open.add(request)
         return True
 
-    def shutdown_request(self, request: Any) -> None:
+    def shutdown_request(self, request: Request) -> None:
         self._open.discard(request)
         super().shutdown_request(request)
 
-    def handle_error(self, *_: Any) -> None:
+    def handle_error(self, *_: object) -> None:
         """Print nothing on the terminal of the run."""
 
 
@@ -161,7 +163,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
         timeout = UNKNOWN
         server_version, sys_version = "karamelo-py", ""
 
-        def log_message(self, *_: Any) -> None:
+        def log_message(self, *_: object) -> None:
             """Print nothing on the terminal of the study."""
 
         def do_GET(self) -> None:
@@ -178,12 +180,12 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                     server.events(self._write)
                 except OSError:  # the page is closed
                     self.close_connection = True
-            elif name in server.answers and (found := server.answers[name](words)) is not None:
-                if isinstance(found, bytes):
+            elif name in server.answers and (answer := server.answers[name](words)) is not None:
+                if isinstance(answer, bytes):
                     kind = "text/javascript" if name.endswith(".js") else "application/octet-stream"
-                    self._give(found, kind)
+                    self._give(answer, kind)
                 else:
-                    self._give(json.dumps(found).encode(), "application/json")
+                    self._give(json.dumps(answer).encode(), "application/json")
             else:
                 self._nothing()
 

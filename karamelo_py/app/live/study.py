@@ -13,7 +13,7 @@ import numpy as np
 from karamelo_py.app.live.frames import plain
 from karamelo_py.app.live.server import Server
 from karamelo_py.app.plot import read_log
-from karamelo_py.app.studies.case import COLUMNS, command_of, said_in, worded
+from karamelo_py.app.studies.case import COLUMNS, Row, command_of, said_in, worded
 
 MOST = 400  # rows of a log drawn on a page
 LINES = 12  # last lines of a run's output
@@ -22,8 +22,8 @@ LINES = 12  # last lines of a run's output
 class StudyPage:
     """The page of a study; `stopped` is set when a viewer ends it.
 
-    `recorded` are names of recorded values, `axes` initial axes of the chart, `base` the folder
-    that folders of rows are relative to.
+    `recorded` are recorded values, `axes` initial axes of the chart; row folders are relative to
+    `base`.
     """
 
     def __init__(
@@ -31,13 +31,13 @@ class StudyPage:
         axes: Sequence[str] = (), base: Path = Path(),
     ):  # fmt: skip
         self.stopped = threading.Event()
-        self._judged: Callable[[Mapping[str, Any]], Mapping[str, Any]] = dict
+        self._judged: Callable[[Row], Row] = dict
         self._script, self._names, self._base = script, [*names], base
         self._about = {
             "title": str(script), "names": self._names, "recorded": [*recorded],
             "facts": [name for name in COLUMNS if name != "seconds_spread"], "axes": [*axes],
         }  # fmt: skip
-        self._rows: list[dict[str, Any]] = []
+        self._rows: list[Row] = []
         self._running: list[tuple[str, float]] = []
         self._progress: dict[str, Any] = {}
         self._folders: dict[str, Path] = {}
@@ -61,7 +61,7 @@ class StudyPage:
 
     def follow(
         self,
-        rows: Sequence[Mapping[str, Any]],
+        rows: Sequence[Row],
         waiting: Sequence[tuple[Mapping[str, str], Path]],
         running: Sequence[tuple[Mapping[str, str], Path, float]],
         **progress: Any,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from math import inf, prod
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import look, records, variables
 from karamelo_py.app.studies.case import (
     PROGRAM,
+    Row,
     command_of,
     environment,
     options_of,
@@ -72,17 +72,16 @@ class Forecast:
 
 
 def forecast(
-    x: float, xs: Sequence[float], rows: Sequence[Mapping[str, Any]], accuracy: str, cost: str,
+    x: float, xs: Sequence[float], rows: Sequence[Row], accuracy: str, cost: str, *,
     highest: float = 4.0,
 ) -> Forecast | None:  # fmt: skip
-    """Forecast a run at `x` from the runs at `xs`, coarse ones first; None if impossible.
+    """Forecast a run at `x` from the runs at `xs`, coarse ones first.
 
-    The error continues with the last order. Bounds follow from the least and the largest order so
-    far, at least a third of the expected order above and half of it below; an order that has fallen
-    may fall by as much again, and one that has not yet reached 2 may. Errors small by chance count
-    as large as they may be (`credible`, with the order `highest` of the basis). The time is steps
-    times (a + b points), fitted to the runs; other costs continue as between the last two.
-    Impossible with fewer than two errors, or if the last run got worse.
+    The error continues with the last order. Its bounds follow from the least and largest order, at
+    least a third of it above and half below; a falling order may fall as much again, and one below
+    2 may reach 2. Errors small by chance count as large as they may be (`credible`). The time is
+    steps times (a + b points), fitted; other costs continue as between the last two runs. None with
+    fewer than two errors, or if the last run got worse.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -107,7 +106,7 @@ def forecast(
     return Forecast(*at, _cost(x, xs, rows, cost))
 
 
-def _cost(x: float, xs: np.ndarray, rows: Sequence[Mapping[str, Any]], cost: str) -> float:
+def _cost(x: float, xs: np.ndarray, rows: Sequence[Row], cost: str) -> float:
     values = column(rows, cost)
     if cost == "seconds" and all(usable(a) for a in values):
         steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
@@ -133,7 +132,7 @@ class ChoiceRuns:
     """A choice of words and its runs, coarse ones first."""
 
     values: dict[str, str]
-    rows: list[Mapping[str, Any]] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()  # of its method
     warnings: tuple[str, ...] = ()  # of its finest run
 
@@ -152,8 +151,8 @@ class ChoiceRuns:
 
     def look(self, folder: Path) -> None:
         """Read method and warnings of the finest run."""
-        place = folder / self.rows[-1]["folder"]
-        record = record_of(place)
+        source = folder / self.rows[-1]["folder"]
+        record = record_of(source)
         self.words = frozenset(record["runs"][0]["method"].split() if record.get("runs") else ())
         notes = record.get("messages", [])
         self.warnings = tuple(note["text"] for note in notes if note["kind"] == "warning")
@@ -174,12 +173,11 @@ class Candidate:
 class Adviser:
     """Finds the cheapest variant whose error is at most `target`.
 
-    `along` is the variable that refines a scene, with its values, coarse ones first; `accuracy` and
-    `cost` are columns of the table.
+    `along` refines a scene, coarse values first; `accuracy` and `cost` are columns of the table.
     """
 
     def __init__(
-        self, study: Study, along: tuple[str, list[str]], choices: list[ChoiceRuns],
+        self, study: Study, along: tuple[str, list[str]], choices: list[ChoiceRuns], *,
         accuracy: str, cost: str, target: float,
     ):  # fmt: skip
         self.study = study
@@ -241,10 +239,10 @@ class Adviser:
         met = [run for run in self._met(choice) if lucky or not run.chance]
         if met or lucky:
             return met[0] if met else None
-        known = self.xs[: len(choice.rows)]
-        for step in range(len(known), len(self.xs)):
+        xs = self.xs[: len(choice.rows)]
+        for step in range(len(xs), len(self.xs)):
             run = forecast(
-                self.xs[step], known, choice.rows, self.accuracy, self.cost, choice.highest
+                self.xs[step], xs, choice.rows, self.accuracy, self.cost, highest=choice.highest
             )
             if run is None:
                 break
@@ -265,7 +263,7 @@ class Adviser:
     def best(self) -> Candidate | None:
         """Return the cheapest candidate, after runs that may change it.
 
-        A choice that could become the cheapest is followed until its candidate is the next finer
+        Choices that could become the cheapest are followed until their candidate is the next finer
         variant.
         """
         while True:
@@ -305,11 +303,12 @@ class Adviser:
 
     def doubts(self, best: Candidate) -> list[str]:
         """List reasons why the error of a forecast may stop falling."""
-        reasons = [f"its runs are warned of: {text}" for text in best.choice.warnings[:1]]
+        reasons = [f"its runs warn: {text}" for text in best.choice.warnings[:1]]
         if self._crosses(best.choice, best.step):
+            basis = ", ".join(best.choice.kind & {*JUMPING})
             reasons.append(
-                f"gradients of the basis {', '.join(best.choice.kind & {*JUMPING})} jump between "
-                "cells: errors grow once points cross them, and on finer grids they cross more"
+                f"the gradient of the {basis} basis jumps between cells: errors grow once points "
+                "cross them, more so on finer grids"
             )
         for other in self.choices:
             if other.kind != best.choice.kind:
@@ -319,7 +318,7 @@ class Adviser:
             floor = np.nanmin(credible(self.xs[: len(sizes)], signed, other.highest))
             if sizes[-1] > WORSE * np.nanmin(sizes) and floor > best.forecast.low:
                 text = f"{other.label} did not stay below {floor:.3g}"
-                reasons.append(f"finer runs of the same functions turned round: {text}")
+                reasons.append(f"errors with the same basis rose again on finer grids: {text}")
         return reasons
 
     def hopeful(self) -> Candidate | None:
@@ -381,7 +380,8 @@ def run(options: Namespace) -> int:
     ordered = values[name]
     if len(ordered) > 1:
         ordered = coarse_first(options.script, name, ordered, choices[0].values)
-    adviser = Adviser(study, (name, ordered), choices, items[0].word, options.cost, options.target)
+    goal = {"accuracy": items[0].word, "cost": options.cost, "target": options.target}
+    adviser = Adviser(study, (name, ordered), choices, **goal)
     adviser.pilot(options.pilot)
     best = adviser.best()
     tell(adviser)

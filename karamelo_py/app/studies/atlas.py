@@ -151,40 +151,41 @@ def run(options: Namespace) -> int:
     return 1 if failed else 0
 
 
-def ended(place: Path) -> tuple[list[str], int]:
+def ended(folder: Path) -> tuple[list[str], int]:
     """List the runs in an entry's tables that did not end well, and count all."""
-    tables = [records.read(path) for path in sorted(place.glob("*.csv"))]
+    tables = [records.read(path) for path in sorted(folder.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)
 
 
-def make(entry: Entry, place: Path, inputs: Path, *, small: bool, again: bool) -> str:
+def make(entry: Entry, folder: Path, inputs: Path, *, small: bool, again: bool) -> str:
     """Run an entry's commands in its folder; return ``done``, ``known`` or ``failed``."""
     lines = entry.lines(str(inputs), small=small)
     key = key_of(lines)
-    record = place / RECORD
+    record = folder / RECORD
     stored = read_json(record)
-    if not again and stored.get("key") == key and "said" in stored:
+    if not again and stored.get("key") == key and "printed" in stored:
         return "known"
-    with reported(place):
-        place.mkdir(parents=True, exist_ok=True)
+    with reported(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
-    for path in [*place.glob("*.png"), *place.glob("*.svg")]:
+    for path in [*folder.glob("*.png"), *folder.glob("*.svg")]:
         path.unlink()  # may be of other commands
     more = {"NUMBA_DISABLE_JIT": "1"} if entry.interpreted else {}
-    transcript = []
+    transcript, printed = [], ""
     for line in lines:
         done = subprocess.run(
             [*PROGRAM, *shlex.split(line)],
-            cwd=place, env={**environment(), **more}, stdin=subprocess.DEVNULL,
+            cwd=folder, env={**environment(), **more}, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, text=True, encoding="utf-8", check=False,
         )  # fmt: skip
-        transcript.append(f"$ karamelo-py {line}\n{done.stdout}")
-        write_whole(place / TRANSCRIPT, "\n".join(transcript))
+        printed = done.stdout
+        transcript.append(f"$ karamelo-py {line}\n{printed}")
+        write_whole(folder / TRANSCRIPT, "\n".join(transcript))
         if done.returncode:
-            print(done.stdout, end="")
+            print(printed, end="")
             return "failed"
-    made = {"key": key, "commands": lines, "said": done.stdout, **surroundings()}
+    made = {"key": key, "commands": lines, "printed": printed, **surroundings()}
     write_whole(record, json.dumps(made, indent=1))
     return "done"
 
@@ -202,7 +203,8 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     """Write the page of finished entries; parts of the others stay."""
     before = page.read_text(encoding="utf-8") if page.exists() else ""
     before_by_name = {
-        part.partition("\n")[0]: part.rstrip() for part in re.split("^##+ ", before, flags=re.M)
+        section.partition("\n")[0]: section.rstrip()
+        for section in re.split("^##+ ", before, flags=re.M)
     }
     shown = page.parent / "_static" / "atlas"
     parts = [
@@ -212,29 +214,29 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
     group = ""
     for entry in entries:
         done = (folder / entry.name / RECORD).exists()
-        part = part_of_page(entry, folder / entry.name, shown, inputs) if done else None
-        part = part or before_by_name.get(entry.name)
-        if not part or not entry.page:
+        section = part_of_page(entry, folder / entry.name, shown, inputs) if done else None
+        section = section or before_by_name.get(entry.name)
+        if not section or not entry.page:
             continue
         if entry.group != group:
             group = entry.group
             parts.append(f"## {group.replace('_', ' ').capitalize()}")
-        parts.append(f"### {part}")
+        parts.append(f"### {section}")
     write_whole(page, "\n\n".join(parts) + "\n")
     print(f"written: {page}; pictures are in {shown}")
 
 
-def part_of_page(entry: Entry, place: Path, shown: Path, inputs: Path) -> str:
+def part_of_page(entry: Entry, folder: Path, shown: Path, inputs: Path) -> str:
     """Write an entry's part of the page; copy its pictures to `shown`."""
     parts = [entry.name, entry.text]
     title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
-    for path in sorted(path for path in place.iterdir() if path.suffix in PICTURES):
+    for path in sorted(path for path in folder.iterdir() if path.suffix in PICTURES):
         target = shown / entry.name / path.name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, target)
         parts.append(f"![{title}](_static/atlas/{entry.name}/{path.name})")
-    made = read_json(place / RECORD)
-    printed = [line.rstrip() for line in made["said"].rstrip().splitlines()]
+    made = read_json(folder / RECORD)
+    printed = [line.rstrip() for line in made["printed"].rstrip().splitlines()]
     text = "\n".join([*(f"$ karamelo-py {line}" for line in made["commands"]), *printed])
     version = made.get("versions", {}).get("karamelo-py", karamelo_py.__version__)
     with_what = [f"karamelo-py {version}", made.get("processor"), made.get("date", "")[:10]]

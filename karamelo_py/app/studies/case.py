@@ -25,6 +25,8 @@ from karamelo_py.output.record import NAME
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
 
+Row = Mapping[str, Any]  # of a table of runs
+Record = Mapping[str, Any]  # a JSON object
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
@@ -74,7 +76,7 @@ COLUMNS = {
 }
 
 
-def worded(case: Mapping[str, Any]) -> str:
+def worded(case: Row) -> str:
     return ", ".join(f"{name} = {value}" for name, value in case.items())
 
 
@@ -228,7 +230,7 @@ def options_of(case: Mapping[str, str]) -> list[str]:
     return [word for name, value in case.items() for word in ("-var", name, value)]
 
 
-def command_of(script: Any, case: Mapping[str, str]) -> str:
+def command_of(script: str | Path, case: Mapping[str, str]) -> str:
     """Format the shell command of a case, with values quoted."""
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
@@ -240,11 +242,11 @@ def environment() -> dict[str, str]:
     return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}
 
 
-def record_of(folder: Path) -> dict[str, Any]:
+def record_of(folder: Path) -> Record:
     return read_json(folder / NAME)
 
 
-def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
+def facts_of(record: Record) -> dict[str, float]:
     """Return numbers of all runs of a script, or of the first, see `COLUMNS`."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
@@ -267,12 +269,12 @@ def facts_of(record: Mapping[str, Any]) -> dict[str, float]:
     return facts
 
 
-def error_of(record: Mapping[str, Any]) -> dict[str, Any]:
+def error_of(record: Record) -> Record:
     errors = [note for note in record.get("messages", []) if note["kind"] == "error"]
     return errors[-1] if errors else {}
 
 
-def folder_name(case: Mapping[str, Any]) -> str:
+def folder_name(case: Row) -> str:
     text = ",".join(f"{name}={value}" for name, value in case.items())
     plain = re.sub(r"[^\w.,=+-]", "_", text)
     if plain == text and len(plain) < 100:

@@ -8,13 +8,12 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
-from typing import Any
 
 import numpy as np
 
 from karamelo_py.app.live.server import require_plotly
 from karamelo_py.app.studies import keeping, look, pictures, records, results
-from karamelo_py.app.studies.case import command_of, worded
+from karamelo_py.app.studies.case import Row, command_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
@@ -179,8 +178,8 @@ def curves(options: Namespace, table: Table, by: list[str]) -> int:
     over = options.x or "Time"
 
     def read(column: str) -> list[pictures.History]:
-        given = {"log": options.log, "names": names(options.names)}
-        return pictures.histories(table, differing, over, column, **given)
+        settings = {"log": options.log, "names": names(options.names)}
+        return pictures.histories(table, differing, over, column, **settings)
 
     exact = None
     if options.exact:
@@ -349,7 +348,7 @@ def _said(row: Mapping[str, str], family: Family) -> str:
     return html.escape(worded(_values(row, family)))
 
 
-def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> dict[str, Any]:
+def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> Row:
     script = family.table.made.get("script", "SCRIPT")
     values = _values(row, family)
     skipped = {*values, "status", "reason", "folder"}

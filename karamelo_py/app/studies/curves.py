@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.app.studies import look
+from karamelo_py.app.studies.case import Row
 from karamelo_py.app.studies.records import SIGNED, value
 from karamelo_py.app.studies.variables import ScriptFiles
 from karamelo_py.output.units import labelled
@@ -77,9 +78,8 @@ def reached(words: Iterable[str]) -> float:
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
     """Return why errors of runs, coarse ones first, are small by chance; "" where they are not.
 
-    `values` are errors at `x`, signed where the sign is known. A small error is chance if a finer
-    run is worse; and, as long as no finer run is as good, if the sign has changed, the error fell
-    faster than by `highest`, the order of the basis, or it has grown.
+    An error is chance if a finer run is worse. If no finer run is as good, also if the sign
+    changes, the error falls faster than by `highest`, the order of the basis, or it grows.
     """
     reasons, size = [], np.abs(np.asarray(values, float))
     for k, error in enumerate(size):
@@ -101,8 +101,8 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
     """Return sizes of errors for a forecast, without reductions by chance.
 
-    An error is at least its change since the run before over the reduction by the order `highest`,
-    and no less than the error of each finer run.
+    At least the change since the run before over the reduction by the order `highest`, and the
+    error of each finer run.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -179,10 +179,9 @@ def label(choice: Mapping[str, str]) -> str:
 
 
 class Family:
-    """A table of runs as lines.
+    """A table of runs as lines, told apart by the variables `by` and others that differ.
 
-    Variables `by` distinguish lines, as do others that differ; `along` differs along a line, by
-    default the number with the most values. `accuracy` and `cost` are the columns compared.
+    `along` differs along a line, by default the number with the most values.
     """
 
     def __init__(
@@ -270,18 +269,18 @@ class Family:
         return front
 
 
-def errors(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+def errors(rows: Sequence[Row], name: str) -> np.ndarray:
     """Read errors, signed where possible; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
-def sizes(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+def sizes(rows: Sequence[Row], name: str) -> np.ndarray:
     """Read absolute values; NaN where missing."""
     return np.abs(column(rows, name))
 
 
-def column(rows: Sequence[Mapping[str, Any]], name: str) -> np.ndarray:
+def column(rows: Sequence[Row], name: str) -> np.ndarray:
     numbers = [value(row, name) for row in rows]
     return np.array([np.nan if a is None else a for a in numbers], float)
 
@@ -293,5 +292,5 @@ def require(option: str, names: Iterable[str], names_of_table: Iterable[str]) ->
             raise missing(option, name, list(names_of_table))
 
 
-def missing(option: str, name: str, known: Sequence[str], place: str = "the table") -> ScriptError:
-    return unknown(f"{option}: {place} has no '{name}'", name, known)
+def missing(option: str, name: str, names: Sequence[str], where: str = "the table") -> ScriptError:
+    return unknown(f"{option}: {where} has no '{name}'", name, names)

@@ -47,18 +47,18 @@ class Observation:
     """A measured number of the log, or a log column over time."""
 
     def __init__(self, text: str, script: variables.ScriptFiles, values: Mapping[str, list[str]]):
-        word, _, what = (part.strip() for part in text.partition("="))
-        if not (word and what):
+        word, _, target = (piece.strip() for piece in text.partition("="))
+        if not (word and target):
             expected = "a log column and a number, or a file and its column: S=test.csv:stress"
             raise ScriptError(f"-match {text}", expected=expected)
         (self.item,) = recorded(word, script, values, "-match")
-        number = number_of(what)
+        number = number_of(target)
         self.times, self.wanted = None, np.array([number], float)
         if number is None:
-            file, _, column = what.rpartition(":")
-            if not file and Path(what).is_file():
-                columns = ", ".join(read_table(Path(what)))
-                expected = f"a column of it: {what}:COLUMN, one of {columns}"
+            file, _, column = target.rpartition(":")
+            if not file and Path(target).is_file():
+                columns = ", ".join(read_table(Path(target)))
+                expected = f"a column of it: {target}:COLUMN, one of {columns}"
                 raise ScriptError(f"-match {text}", expected=expected)
             if not Path(file).is_file():
                 expected = "a number, or FILE:COLUMN"
@@ -228,11 +228,12 @@ def run(options: Namespace) -> int:
     terminal().print(table)
     for k, name in enumerate(search.names):
         if not best.slopes[:, k].any():
-            print(f"{name} changes nothing that is measured")
+            print(f"{name} has no effect on the measured values")
         elif at_end[k]:
-            print(f"{name} is at the end of its range: search a wider one")
+            print(f"{name} is at the end of its range: search a wider range")
     for a, b in alike:
-        print(f"the measurements do not tell {search.names[b]} and {search.names[a]} apart")
+        pair = f"{search.names[b]} and {search.names[a]}"
+        print(f"the measurements determine only a combination of {pair}")
     if apart:
         tell_apart(search, [best, *apart])
     if search.failed:
@@ -268,7 +269,7 @@ def disagree(best: End, other: End, half: np.ndarray) -> bool:
 
 def tell_apart(search: Search, ends: Sequence[End]) -> None:
     """Print ends that disagree, the likely cause, and a fix."""
-    print("The searches end at different values, so that there is no +-:")
+    print("The searches end at different values, so there is no +-:")
     for end in ends:
         values = search.case(end.share)
         text = ", ".join(f"{name} = {shown(float(values[name]))}" for name in search.names)
@@ -280,9 +281,9 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """Return half the 95 % ranges, and pairs of variables that cannot be told apart.
 
-    NaN without effect, or with too few measurements; inf if only a combination is determined.
-    Covariance s^2 (J^T J)^-1, s^2 from the n - p differences `off` (Seber & Wild 2003, Nonlinear
-    Regression, section 2.1).
+    NaN without effect or enough measurements, inf if only a combination is determined. Covariance
+    s^2 (J^T J)^-1, s^2 from the n - p differences `off` (Seber & Wild 2003, Nonlinear Regression,
+    section 2.1).
     """
     from scipy.stats import t
 

@@ -20,9 +20,8 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 class Kept(NamedTuple):
     """Verdict on the column in a run.
 
-    ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step), or ``unknown``
-    (given up or killed). A part of the energy ``falls`` or ``grows``, which says nothing about the
-    total.
+    ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step), ``unknown`` (given
+    up or killed); a part of the energy ``falls`` or ``grows``.
     """
 
     word: str
@@ -83,7 +82,7 @@ def _general(note: Mapping[str, str]) -> str:
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Write a Markdown table with rows by the variables `by`, and list silent failures.
 
-    Messages follow, by numbers in brackets. Variables in step with row variables are left out.
+    Messages follow, by numbers. Variables in step with row variables are left out.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

@@ -3,13 +3,17 @@
 import hashlib
 from collections.abc import Sequence
 from math import ceil, floor, log10
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from karamelo_py.app.studies.case import COLUMNS
 from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.terms import number_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 # Okabe & Ito, for colour-blind readers; each has a marker, for prints in grey.
 PALETTE = (
@@ -52,8 +56,8 @@ def place(word: str, others: Sequence[str] = ()) -> int:
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
     """Return colour, marker and dashes (by number) of each line.
 
-    The first variable sets colour and marker, the others the dashes: fixed for known words, or the
-    next unused in this colour.
+    The first variable sets colour and marker, the others the dashes: fixed for known words, else
+    the next unused.
     """
     names = list(choices[0]) if choices else []
     if not names:
@@ -93,7 +97,7 @@ def readable(colour: str) -> str:
     return to_hex(rgb)
 
 
-def contrast(rgb: Any) -> float:
+def contrast(rgb: Sequence[float] | np.ndarray) -> float:
     """Return the contrast with white of an sRGB colour, 0 to 1 (WCAG 2.1)."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
@@ -105,10 +109,7 @@ def label(name: str) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Return round ticks of a logarithmic axis: 1, 2 and 5, 1, or every few decades.
-
-    A short axis gets more digits; labels never touch.
-    """
+    """Return round ticks of a logarithmic axis, whose labels do not touch."""
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
@@ -133,7 +134,7 @@ def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
     return chosen
 
 
-def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None = None) -> None:
+def log_axis(axis: "Axis", low: float, high: float, values: Sequence[float] | None = None) -> None:
     """Make an axis logarithmic, with ticks at `values` if they are few."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
@@ -149,7 +150,7 @@ def log_axis(axis: Any, low: float, high: float, values: Sequence[float] | None 
     axis.set_major_formatter(FixedFormatter(tick_texts(ticks)))
 
 
-def slope(axes: Any, lines: Sequence[tuple[Any, Any]], exponent: float) -> None:
+def slope(axes: "Axes", lines: Sequence[tuple[np.ndarray, np.ndarray]], exponent: float) -> None:
     """Draw a triangle of y = x^exponent below lines (x, y), on logarithmic axes."""
     p, falls = abs(exponent), exponent < 0
     logs = [np.log([x, y]) for x, y in lines]
@@ -191,11 +192,8 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
     return result
 
 
-def direct_labels(axes: Any, ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names next to the axes, for x, y, name and colour of line ends.
-
-    Equal ends of one colour have one name: "linear, usf / usavg".
-    """
+def direct_labels(axes: "Axes", ends: Sequence[tuple[float, float, str, str]]) -> None:
+    """Write names at line ends (x, y, name, colour); equal ends share a label."""
     if not ends:
         return
     axes.autoscale_view()  # limits are final from here on

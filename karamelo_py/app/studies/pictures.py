@@ -227,10 +227,7 @@ class History(NamedTuple):
 def histories(
     table: Table, by: Sequence[str], over: str, curve: str, *, log: str, names: Sequence[str]
 ) -> list[History]:
-    """Read one column `over` another from the logs.
-
-    Labels are `names`, in the order of the table, else values of the variables `by`.
-    """
+    """Read one column `over` another from the logs, labelled by `names` or variables `by`."""
     curves = []
     for k, row in enumerate(table.rows):
         columns = read_log(table.path.parent / row["folder"], log)
@@ -251,8 +248,7 @@ def histories(
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     """Return the rows (n,) of a log with increasing time.
 
-    A stopped run ends with its last good state, which is earlier; one that has gone back has rows
-    of the discarded state.
+    A stopped run ends with an earlier good state; one that went back has discarded rows.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)

@@ -8,12 +8,11 @@ import re
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from karamelo_py.app.plot import read_log, read_text
-from karamelo_py.app.studies.case import COLUMNS, CaseOutcome
+from karamelo_py.app.studies.case import COLUMNS, CaseOutcome, Row
 from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
@@ -70,14 +69,14 @@ class Reduction:
 class Recorded:
     """A number from a log: ``err`` (the last value), ``max:err``, ...
 
-    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and of variables. A formula
-    that is abs(...) as a whole is also recorded with its sign (`signed`).
+    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and variables. One that is
+    abs(...) as a whole is also recorded with its sign (`signed`).
     """
 
     signed: "Recorded | None" = None
 
     def __init__(self, word: str):
-        name, equals, formula = (part.strip() for part in word.partition("="))
+        name, equals, formula = (piece.strip() for piece in word.partition("="))
         self.text, self.raw = word, None
         self.parts: dict[str, Reduction] = {}  # by name in the formula
         if not equals:
@@ -104,12 +103,12 @@ class Recorded:
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
         """List the log columns that it reads; `variables` are none."""
-        return [part.column for name, part in self.parts.items() if name not in variables]
+        return [reduction.column for name, reduction in self.parts.items() if name not in variables]
 
-    def of(self, log: Mapping[str, np.ndarray], case: Mapping[str, Any]) -> float:
+    def of(self, log: Mapping[str, np.ndarray], case: Row) -> float:
         numbers = {
-            name: number_of(case[name]) if name in case else part.of(log)
-            for name, part in self.parts.items()
+            name: number_of(case[name]) if name in case else reduction.of(log)
+            for name, reduction in self.parts.items()
         }
         if self.raw is None:
             return numbers[""]
@@ -158,11 +157,10 @@ def _apart(text: str) -> list[str]:
 
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Sequence[Recorded], folder: Path
-) -> dict[str, Any]:
+) -> Row:
     """Make the row of a run; unknown cells are None.
 
-    A failed run has no recorded values. The reason of a finished run is why its first missing value
-    is missing.
+    A failed run has no recorded values. A finished run's reason is why a value is missing.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)
@@ -184,7 +182,7 @@ def row(
     }
 
 
-def write(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write(path: Path, rows: Sequence[Row]) -> None:
     """Write a table atomically."""
     file = io.StringIO()
     writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
@@ -205,7 +203,7 @@ def read(path: Path) -> list[dict[str, str]]:
     return rows
 
 
-def value(each: Mapping[str, Any], name: str) -> float | None:
+def value(each: Row, name: str) -> float | None:
     """Return the number in a column, or None."""
     cell = each.get(name)
     if cell is None or isinstance(cell, float):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import ceil, exp, inf, isclose, isfinite, log, nan, prod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from karamelo_py.advice.energy import not_watched
 from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import look, records, variables
-from karamelo_py.app.studies.case import error_of, record_of
+from karamelo_py.app.studies.case import Row, error_of, record_of
 from karamelo_py.app.studies.curves import usable
 from karamelo_py.app.studies.study import Study, open_study
 from karamelo_py.kernels import watch
@@ -23,6 +23,10 @@ from karamelo_py.output.files import savefig
 from karamelo_py.output.plots import blank_figure, tick_texts
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables: stable, damped (spurious energy
@@ -128,7 +132,7 @@ def run(options: Namespace) -> int:
     try:
         _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart)
     finally:
-        if chart.found:  # also if interrupted
+        if chart.results:  # also if interrupted
             records.write(table, chart.rows())
             chart.draw(out, options.script.name, words)
     chart.tell()
@@ -144,7 +148,7 @@ def run(options: Namespace) -> int:
 def growth(energy: np.ndarray) -> float:
     """Return the largest mean of an energy over its first; inf for NaN.
 
-    Means are over a tenth of the rows. From rest the median replaces the first mean.
+    Means are over a tenth of the rows; from rest the median replaces the first.
     """
     if not len(energy):
         return 0.0
@@ -161,12 +165,12 @@ def growth(energy: np.ndarray) -> float:
 def remains(energy: np.ndarray) -> float:
     """Return the mean of an energy over the last tenth of its rows over the first tenth's."""
     rows = max(1, ceil(FIRST * len(energy)))
-    first, last = (float(np.abs(part).mean()) if len(part) else 0.0
-                   for part in (energy[:rows], energy[-rows:]))  # fmt: skip
+    first, last = (float(np.abs(end).mean()) if len(end) else 0.0
+                   for end in (energy[:rows], energy[-rows:]))  # fmt: skip
     return last / first if first > 0 else 1.0
 
 
-def in_short(row: Mapping[str, Any], code: str) -> str:
+def in_short(row: Row, code: str) -> str:
     if row["status"] == "too long":
         return "too long"
     if code in REASONS:
@@ -175,11 +179,10 @@ def in_short(row: Mapping[str, Any], code: str) -> str:
 
 
 class Map:
-    """A stability map: the plane of one or two `axes` among the variables in `values`.
+    """A stability map over one or two `axes` of the variables in `values`.
 
-    Growth is measured by the log column `energy` by more than the factor `bound`; without a column,
-    by the program. The column `error` shades stable cells. Variables go in step with their
-    `leaders`.
+    Growth is measured by the log column `energy` by more than the factor `bound`, else by the
+    program. The column `error` shades stable cells. Variables go in step with their `leaders`.
     """
 
     def __init__(
@@ -200,22 +203,22 @@ class Map:
         )
         self.y = more[0] if more else [0.0]
         self.shape = len(self.x), len(self.y)
-        self.found: dict[Cell, dict[str, Any]] = {}  # cells that were run
-        self.inferred: dict[Cell, Any] = {}  # classes of other cells
+        self.results: dict[Cell, Row] = {}  # cells that were run
+        self.inferred: dict[Cell, Hashable] = {}  # classes of other cells
 
     @property
-    def classes(self) -> dict[Cell, Any]:
-        return {cell: row["class"] for cell, row in self.found.items()} | self.inferred
+    def classes(self) -> dict[Cell, Hashable]:
+        return {cell: row["class"] for cell, row in self.results.items()} | self.inferred
 
     @property
     def failures(self) -> list[tuple[str, int]]:
-        failed = (row["why"] for row in self.found.values() if row["class"] == "failed")
+        failed = (row["why"] for row in self.results.values() if row["class"] == "failed")
         return Counter(failed).most_common()
 
     def case(self, cell: Cell) -> dict[str, str]:
         at = dict(zip(self.axes, cell, strict=False))
-        place = {name: at.get(self.leaders.get(name, name), 0) for name in self.values}
-        return {name: values[place[name]] for name, values in self.values.items()}
+        index = {name: at.get(self.leaders.get(name, name), 0) for name in self.values}
+        return {name: values[index[name]] for name, values in self.values.items()}
 
     def classify(self, cells: Sequence[Cell]) -> list[str]:
         cases = {cell: self.case(cell) for cell in cells}
@@ -224,10 +227,10 @@ class Map:
         finally:
             for cell, case in cases.items():
                 if (row := self.study.rows.get(tuple(case.values()))) is not None:
-                    self.found[cell] = self.judged(row)
-        return [self.found[cell]["class"] for cell in cells]
+                    self.results[cell] = self.judged(row)
+        return [self.results[cell]["class"] for cell in cells]
 
-    def judged(self, row: Mapping[str, Any]) -> dict[str, Any]:
+    def judged(self, row: Row) -> Row:
         """Add class and reason to the row of a run."""
         folder = self.study.out.parent / row["folder"]
         record = record_of(folder)
@@ -274,7 +277,7 @@ class Map:
         """Make the table of all cells."""
         rows = []
         for cell, kind in sorted(self.classes.items()):
-            row = self.found.get(cell, {})
+            row = self.results.get(cell, {})
             cells = {"class": kind, "run": "yes" if row else "no", "reason": row.get("why")}
             cells |= {name: row.get(name) for name in ("growth", "dt", "stable_dt", "own_dt")}
             cells |= {"limit": row.get("limit"), "message": row.get("reason")}
@@ -286,11 +289,11 @@ class Map:
     def line(self, step: str) -> list[float | None]:
         """Return each row's x where the first step equals the column `step`, or None.
 
-        Beyond the runs, the ratio of the steps continues as a power of x. Rows of numbers with
-        fewer than two runs are interpolated.
+        Extrapolates the ratio of the steps as a power of x, and interpolates rows with too few
+        runs.
         """
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
-        for (i, j), row in sorted(self.found.items()):
+        for (i, j), row in sorted(self.results.items()):
             dt, same = row.get("dt"), row.get(step)
             if dt and same and isfinite(dt / same):
                 points[j].append((self.x[i], dt / same))
@@ -324,23 +327,23 @@ class Map:
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind not in BORNE), None)
-            row = self.found.get((edge - 1, j)) if edge and column[edge] not in UNTOLD else None
+            row = self.results.get((edge - 1, j)) if edge and column[edge] not in UNTOLD else None
             if row and row.get("dt") and row.get("stable_dt"):
                 ratios.append((row["dt"] / row["stable_dt"], int(row["steps"])))
         return ratios
 
     def tell(self) -> None:
-        count, run = Counter(self.classes.values()), len(self.found)
+        count, run = Counter(self.classes.values()), len(self.results)
         print(f"{run} of {len(self.classes)} cells were run (the others lie between like ones)")
         for kind in CLASSES:
             if count[kind]:
                 print(f"  {kind:<8} {plural(count[kind], 'cell')}")
         for reason, times in self.failures:
             print(f"    {reason}: {plural(times, 'run')}")
-        if unwatched := Counter(filter(None, (row["unwatched"] for row in self.found.values()))):
+        if unwatched := Counter(filter(None, (row["unwatched"] for row in self.results.values()))):
             (why, times), *_ = unwatched.most_common()
-            print(f"energy is {why} ({plural(times, 'run')}): stable are those that came to their")
-            print("end, whatever they gained on the way; -energy COLUMN judges by the log")
+            print(f"energy is {why} ({plural(times, 'run')}): runs that reached their end count as")
+            print("stable, whatever energy they gained; -energy COLUMN judges by the log")
         if count["short"]:
             print(f"runs of fewer than {FEWEST} steps do not show whether energy grows: run longer")
         margins = self.margins()
@@ -370,7 +373,7 @@ class Map:
         if self.error:
             self._shade(figure, axes)
         numbers = {reason: str(k) for k, (reason, _) in enumerate(self.failures, 1)}
-        for (i, j), row in self.found.items():
+        for (i, j), row in self.results.items():
             if row["class"] == "failed":
                 axes.text(x[i], y[j], numbers[row["why"]], ha="center", va="center",
                           fontsize=7, color="white")  # fmt: skip
@@ -384,7 +387,7 @@ class Map:
             Patch(facecolor="none", edgecolor="none", label=f"{k}  {reason}")
             for reason, k in numbers.items()
         ]  # fmt: skip
-        names = dict.fromkeys(row["limit"] for row in self.found.values() if row["limit"])
+        names = dict.fromkeys(row["limit"] for row in self.results.values() if row["limit"])
         limit = "the program's limit" + (f"\n({', '.join(names)})" if names else "")
         lines = ("stable_dt", limit, "k--"), ("own_dt", "the program's own", "k:")
         rows = list(pairwise(edges(y)))
@@ -413,23 +416,23 @@ class Map:
                 axis.set_ticks(at, words)
         savefig(figure, path)
 
-    def _shade(self, figure: Any, axes: Any) -> None:
+    def _shade(self, figure: "Figure", axes: "Axes") -> None:
         """Shade stable cells by errors, interpolated between runs."""
         from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
         stable = [cell for cell, kind in self.classes.items() if kind == "stable"]
-        known = {
-            cell: float(np.log(abs(row[self.error]))) for cell, row in self.found.items()
+        logs = {
+            cell: float(np.log(abs(row[self.error]))) for cell, row in self.results.items()
             if cell in stable and usable(abs(row[self.error] or 0.0))
         }  # fmt: skip
         grid = np.full(self.shape, nan)
         for i, j in stable:
-            near = {c: e for c, e in known.items() if c[1] == j or not self.words[-1]}
+            near = {c: e for c, e in logs.items() if c[1] == j or not self.words[-1]}
             if near:
                 far = np.array([(i - k) ** 2 + (j - m) ** 2 for k, m in near], float)
                 weight = np.where(far == 0, 1e9, 1 / np.maximum(far, 1))
                 grid[i, j] = np.exp(np.average([*near.values()], weights=weight))
-        if not known:
+        if not logs:
             return
         low, high = np.nanmin(grid), np.nanmax(grid)
         colours = LinearSegmentedColormap.from_list("", ["#eef6fb", "#3f8fc4"])
@@ -461,29 +464,26 @@ def explore(
     stride: int = 6,
     apart: Sequence[bool] = (False, False),
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """Find the class of every cell of a plane, most of them by inference.
+    """Return the classes of the cells that were run, and of the others, which are inferred.
 
-    Lines and columns about `stride` cells apart are run first. Cells in a row or a column between
-    two cells of one class are taken to be of that class, the nearest ones first; between unlike
-    ones the middle is run, in the longest gaps first. Where an edge goes along a row, one in three
-    of its cells is run, so that no bow of it is cut off. So edges are found to the cell; an island
-    between runs is missed. Along a direction of words (`apart`) nothing is inferred.
-
-    `classify` gets several cells at once. Returns the classes of those cells, and of the others.
+    Lines and columns about `stride` cells apart are run first. Cells between two of one class in a
+    row or column get that class, the nearest first; between unlike ones the middle is run, longest
+    gaps first. Along an edge, one in three cells is run, so that no bow is cut off. Islands between
+    runs are missed. Nothing is inferred along a direction of words (`apart`).
     """
     classes: list[Hashable] = []  # of the numbers in planes
-    known = np.full(shape, UNKNOWN)
+    plane = np.full(shape, UNKNOWN)
     first = [_cuts(n, 1 if words else stride) for n, words in zip(shape, apart, strict=True)]
     cells = [(i, j) for i in first[0] for j in first[1]]
     while cells:
         for cell, kind in zip(cells, classify(cells), strict=True):
             if kind not in classes:
                 classes.append(kind)
-            known[cell] = classes.index(kind)
-        filled = _filled(known, stride, apart)
+            plane[cell] = classes.index(kind)
+        filled = _filled(plane, stride, apart)
         halves = [*_halves(filled, apart)]
-        cells = _spaced(halves or ([] if any(apart) else [*_unproved(known, filled)]))
-    asked = {cell: classes[k] for cell, k in np.ndenumerate(known) if k != UNKNOWN}
+        cells = _spaced(halves or ([] if any(apart) else [*_unproved(plane, filled)]))
+    asked = {cell: classes[k] for cell, k in np.ndenumerate(plane) if k != UNKNOWN}
     return asked, {cell: classes[k] for cell, k in np.ndenumerate(filled) if cell not in asked}
 
 
@@ -502,9 +502,9 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
     return ((a, b) for a, b in pairwise(np.flatnonzero(line != UNKNOWN)) if b - a > 1)
 
 
-def _filled(known: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
+def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
     """Fill in cells between like ones unless row and column disagree."""
-    filled, reach = known.copy(), 2
+    filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
         rows, columns = _between(filled, along_y), _between(filled.T, along_x).T
@@ -534,21 +534,21 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
         yield from ((b - a, ((a + b) // 2, j)) for a, b in _gaps(line))
 
 
-def _unproved(known: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
+def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
     """Yield length and middle of stretches along an edge without a run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
-        for stretch in _stretches(known[i + k], plane[i], plane[i + 1], k):
+        for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])
     for j, k in np.ndindex(plane.shape[1] - 1, 2):
-        for stretch in _stretches(known[:, j + k], plane[:, j], plane[:, j + 1], k):
+        for stretch in _stretches(runs[:, j + k], plane[:, j], plane[:, j + 1], k):
             yield len(stretch), (stretch[len(stretch) // 2], j + k)
 
 
-def _stretches(known: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
+def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
     """Find stretches longer than 1 where two lines differ and one is unknown."""
     line = (near, far)[which]
     stretches: list[list[int]] = [[]]
-    for i in np.flatnonzero((near != far) & (known == UNKNOWN)):
+    for i in np.flatnonzero((near != far) & (runs == UNKNOWN)):
         last = stretches[-1]
         if last and (i > last[-1] + 1 or line[i] != line[last[-1]]):
             stretches.append([])

@@ -17,7 +17,7 @@ import numpy as np
 
 from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
-from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, folder_name, kind_of
+from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, Row, folder_name, kind_of
 from karamelo_py.app.studies.records import Recorded, recorded, row, write
 from karamelo_py.output.claims import Claim, claim
 from karamelo_py.output.console import duration
@@ -61,7 +61,7 @@ class Study:
     writes: bool = True  # write the table after each run
     page: StudyPage | None = None  # with --live
     # Rows of finished runs, by the values of the case.
-    rows: dict[tuple[str, ...], dict[str, Any]] = field(default_factory=dict)
+    rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
     claim: Claim | None = None  # of the folder
     ran: int = 0  # runs made by this study
     begun: float = field(default_factory=time.perf_counter)
@@ -98,10 +98,10 @@ class Study:
         if self.writes and self.rows:
             write(self.out, list(self.rows.values()))
 
-    def run(self, cases: Sequence[Mapping[str, str]]) -> list[dict[str, Any]]:
+    def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
         """Return the rows of cases, in order, after running unknown ones.
 
-        An interrupt ends runs in progress, stores finished ones, and says how to continue.
+        An interrupt ends runs in progress; finished ones are stored.
         """
         waiting = []
         for case in cases:
@@ -137,16 +137,16 @@ class Study:
 
         def ready() -> Any:
             """Choose a case; the first of a kind goes ahead, because it compiles."""
-            kinds = (((case, place), kind_of(case.values())) for case, place in queue)
+            kinds = (((case, folder), kind_of(case.values())) for case, folder in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
         try:
             while queue or running:
                 while len(running) < self.jobs and (item := ready()):
                     queue.remove(item)
-                    case, place = item
+                    case, folder = item
                     started.add(kind_of(case.values()))
-                    running[pool.submit(self.launch.run, case, place)] = case
+                    running[pool.submit(self.launch.run, case, folder)] = case
                     display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -195,7 +195,7 @@ class _Display:
         self.bar = Progress(*columns, transient=True, disable=not seen)
         self.task = self.bar.add_task(study.title)
 
-    def finish(self, case: Mapping[str, str], result: Mapping[str, Any]) -> None:
+    def finish(self, case: Mapping[str, str], result: Row) -> None:
         self.finished += 1
         numbers = [f"{i.word} {shown(result[i.word])}" for i in self.study.items]
         done, of = self.progress
@@ -243,9 +243,9 @@ def _said(case: Mapping[str, str]) -> str:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """Fit the time of a case: a product of powers of its numbers and factors of its words.
+    """Fit the time of a case by ridge regression of logarithms.
 
-    By ridge regression of logarithms.
+    A product of powers of its numbers and factors of its words.
     """
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
@@ -283,7 +283,7 @@ def shown(value: Any) -> str:
     return str(value)
 
 
-def ended(result: Mapping[str, Any]) -> str:
+def ended(result: Row) -> str:
     return result["status"] + (f": {result['reason']}" if result["reason"] else "")
 
 
@@ -299,11 +299,8 @@ def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None 
     return table
 
 
-def results_table(rows: Sequence[Mapping[str, Any]], study: Study, console: Console) -> Table:
-    """Make a table of runs that cuts no value.
-
-    If there is little room, facts are left out, and the last column wraps.
-    """
+def results_table(rows: Sequence[Row], study: Study, console: Console) -> Table:
+    """Make a table of runs; facts are left out before values are cut."""
     from rich.text import Text
 
     words, facts = [item.word for item in study.items], list(_FACTS)
@@ -332,11 +329,11 @@ def terminal() -> Console:
 
 def open_study(
     options: Namespace, plan: variables.StudyPlan, out: Path, items: Sequence[Recorded], *,
-    axes: Sequence[str] = (), facts: Mapping[str, Any], **settings: Any,
+    axes: Sequence[str] = (), facts: Row, **settings: Any,
 ) -> Study:  # fmt: skip
-    """Start a study: lock its folder, write `facts` of it, open its page.
+    """Start a study: lock its folder, write `facts` of it, open its page with `axes`.
 
-    `settings` are further fields of `Study`; `axes` label the chart on the page.
+    `settings` are further fields of `Study`.
     """
     names, again = list(plan.values), options.again
     study = Study(plan.launch, out, names, items, plan.jobs, again=again, **settings)
@@ -391,7 +388,7 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def tell(rows: Sequence[Mapping[str, Any]], study: Study) -> None:
+def tell(rows: Sequence[Row], study: Study) -> None:
     console = terminal()
     console.print(results_table(rows, study, console))
     done = sum(row["status"] == "done" for row in rows)

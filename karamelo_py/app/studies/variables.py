@@ -3,13 +3,14 @@
 import csv
 import os
 import re
+from argparse import ArgumentParser, Namespace
 from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
 from itertools import product
 from math import prod
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
@@ -20,7 +21,7 @@ from karamelo_py.script.errors import ScriptError, meant, plural, unknown
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text, read_script
-from karamelo_py.script.syntax import Assignment, CommandCall
+from karamelo_py.script.syntax import Assignment, CommandCall, FunctionCall, Node, Raw
 from karamelo_py.script.terms import number_of
 
 VALUES = "NAME=value,value,... or NAME=first:last:count"
@@ -53,7 +54,7 @@ def _spread(name: str, value: str) -> list[str]:
     parts = value.split(":")
     if len(parts) == 1:
         return [value]
-    ends = [number_of(part) for part in parts[:2]]
+    ends = [number_of(word) for word in parts[:2]]
     if len(parts) != 3 or None in ends or not parts[2].isdigit() or int(parts[2]) < 2:
         raise ScriptError(
             f"-var {name}={value}: this is not a range",
@@ -69,7 +70,7 @@ def cases(
 ) -> list[dict[str, str]]:
     """Combine the values of all variables, the first one changing slowest.
 
-    Variables `zipped` go in step. `where` are conditions in the script language.
+    Variables `zipped` go in step; `where` are conditions.
     """
     axes: list[list[dict[str, str]]] = []
     for group in zipped:
@@ -95,7 +96,7 @@ def cases(
     words = {value for column in values.values() for value in column}
     selected = []
     for parts in product(*axes):
-        combined = {name: value for part in parts for name, value in part.items()}
+        combined = {name: value for choice in parts for name, value in choice.items()}
         case = {name: combined[name] for name in values}
         if all(holds(condition, case, words) for condition in where):
             selected.append(case)
@@ -105,14 +106,14 @@ def cases(
 
 
 class NamesOfCase:
-    """Names in a formula: `known` values, and unquoted `words`."""
+    """Names in a formula: `values`, and unquoted `words`."""
 
-    def __init__(self, option: str, known: Mapping[str, Any], words: Iterable[str] = ()):
-        self.option, self.known, self.words = option, {**CONSTANTS, **known}, words
+    def __init__(self, option: str, values: Mapping[str, Any], words: Iterable[str] = ()):
+        self.option, self.values, self.words = option, {**CONSTANTS, **values}, words
 
-    def name(self, name: str, node: Any, raw: Any) -> Any:
-        if name in self.known:
-            value = self.known[name]
+    def name(self, name: str, node: Node, raw: Raw) -> Any:
+        if name in self.values:
+            value = self.values[name]
             plain = number_of(value) if isinstance(value, str) else value
             return value if plain is None else plain
         if name in self.words:
@@ -121,13 +122,13 @@ class NamesOfCase:
             f"{self.option}: unknown name '{name}'",
             expected="a variable of the study, or one of its values (in quotes where it has signs "
             'such as -): basis == "quadratic-spline"',
-            hint=meant(name, [*self.known, *self.words]),
+            hint=meant(name, [*self.values, *self.words]),
         )
 
     def hides(self, name: str) -> bool:
         return False
 
-    def command(self, node: Any, raw: Any) -> Any:
+    def command(self, node: FunctionCall, raw: Raw) -> NoReturn:
         raise ScriptError(f"{self.option}: unknown function '{node.name}'")
 
 
@@ -220,14 +221,15 @@ class ScriptFiles:
 
 def _published(family: str, style: str) -> tuple[str, ...]:
     with suppress(ScriptError):
-        return tuple(getattr(registry.find(family, style), "published", ()))
+        return tuple(registry.find(family, style).published)
     return ()
 
 
 # ---- options ------------------------------------------------------------------------------------
 
 
-def add_family(parser: Any) -> None:
+def add_family(parser: ArgumentParser) -> None:
+    parser.set_defaults(zip=[])
     parser.add_argument("script", type=Path, help="the script")
     parser.add_argument(
         *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
@@ -248,7 +250,7 @@ def add_family(parser: Any) -> None:
     )
 
 
-def add_axes(parser: Any) -> None:
+def add_axes(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-axes",
         metavar="X,Y",
@@ -257,7 +259,7 @@ def add_axes(parser: Any) -> None:
     )
 
 
-def along(options: Any, x: str, y: str) -> tuple[str, str]:
+def along(options: Namespace, x: str, y: str) -> tuple[str, str]:
     """Return the axis labels of the options, by default `x` and `y`."""
     words = split(options.axes or ",")
     if len(words) != 2:
@@ -274,14 +276,14 @@ def names(text: str) -> list[str]:
     return list(filter(None, split(text)))
 
 
-def add_steps(parser: Any) -> None:
+def add_steps(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-zip", action="append", default=[], metavar="A,B",
         help="variables that change together: their first values, then their second, ...",
     )  # fmt: skip
 
 
-def add_combinations(parser: Any) -> None:
+def add_combinations(parser: ArgumentParser) -> None:
     add_steps(parser)
     parser.add_argument(
         "-where", action="append", default=[], metavar="CONDITION",
@@ -289,9 +291,8 @@ def add_combinations(parser: Any) -> None:
     )  # fmt: skip
 
 
-def zipped(options: Any) -> list[list[str]]:
-    # Not every study of a family has it.
-    return [names(group) for group in getattr(options, "zip", [])]
+def zipped(options: Namespace) -> list[list[str]]:
+    return [names(group) for group in options.zip]
 
 
 class StudyPlan(NamedTuple):
@@ -303,7 +304,7 @@ class StudyPlan(NamedTuple):
     jobs: int  # runs at once
 
 
-def family(options: Any, *, timed: bool = False, repeat: int = 1) -> StudyPlan:
+def family(options: Namespace, *, timed: bool = False, repeat: int = 1) -> StudyPlan:
     """Read variables, script and settings from the options."""
     script, threads = ScriptFiles(options.script), options.threads or 1
     in_step = {name for group in zipped(options) for name in group}

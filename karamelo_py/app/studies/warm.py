@@ -1,8 +1,8 @@
 """Start runs as copies (forks) of warm processes, which have imported the program.
 
-A run leaves a copy of itself with the kernels of its kind, for later runs of that kind. Runs are
-child processes of the study. On Linux only, where the study can adopt orphans; otherwise, and if
-anything fails, a run starts a new interpreter.
+A run leaves a copy of itself, with its kernels, for later runs of its kind. Runs are children of
+the study. On Linux only, where it can adopt orphans; otherwise, or if anything fails, a run starts
+a new interpreter.
 """
 
 import ctypes
