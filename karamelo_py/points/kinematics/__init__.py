@@ -118,13 +118,13 @@ class Elements(tuple):
 
     __slots__ = ()
     __array_ufunc__ = None  # products with NumPy numbers are left to these classes
+    origin = None  # of a product: the function that adds it with one rounding, and its factors
 
     def __add__(self, other):
         if type(other) is Isotropic:
             return self.with_diagonal(other.p)
-        origin = getattr(other, "origin", None)
-        if origin is not None:
-            add, a, b = origin
+        if isinstance(other, Elements) and other.origin is not None:
+            add, a, b = other.origin
             return add(self, a, b)
         return self._make([a + b for a, b in zip(self, other, strict=True)])
 
