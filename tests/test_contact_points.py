@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from karamelo_py.kernels.pairs import TwoBodies, cells_for, push_apart
+from karamelo_py.kernels.pairs import Push, TwoBodies, cells_for, push_apart
 from karamelo_py.points.bodies import MinimizePenetration
 from karamelo_py.points.kinematics import KINEMATICS
 
@@ -65,15 +65,14 @@ def test_no_pair_is_missed(d, overlap):
         first2=n,
     )  # fmt: skip
     cells = cells_for(n + m)._replace(start=np.zeros(100, np.int64))
-    total = np.zeros(3)
     for reach in (spacing, 0.5 * spacing):
         bound.force[:] = 0
         law, kin = MinimizePenetration(0.0), KINEMATICS[d]()
-        found = push_apart(law, kin, bound, cells, reach, 0.1, 0.1, 0.1, total)
+        found = push_apart(Push(law, kin, reach, 0.1, 0.1, 0.1), bound, cells)
         f1, f2, count = by_hand(d, x1, x2, r1, r2, reach, 0.1)
         assert found == count > 0
         assert bound.force == pytest.approx(np.concatenate([f1, f2]), rel=1e-10, abs=1e-10)
-        assert total[:d] == pytest.approx(f1.sum(axis=0), rel=1e-10, abs=1e-10)
+        assert cells.total[:d] == pytest.approx(f1.sum(axis=0), rel=1e-10, abs=1e-10)
 
 
 # --- forces of single points ------------------------------------------------------------------

@@ -119,7 +119,7 @@ def test_fixes(monkeypatch, own_cache, method):
     hooks = one.hooks, one.fixes.lasting.functions
     forget()
     monkeypatch.setenv("KARAMELO_PY_CACHE", own_cache)
-    steps = StepsOnCard(Emulator(), one.setup, ((hub.update.scheme, type(one.visits))), hooks)
+    steps = StepsOnCard(Emulator(), one.setup, (hub.update.scheme, type(one.visits)), hooks)
     steps.send()
     assert steps.advance(43) == other.advance(43) == 0
     steps.fetch()
@@ -173,4 +173,4 @@ def test_code_is_kept(monkeypatch, own_cache):
             monkeypatch.setattr(Emulator, "_compiled", made_again)
         hub, one = begun(WATER)
         hooks = one.hooks, one.fixes.lasting.functions
-        StepsOnCard(Emulator(), one.setup, ((hub.update.scheme, type(one.visits))), hooks)
+        StepsOnCard(Emulator(), one.setup, (hub.update.scheme, type(one.visits)), hooks)

@@ -412,7 +412,6 @@ class OnProcessors(NamedTuple): ...
 @take.on(Brake, Processor)
 def _brake(row, s, step):
     sweep_nodes(step.mode, Halve(), s, kick(s))
-    return True
 
 
 @take.on(Brake, Card)

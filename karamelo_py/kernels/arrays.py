@@ -37,22 +37,19 @@ class Nodes(NamedTuple):
     fields: tuple  # declared fields, (N, components)
 
 
-# Components of the records; in 3D a vector takes four numbers, the width of a register.
+# First components in the records; in 3D a vector takes four numbers, the width of a register.
 MASS = 0  # of Nodes.sums
 
 
 def of_momentum(kin):
-    """Return the first component of momentum in `Nodes.sums`."""
     return 1
 
 
 def of_force(kin):
-    """Return the first component of force in `Nodes.sums`."""
     return 2 if kin.dimension == 1 else 4
 
 
 def of_change(kin):
-    """Return the first component of v* - v in `Nodes.update`; v* is first."""
     return 4 if kin.dimension == 3 else kin.dimension
 
 
@@ -166,6 +163,29 @@ class Block(NamedTuple):
     points: Points
     laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
     tiling: Tiling
+
+
+class OnGrids(NamedTuple):
+    """Points on grids."""
+
+    basis: Tag  # or () for what serves all bases
+    kin: Tag
+    grids: Grid
+    of: np.ndarray  # (n,) grid of each point
+    x: np.ndarray  # (w, n) places
+
+
+class Matter(NamedTuple):
+    """Points with their law."""
+
+    kin: Tag
+    points: Points
+    laws: NamedTuple  # as in `Block`
+
+
+def matter_of(kin: Tag, block: Block) -> Matter:
+    """Return the points of a block without optional fields (`known_to_laws`), and their law."""
+    return Matter(kin, known_to_laws(block.points), block.laws)
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:

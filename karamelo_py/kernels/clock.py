@@ -1,7 +1,7 @@
 """Step size, reports of sweeps, and the end of a step."""
 
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import at_hand, index, kernel, real
 from karamelo_py.compiler.fields import load_vector
@@ -9,7 +9,7 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIME, TIMESTEP, Control, Number, Setup, Tag
 from karamelo_py.kernels.totals import agree_on_reports
-from karamelo_py.points.grid import inside
+from karamelo_py.points.grid import Grid, inside
 from karamelo_py.points.kinematics import vector
 
 
@@ -19,11 +19,7 @@ def step_size(s: Setup) -> Number:
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the previous step, for the velocity at the start of this one.
-
-    Before the first step and after load steps, whose strain the state includes, it is next to 0 but
-    not 0: laws divide by it.
-    """
+    """Return dt of the previous step; next to 0 but not 0 (laws divide by it) if there is none."""
     last = s.control.clock[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
@@ -161,8 +157,25 @@ def all_well(s: Setup, take: Any = take_reports) -> bool:
     return clock.wrong == 0
 
 
-def checked_move(frame, kin, grids, points, now, stride, p):
+class MoveCheck(NamedTuple):
+    """Settings of the check of moves."""
+
+    frame: Tag
+    kin: Tag
+    grids: Grid
+    now: int
+    stride: float
+
+
+def move_check(s: Setup) -> MoveCheck:
+    """Return the settings of the present step."""
+    clock = s.control.clock[0]
+    return MoveCheck(s.frame, s.kin, s.grids, clock.now, clock.stride)
+
+
+def checked_move(check, points, p):
     """Return the move of point `p` in a step, in cells, and whether it is allowed."""
+    frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)
     step = (y - load_vector(kin, points.x[now], p)).largest()
@@ -171,15 +184,14 @@ def checked_move(frame, kin, grids, points, now, stride, p):
 
 
 @by_threads
-def _check_points(frame, kin, grids, points, tiling, now, stride, k):
-    """Report the largest move of the points of a part, and a failed one."""
-    grids, points, tiling = at_hand(grids), at_hand(points), at_hand(tiling)
+def _check_points(check, points, tiling, k):
+    check, points, tiling = at_hand(check), at_hand(points), at_hand(tiling)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
         furthest = 0.0
         wrong = 0
         for p in range(tiling.range[t, 0], tiling.range[t, 1]):
-            cells, good = checked_move(frame, kin, grids, points, now, stride, p)
+            cells, good = checked_move(check, points, p)
             furthest = max(furthest, cells)
             wrong = wrong if good else p + 1
         tiling.report[t, 0] = furthest
@@ -190,8 +202,7 @@ def check_moves(s: Setup, mode: Tag) -> bool:
     """Check the new positions again, after hooks that may have changed them."""
     clock = s.control.clock[0]
     for block in s.blocks:
-        of = block.points, block.tiling, clock.now, clock.stride
-        _check_points(mode, block.tiling.count[1], s.frame, s.kin, s.grids, *of)
+        _check_points(mode, block.tiling.count[1], move_check(s), block.points, block.tiling)
     read_reports(s)
     clock.move = max(clock.move, clock.new_move)
     return clock.wrong == 0

@@ -34,7 +34,16 @@ import numpy as np
 from karamelo_py.compiler import kernel, noinline
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, of_change, of_momentum, vector_at
+from karamelo_py.kernels.arrays import (
+    DT,
+    MASS,
+    TIMESTEP,
+    Nodes,
+    Tag,
+    of_change,
+    of_momentum,
+    vector_at,
+)  # fmt: skip
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.equations.mass_momentum import Centre, Normal
 from karamelo_py.kernels.table import Once, each_node
@@ -79,13 +88,22 @@ class SeparateFields(NamedTuple):
     change: np.ndarray  # (F, d) scratch: velocity change of each of them
 
 
+class Bodies(NamedTuple):
+    """Bodies in contact, and their nodes."""
+
+    contact: SeparateFields
+    kin: Tag
+    nodes: Nodes
+
+
 # --- two bodies at a position -----------------------------------------------------------------
 
 
 class Where(NamedTuple):
     """A position where fields meet, and the step."""
 
-    x: tuple  # position of the node
+    place: int  # number of its node in the first field
+    x: tuple  # (d,)
     h: float
     dt: float
     step: int  # its number, from 1
@@ -95,6 +113,16 @@ class Touched(NamedTuple):
     """Instead of `Where`: pairs of bodies with contact in a step."""
 
     step: int
+
+
+class Side(NamedTuple):
+    """A field that meets another."""
+
+    field: int
+    i: int  # index among those that meet
+    n: int  # its node
+    per_mass: float
+    x: tuple  # (d,) position
 
 
 class NodePair(NamedTuple):
@@ -132,13 +160,11 @@ def _led(contact, kin, n):
 
 @noinline
 def _place(contact, n, k):
-    """Return the index of a node along direction k."""
     return n % contact.stride // contact.beside[k, 0] % contact.beside[k, 1]
 
 
 @noinline
 def _kept(contact, n, k):
-    """Return 0 at an end of the grid: a body that ends there has no surface."""
     return 1.0 if 0 < _place(contact, n, k) < contact.beside[k, 1] - 1 else 0.0
 
 
@@ -154,19 +180,19 @@ def _beside(contact, kin, n, which):
 
 
 @noinline
-def _face(contact, kin, nodes, n):
+def _face(bodies, n):
     """Return the sum of m grad N of a node, which points out of the body."""
+    contact, kin, nodes = bodies
     gradient = vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
     return vector(kin, [_kept(contact, n, k) * of_axis for k, of_axis in enumerate(gradient)])
 
 
 def _cosine_above(a, b, least):
-    """Return True if the cosine of the angle between two vectors is above `least`."""
     return dot(a, b) > least * sqrt(dot(a, a) * dot(b, b))
 
 
 @noinline
-def _normal(contact, kin, nodes, n, other):
+def _normal(bodies, n, other):
     """Return the outward direction of a body, and the squared sine of its scatter angle.
 
     It is the mean of the sums of m grad N over the nodes around `n`. The sum of one node rotates by
@@ -180,11 +206,12 @@ def _normal(contact, kin, nodes, n, other):
     Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of the same
     density both are equal, and the block's direction is tilted by 15 degrees.)
     """
+    contact, kin, _ = bodies
     total, lengths = zero_vector(kin, 0.0), 0.0
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
         if inside:
-            part = contact.per_mass[n // contact.stride] * _face(contact, kin, nodes, beside)
+            part = contact.per_mass[n // contact.stride] * _face(bodies, beside)
             for k in range(kin.dimension):
                 part = (0.5 if which // 3**k % 3 == 1 else 0.25) * part
             if not _cosine_above(part, other, FACING):
@@ -200,15 +227,13 @@ def _normal(contact, kin, nodes, n, other):
 
 
 @noinline
-def _is_hollow(contact, kin, nodes, n, normal, other):
-    """Return True if, of the faces towards another body around a node, two face each other.
-
-    Then, along the surface, their normals rotate towards the connecting vector.
-    """
+def _is_hollow(bodies, n, normal, other):
+    """Return True if two of the faces towards another body around a node face each other."""
+    contact, kin, _ = bodies
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
-        face = _face(contact, kin, nodes, beside if inside else n)
+        face = _face(bodies, beside if inside else n)
         if inside and square > 0 and _cosine_above(face, -1.0 * other, FACING):
             way = vector(kin, [float(which // 3**k % 3 - 1) for k in range(kin.dimension)])
             turn += dot(face, way) - dot(face, normal) * dot(way, normal) / square
@@ -216,15 +241,13 @@ def _is_hollow(contact, kin, nodes, n, normal, other):
 
 
 @noinline
-def _entering(contact, kin, nodes, n, other, velocity, least):
-    """Return the largest part of a velocity, above `least`, that enters a face around a node.
-
-    Only faces towards the `other` body count.
-    """
+def _entering(bodies, n, other, velocity, least):
+    """Return the largest part of a velocity, above `least`, that enters a face towards `other`."""
+    contact, kin, _ = bodies
     most, part = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
-        face = _face(contact, kin, nodes, beside if inside else n)
+        face = _face(bodies, beside if inside else n)
         speed, square = -dot(face, velocity), dot(face, face)
         if inside and speed > most * sqrt(square) and _cosine_above(face, -1.0 * other, FACING):
             most = speed / sqrt(square)
@@ -239,61 +262,54 @@ def _across(direction, other):
 
 
 @noinline
-def _entering_corner(contact, kin, nodes, n, other, velocity):
+def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity to remove so that no face of a hollow corner is entered.
 
     The remainder slides along one face, then along the edge of two, or is 0. It is perpendicular
     to what is removed: one impulse along that direction removes all of it.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
-    first = _entering(contact, kin, nodes, n, other, velocity, least)
+    first = _entering(bodies, n, other, velocity, least)
     left = velocity - first
-    second = _across(_entering(contact, kin, nodes, n, other, left, least), first)
+    second = _across(_entering(bodies, n, other, left, least), first)
     left = _across(left, second)
-    third = _entering(contact, kin, nodes, n, other, left, least)
+    third = _entering(bodies, n, other, left, least)
     return velocity - _across(left, _across(_across(third, first), second))
 
 
 @noinline
-def _normal_of_led(contact, kin, nodes, n, other, velocity, known):
-    """Return normal, scatter, and whether the corner is hollow, of a led body at node `n`.
-
-    `other` is the normal of the free body, which has the `velocity` relative to it.
-    """
-    normal, scatter = _normal(contact, kin, nodes, n, other)
-    hollow = known and scatter >= EDGE and _is_hollow(contact, kin, nodes, n, normal, other)
+def _normal_of_led(bodies, n, other, velocity, known):
+    """Return normal, scatter, and whether the corner is hollow, of a led body at node `n`."""
+    normal, scatter = _normal(bodies, n, other)
+    hollow = known and scatter >= EDGE and _is_hollow(bodies, n, normal, other)
     if hollow:
-        into = _entering_corner(contact, kin, nodes, n, other, velocity)
+        into = _entering_corner(bodies, n, other, velocity)
         normal = -1.0 * into if dot(into, into) > 0 else normal
     return normal, scatter, hollow
 
 
 @noinline
-def _pair_of(contact, kin, nodes, records, n, m, known):
-    """Pair the bodies with nodes `n` and `m`; velocities are the first components of `records`.
-
-    Only `known` velocities limit which faces are entered.
-    """
+def _pair_of(bodies, records, n, m, known):
+    """Pair the bodies at nodes `n` and `m` with velocities `records`; `known` ones limit faces."""
+    contact, kin, nodes = bodies
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     like = zero_vector(kin, 0.0)
     relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
     led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
     hollow = False
     if led_n and not led_m:
-        of_m, scatter_m = _normal(contact, kin, nodes, m, like)
-        of_n, scatter_n, hollow = _normal_of_led(
-            contact, kin, nodes, n, of_m, -1.0 * relative, known
-        )
+        of_m, scatter_m = _normal(bodies, m, like)
+        of_n, scatter_n, hollow = _normal_of_led(bodies, n, of_m, -1.0 * relative, known)
         if hollow or scatter_n < EDGE:
             of_m = 0.0 * of_m
     elif led_m and not led_n:
-        of_n, scatter_n = _normal(contact, kin, nodes, n, like)
-        of_m, scatter_m, hollow = _normal_of_led(contact, kin, nodes, m, of_n, relative, known)
+        of_n, scatter_n = _normal(bodies, n, like)
+        of_m, scatter_m, hollow = _normal_of_led(bodies, m, of_n, relative, known)
         if hollow or scatter_m < EDGE:
             of_n = 0.0 * of_n
     else:
-        of_n, scatter_n = _normal(contact, kin, nodes, n, like)
-        of_m, scatter_m = _normal(contact, kin, nodes, m, like)
+        of_n, scatter_n = _normal(bodies, n, like)
+        of_m, scatter_m = _normal(bodies, m, like)
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
@@ -304,17 +320,14 @@ def _pair_of(contact, kin, nodes, records, n, m, known):
 
 
 def _left(pair, push):
-    """Return the relative velocity after the impulse `push` m grad N."""
     items = zip(pair.relative, pair.outward, pair.yielding, strict=True)
     return pair.relative._make([v - push * n * yielding for v, n, yielding in items])
 
 
 @noinline
-def _reach(contact, nodes, outward, n, where, side):
-    """Return the distance from node `n` to the surface of its body, along the outward normal.
-
-    `side` is 1 for the first body of the pair and -1 for the second.
-    """
+def _reach(bodies, outward, n, where, side):
+    """Return the distance from node `n` to its surface along the normal; `side` is 1 or -1."""
+    contact, _, nodes = bodies
     centre = field(nodes.fields, Centre)
     mean = 0.0
     for k, component in enumerate(outward):
@@ -327,19 +340,18 @@ def _reach(contact, nodes, outward, n, where, side):
 
 
 @noinline
-def _gap(contact, nodes, outward, n, m, where):
-    """Return the distance between two bodies along a direction from the first to the second."""
-    gap = -_reach(contact, nodes, outward, n, where, 1)
-    return gap - _reach(contact, nodes, outward, m, where, -1)
+def _gap(bodies, outward, pair, where):
+    gap = -_reach(bodies, outward, pair.n, where, 1)
+    return gap - _reach(bodies, outward, pair.m, where, -1)
 
 
-def _directions(contact, kin, nodes, pair):
+def _directions(bodies, pair):
     """Return further directions along which bodies may be apart; zeros for none.
 
-    Basis functions are products along the grid axes: there the gap does not depend on where faces
-    end. Where faces of both bodies end, the vector between the mean positions leads across the gap;
-    next to a plane face it does not.
+    Along the grid axes gaps do not depend on where faces end. Where faces of both bodies end, the
+    vector between the mean positions leads across the gap; next to a plane face it does not.
     """
+    _, kin, nodes = bodies
     centre, like = field(nodes.fields, Centre), zero_vector(kin, 0.0)
     between = pair.per_m * vector_at(kin, centre, pair.m, 0, like)
     between = between - pair.per_n * vector_at(kin, centre, pair.n, 0, like)
@@ -350,11 +362,12 @@ def _directions(contact, kin, nodes, pair):
 
 
 @noinline
-def _last_contact(contact, kin, nodes, pair, spreads):
+def _last_contact(bodies, pair, spreads):
     """Return the last step of contact between two bodies at their nodes, 0 for none.
 
     If it `spreads`, contact at the nodes that a moving rigid wall comes from counts as well.
     """
+    contact, kin, nodes = bodies
     other = pair.m // contact.stride
     last = abs(contact.touched[pair.n, other])
     led = pair.n if contact.rigid[pair.n // contact.stride] else pair.m
@@ -368,34 +381,29 @@ def _last_contact(contact, kin, nodes, pair, spreads):
 
 
 @noinline
-def _excess_of(contact, kin, nodes, pair, where):
-    """Return the excess of the approach velocity over the one that closes the gap in a step.
-
-    It is 0 for bodies that are apart along any other direction.
-    """
-    size = sqrt(dot(pair.outward, pair.outward))
+def _excess_of(bodies, pair, where):
+    """Return the approach velocity above what closes the gap in a step; 0 for bodies apart."""
+    contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
     approach = dot(pair.outward, pair.relative)
     if not approach > 0:
         return 0.0
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
-    last = _last_contact(contact, kin, nodes, pair, memory > 1)
-    # Where three bodies meet, a pair is looked at again in the step that has touched already.
+    last = _last_contact(bodies, pair, memory > 1)
+    # Where three bodies meet, a pair may already have touched in this step.
     lasts = pair.wall and last > 0 and last >= where.step - memory
     if lasts and memory > 1:
         return approach / size
-    for direction in _directions(contact, kin, nodes, pair):
+    for direction in _directions(bodies, pair):
         length = sqrt(dot(direction, direction))
         if length > 0:
-            gap = _gap(contact, nodes, direction, pair.n, pair.m, where)
+            gap = _gap(bodies, direction, pair, where)
             if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
                 return 0.0
-    last = abs(contact.touched[pair.n, pair.m // contact.stride])
-    # Where three bodies meet, a pair may already have touched in this step.
-    if pair.wall and last > 0 and last >= where.step - 1:
+    if lasts:
         return approach / size
-    gap = _gap(contact, nodes, pair.outward, pair.n, pair.m, where)
+    gap = _gap(bodies, pair.outward, pair, where)
     return approach / size - max(gap, 0.0) / where.dt
 
 
@@ -415,10 +423,7 @@ def _friction_of(pair, friction, push, slide, share):
 
 @noinline
 def _meet(contact, nodes, n):
-    """List the fields with mass at the position of node `n` in `meeting`; return their number.
-
-    It is 0 if an earlier field is among them: each position is visited once.
-    """
+    """List the fields that meet at a position in `meeting`; return their number, 0 if not first."""
     if not nodes.sums[n, MASS] > 0:
         return 0
     a = n // contact.stride
@@ -435,17 +440,13 @@ def _meet(contact, nodes, n):
 
 @noinline
 def _node(contact, place, i):
-    """Return the node of the `i`-th field that meets at a position."""
     return place + contact.meeting[i] * contact.stride
 
 
 @noinline
-def _count_partners(which, contact, kin, nodes, place, count):
-    """Count the pairs of each field; return whether there are any.
-
-    Pairs that approach faster than allowed, or that have `Touched`.
-    """
-    found = False
+def _count_partners(which, bodies, place, count):
+    """Count the approaching pairs, or those that have `Touched`, of each field."""
+    contact, found = bodies.contact, False
     contact.partners[:count] = 0
     for i in range(count):
         n = _node(contact, place, i)
@@ -454,8 +455,8 @@ def _count_partners(which, contact, kin, nodes, place, count):
                 belongs = abs(contact.touched[n, contact.meeting[j]]) == which.step
             else:
                 m = _node(contact, place, j)
-                pair = _pair_of(contact, kin, nodes, nodes.update, n, m, True)
-                belongs = _excess_of(contact, kin, nodes, pair, which) > 0
+                pair = _pair_of(bodies, bodies.nodes.update, n, m, True)
+                belongs = _excess_of(bodies, pair, which) > 0
             if belongs:
                 contact.partners[i] += 1
                 contact.partners[j] += 1
@@ -472,34 +473,35 @@ def _share(contact, i, j):
 
 
 @noinline
-def _take(contact, control, a, i, n, k, impulse, per_mass, x):
-    """Apply a component of an impulse to a node, or to the fix that prescribes its velocity."""
+def _take(contact, control, side, k, impulse):
+    field_, i, n, per_mass, x = side
     slot = contact.prescribed[n, k]
     if not _immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
     if not counts(control.ranks, n):
         return
     force = impulse / control.clock[0].kick
-    add_to(control.totals, contact.slot[a] + k, force)
+    add_to(control.totals, contact.slot[field_] + k, force)
     # Torque about the two other axes.
-    add_to(control.totals, contact.torque[a] + (k + 1) % 3, x[(k + 2) % 3] * force)
-    add_to(control.totals, contact.torque[a] + (k + 2) % 3, -x[(k + 1) % 3] * force)
+    add_to(control.totals, contact.torque[field_] + (k + 1) % 3, x[(k + 2) % 3] * force)
+    add_to(control.totals, contact.torque[field_] + (k + 2) % 3, -x[(k + 1) % 3] * force)
     if slot:
         add_to(control.totals, slot - 1 + k, -force)
 
 
 def _before(kin, nodes, n, per_mass):
-    """Return the velocity of a node at the beginning of the step."""
     return per_mass * vector_at(kin, nodes.sums, n, of_momentum(kin), zero_vector(kin, 0.0))
 
 
 @noinline
-def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
-    """Apply `share` of the impulse between the `i`-th and `j`-th of the fields that meet."""
+def _touch_pair(bodies, control, i, j, where):
+    """Apply the impulse between the `i`-th and `j`-th of the fields that meet, shared by pairs."""
+    contact, kin, nodes = bodies
+    share = _share(contact, i, j)
     a, b = contact.meeting[i], contact.meeting[j]
-    n, m = _node(contact, place, i), _node(contact, place, j)
-    pair = _pair_of(contact, kin, nodes, nodes.update, n, m, True)
-    excess = _excess_of(contact, kin, nodes, pair, where)
+    n, m = _node(contact, where.place, i), _node(contact, where.place, j)
+    pair = _pair_of(bodies, nodes.update, n, m, True)
+    excess = _excess_of(bodies, pair, where)
     if not excess > 0:
         return
     size = sqrt(dot(pair.outward, pair.outward))
@@ -526,12 +528,13 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
     work = -heat  # remaining work of rigid bodies
+    first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)
     for k in range(kin.dimension):
         impulse = push * pair.outward[k] / size
         if rub > 0:
             impulse += rub * slide[k]
-        _take(contact, control, a, i, n, k, -impulse, pair.per_n, where.x)
-        _take(contact, control, b, j, m, k, impulse, pair.per_m, where.x)
+        _take(contact, control, first, k, -impulse)
+        _take(contact, control, second, k, impulse)
         if contact.rigid[a] and not _immovable(contact, m, k):
             work += impulse * nodes.update[n, k]
         if contact.rigid[b] and not _immovable(contact, n, k):
@@ -544,37 +547,37 @@ def _touch_pair(contact, kin, nodes, control, i, j, place, share, where):
 
 
 @noinline
-def _touch_place(contact, kin, nodes, control, place, count, where):
+def _touch_place(bodies, control, count, where):
+    contact, kin, nodes = bodies
     contact.partners[:count] = 1  # a single pair checks its approach itself
     for _ in range(REPEATS if count > 2 else 1):
-        if count > 2 and not _count_partners(where, contact, kin, nodes, place, count):
+        if count > 2 and not _count_partners(where, bodies, where.place, count):
             return
         contact.change[:count] = 0.0
         for i in range(count):
             for j in range(i + 1, count):
-                share = _share(contact, i, j)
-                _touch_pair(contact, kin, nodes, control, i, j, place, share, where)
+                _touch_pair(bodies, control, i, j, where)
         for i in range(count):
-            n = _node(contact, place, i)
+            n = _node(contact, where.place, i)
             for k in range(kin.dimension):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
 
 
 @noinline
-def touch_node(contact, kin, grids, nodes, control, n):
+def touch_node(bodies, grids, control, n):
     """Resolve contact at the position of node `n`, if its field is the first there."""
-    count = _meet(contact, nodes, n)
+    contact = bodies.contact
+    count = _meet(contact, bodies.nodes, n)
     if count > 1:
         grid = record(grids, n // contact.stride)
         step = int(control.values[TIMESTEP]) + 1
-        where = Where(node_position(grid, n), grid.h, control.values[DT], step)
-        _touch_place(contact, kin, nodes, control, n % contact.stride, count, where)
+        place, x = n % contact.stride, node_position(grid, n)
+        _touch_place(bodies, control, count, Where(place, x, grid.h, control.values[DT], step))
 
 
 @noinline
 def _keep_rigid(contact, kin, nodes, n):
-    """Restore the velocity of rigid bodies."""
     if contact.rigid[n // contact.stride] and nodes.sums[n, MASS] > 0:
         for k in range(kin.dimension):
             v = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
@@ -602,57 +605,64 @@ def _publish_forces(s):
             control.values[contact.copies[c, 1] + k] = control.values[contact.copies[c, 0] + k]
 
 
+def _bodies(s):
+    return Bodies(s.contact, s.kin, s.nodes)
+
+
 # Contact acts on v* and the velocity change of this step.
 SeparateFields.rows = (  # type: ignore[attr-defined]
     Once(_begin_forces),
     each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
-    each_node(lambda s, n: touch_node(s.contact, s.kin, s.grids, s.nodes, s.control, n)),
+    each_node(lambda s, n: touch_node(_bodies(s), s.grids, s.control, n)),
     Once(_publish_forces),
 )
 
 
-@kernel
-def list_pairs(contact, kin, grids, nodes, spans, pairs, normals, gaps):
-    """List the pairs of nodes where two fields meet; return their number.
+class ListedPairs(NamedTuple):
+    """Pairs of nodes where two fields meet."""
 
-    `pairs` (n, 2) gets the nodes, `normals` (n, d) unit normals from the first to the second body,
-    `gaps` the remaining distances.
-    """
-    found = 0
+    nodes: np.ndarray  # (n, 2)
+    normals: np.ndarray  # (n, d) unit normals from the first to the second body
+    gaps: np.ndarray  # (n,) remaining distances
+
+
+@kernel
+def list_pairs(bodies, grids, spans, pairs):
+    """List the pairs of nodes where two fields meet in `pairs`; return their number."""
+    contact, kin, nodes = bodies
+    count = 0
     for s in range(1, 1 + spans[0, 0]):
         for first in range(spans[s, 0], spans[s, 1]):
-            count = _meet(contact, nodes, first)
+            meeting = _meet(contact, nodes, first)
             place = first % contact.stride
             grid = record(grids, first // contact.stride)
-            where = Where(node_position(grid, first), grid.h, 1.0, 0)
-            for i in range(count if count > 1 else 0):
-                for j in range(i + 1, count):
+            where = Where(place, node_position(grid, first), grid.h, 1.0, 0)
+            for i in range(meeting if meeting > 1 else 0):
+                for j in range(i + 1, meeting):
                     n, m = _node(contact, place, i), _node(contact, place, j)
-                    pair = _pair_of(contact, kin, nodes, nodes.update, n, m, False)
+                    pair = _pair_of(bodies, nodes.update, n, m, False)
                     size = sqrt(dot(pair.outward, pair.outward))
                     if size > 0:
-                        pairs[found, 0], pairs[found, 1] = n, m
+                        pairs.nodes[count, 0], pairs.nodes[count, 1] = n, m
                         for k in range(kin.dimension):
-                            normals[found, k] = pair.outward[k] / size
-                        gap = _gap(contact, nodes, pair.outward, n, m, where)
-                        for direction in _directions(contact, kin, nodes, pair):
+                            pairs.normals[count, k] = pair.outward[k] / size
+                        gap = _gap(bodies, pair.outward, pair, where)
+                        for direction in _directions(bodies, pair):
                             if dot(direction, direction) > 0:
-                                gap = max(gap, _gap(contact, nodes, direction, n, m, where))
-                        gaps[found] = gap
-                        found += 1
-    return found
+                                gap = max(gap, _gap(bodies, direction, pair, where))
+                        pairs.gaps[count] = gap
+                        count += 1
+    return count
 
 
 # --- the velocity that deforms ----------------------------------------------------------------
 
 
 @noinline
-def _stay_pair(contact, kin, nodes, i, j, pair, share, sticks):
-    """Remove `share` of the relative velocity across the surface, or of all if the pair sticks.
-
-    In a hollow corner, of all components that v* does not leave free: along one face, or none.
-    """
-    taken = pair.relative
+def _stay_pair(bodies, i, j, pair, sticks):
+    """Remove the pair's part of the velocity across the surface, or all that v* lacks."""
+    contact, kin, nodes = bodies
+    share, taken = _share(contact, i, j), pair.relative
     if pair.hollow:
         like = zero_vector(kin, 0.0)
         free = vector_at(kin, nodes.update, pair.n, 0, like)
@@ -674,8 +684,9 @@ def _stay_pair(contact, kin, nodes, i, j, pair, share, sticks):
 
 
 @noinline
-def _stay_place(contact, kin, nodes, place, count, step):
-    if not _count_partners(Touched(step), contact, kin, nodes, place, count):
+def _stay_place(bodies, place, count, step):
+    contact, kin, nodes = bodies
+    if not _count_partners(Touched(step), bodies, place, count):
         return
     for _ in range(REPEATS if count > 2 else 1):
         contact.change[:count] = 0.0
@@ -684,10 +695,8 @@ def _stay_place(contact, kin, nodes, place, count, step):
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    m = _node(contact, place, j)
-                    pair = _pair_of(contact, kin, nodes, nodes.velocity, n, m, True)
-                    share, sticks = _share(contact, i, j), touched < 0
-                    _stay_pair(contact, kin, nodes, i, j, pair, share, sticks)
+                    pair = _pair_of(bodies, nodes.velocity, n, _node(contact, place, j), True)
+                    _stay_pair(bodies, i, j, pair, touched < 0)
         for i in range(count):
             n = _node(contact, place, i)
             for k in range(kin.dimension):
@@ -695,11 +704,11 @@ def _stay_place(contact, kin, nodes, place, count, step):
 
 
 @noinline
-def stay_node(contact, kin, nodes, step, n):
+def stay_node(bodies, step, n):
     """Apply `_stay` at the position of node `n`, if contact acted there in `step`."""
-    count = _meet(contact, nodes, n)
+    count = _meet(bodies.contact, bodies.nodes, n)
     if count > 1:
-        _stay_place(contact, kin, nodes, n % contact.stride, count, step)
+        _stay_place(bodies, n % bodies.contact.stride, count, step)
 
 
 def _stay(steps):
@@ -714,7 +723,7 @@ def _stay(steps):
     def stay(s, n):
         step = int(s.control.values[TIMESTEP]) + steps
         if step > 0:  # contact is possible from the first step
-            stay_node(s.contact, s.kin, s.nodes, step, n)
+            stay_node(_bodies(s), step, n)
 
     return (each_node(stay),)
 

@@ -16,9 +16,9 @@ EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy 
 
 
 @kernel
-def export_state(kin, points, laws, out):
+def export_state(matter, out):
     """Fill ``out`` (n, EXPORTED)."""
-    points, laws = at_hand(points), at_hand(laws)
+    kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         put_at(out, p, 0, law_functions.cauchy_stress(law, kin, state))
@@ -29,12 +29,9 @@ def export_state(kin, points, laws, out):
 
 
 @kernel
-def export(what, times_volume, kin, points, laws, out):
-    """Fill ``out`` (n,) with a column of `columns_of`.
-
-    ``times_volume`` multiplies by reference volume: energies from densities.
-    """
-    points, laws = at_hand(points), at_hand(laws)
+def export(what, times_volume, matter, out):
+    """Fill ``out`` (n,) with a column, times reference volume if ``times_volume``."""
+    kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         number = law_functions.shown(what, law, kin, state)
@@ -44,9 +41,9 @@ def export(what, times_volume, kin, points, laws, out):
 
 
 @kernel
-def impose_stress(kin, points, laws, chosen, given, stress):
+def impose_stress(matter, chosen, given, stress):
     """Set components ``given`` (6,) of the Cauchy stress of chosen points to ``stress`` (n, 6)."""
-    points, laws = at_hand(points), at_hand(laws)
+    kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         if not chosen[p]:
             continue
@@ -69,13 +66,13 @@ def impose_temperature(kin, points, laws, rows, temperature):
 
 
 @kernel
-def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
+def export_to_nodes(at, values, unit, out):
     """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
 
     The first column takes whole units, the second remainders in units 2^36 times smaller: both are
     exact for up to 2^17 points at a node, in any order.
     """
-    grids = at_hand(grids)
+    basis, kin, grids, grid_of, where = at_hand(at)
     whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit
     for p in range(values.size):
         grid = record(grids, index(grid_of[p]))
@@ -89,12 +86,9 @@ def export_to_nodes(basis, kin, grids, grid_of, where, values, unit, out):
 
 
 @kernel
-def export_velocity_moment(basis, kin, grids, grid_of, where, gradients, out):
-    """Fill ``out`` (d d, n) with moments sum N v (X - x) of velocities with these gradients.
-
-    ``where`` (w, n) are places for the weights, on grids ``grid_of`` (n,).
-    """
-    grids = at_hand(grids)
+def export_velocity_moment(at, gradients, out):
+    """Fill ``out`` (d d, n) with moments sum N v (X - x) of velocities with these gradients."""
+    basis, kin, grids, grid_of, where = at_hand(at)
     flat = planar(kin)
     for p in range(out.shape[1]):
         grid = record(grids, index(grid_of[p]))

@@ -137,14 +137,13 @@ class Stage:
         self._point_functions()
 
     def _point_functions(self) -> None:
-        """Make the functions of a point: gather and update, load, count."""
         row, at, lists, corners, count = self.row, self.at, self.lists, self.corners, self.support
         tasks, quantities, keeps = row.visit.tasks, row.visit.quantities, self.scatters
 
         def context(s):
             whole = last_step_size(s) if row.of_last_step else step_size(s)
             dt = whole if row.share == 1 else real(row.share, whole) * whole
-            return sweep.context_of(at(s), dt, row.gathers, row.scatters, row.moves)
+            return sweep.context_of(at(s), sweep.Extent(dt, row.gathers, row.scatters, row.moves))
 
         def point(s, block, p):
             c, points = context(s), block.points
@@ -310,7 +309,6 @@ def _grid_of(grids, n):
 
 
 def _steps_to(s, grid, k):
-    """Return the distance in node numbers from the first node of a cell to its k-th."""
     return node_number(grid, 0, digits(k, s.basis.line_nodes, s.kin.dimension))
 
 

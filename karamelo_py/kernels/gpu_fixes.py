@@ -16,7 +16,7 @@ from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.kernels import arrays, hook_loop, totals, watch
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
-from karamelo_py.kernels.clock import checked_move, kick, step_size
+from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
@@ -32,8 +32,6 @@ def _hooks_with_room(hooks):
 
 
 def _control(count: int) -> Callable:
-    """Make the control of a thread; `count` private values, or 0."""
-
     def own_values(values):
         room = room_for(count, (0.0,))[0]
         for k in range(count):
@@ -152,8 +150,8 @@ def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
 
 def check_point(i, fate, s, block):
     """Check the new position of a point again."""
-    points, clock = block.points, s.control.clock[0]
-    cells, good = checked_move(s.frame, s.kin, s.grids, points, clock.now, clock.stride, i)
+    points = block.points
+    cells, good = checked_move(move_check(s), points, i)
     if good:
         raise_to(fate, MOVED, cells)
     else:
@@ -171,7 +169,6 @@ def take_moves(i, fate, s):
 
 
 def _setup(s: arrays.Setup) -> Callable:
-    """Make the setup of a thread, with private copies of scratch."""
     fields, d = len(s.contact.slot) if isinstance(s.contact, SeparateFields) else 0, s.kin.dimension
 
     def contact_of(s):

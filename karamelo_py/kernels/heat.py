@@ -96,13 +96,11 @@ class AtHeatedPoints(NamedTuple):
 @take.on(AtHeatNodes, Processor)
 def _at_heat_nodes(row, s, step):
     at_heat_nodes(step.hooks, row.stage, row.target, s)
-    return True
 
 
 @take.on(AtHeatedPoints, Processor)
 def _at_heated_points(row, s, step):
     at_heated_points(step.hooks, s)
-    return True
 
 
 # One loop gathers and scatters.

@@ -137,7 +137,6 @@ def act(what, task, call, count):
 
 @noinline
 def _act_on_part(what, task, call, k, parts):
-    """Do `task` with the members in the part of thread `k`; return how many count."""
     found = 0
     call.hooks.scratch[:6] = 0.0
     first, last, step = _turns(what, k, parts)
@@ -207,10 +206,7 @@ def directions(hooks):
 
 @noinline
 def evaluate(call, component, count, result, shift):
-    """Evaluate the formula of a component for the chosen members, at the present time plus `shift`.
-
-    Results go to row `result` of the scratch. A formula without code is a number.
-    """
+    """Evaluate the formula of a component at the present time plus `shift` into row `result`."""
     hooks, control = call.hooks, call.control
     program = hooks.programs[call.h, component]
     if program.begin == program.end:
@@ -229,7 +225,6 @@ def evaluate(call, component, count, result, shift):
 
 @noinline
 def _evaluate_now_and_before(call, c, count):
-    """Evaluate the formula of direction `c`, and one step earlier if used."""
     evaluate(call, c, count, VALUE, 0.0)
     if call.hooks.table[call.h].uses_before:
         # There is nothing before time 0.
@@ -271,10 +266,7 @@ def publish_total(hooks, h, control):
 
 
 def _choose_nodes(what, call, row, end, member):
-    """Choose up to a block of members in use, with mass; return their number and where to continue.
-
-    Members ascend like rows; a wall may have more members than are in use.
-    """
+    """Choose up to a block of members in use, with mass; return number, and where to continue."""
     hooks, h, ranges, sums = call.hooks, call.h, what.ranges, what.nodes.sums
     of_all = what.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -371,13 +363,11 @@ def _moves_as_told(hooks, n):
 
 
 def _is_taken(rigid, n):
-    """Return True if rigid points set the velocity of a node."""
     return rigid is not None and rigid[n, arrays.MASS] > 0
 
 
 @noinline
 def _change_nodes(what, call, count):
-    """Act on the chosen nodes; add to totals and work."""
     hooks, control, slot = call.hooks, call.control, call.hooks.table[call.h].slot
     for c in range(directions(hooks)):
         if hooks.programs[call.h, c].begin < 0:
@@ -518,7 +508,7 @@ def _act_on_whole_nodes(what, task, call, count):
         values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
         force = tuple([nodes.sums[n, first + c] for c in range(kin.dimension)])
         star = tuple([nodes.update[n, c] for c in range(kin.dimension)])
-        found = kinds.results(tag, what, kin, kin, n, values, dt)
+        found = kinds.results(tag, what, kinds.Member(n, kin, kin, values, dt))
         numbers = kinds.written(tag, what, n, found)
         own = totals.counts(control.ranks, n)
         for c in range(kin.dimension):
@@ -555,10 +545,7 @@ def whole_nodes(s, tag, stage, target):
 
 
 def node_hooks(stage, what, hooks, s, dt):
-    """Call the node functions of `stage` on members with mass.
-
-    `what` is of `hooked_nodes`; for `LOADS` the work is summed: the loop is compiled once.
-    """
+    """Call the node functions of `stage` on `what` of `hooked_nodes`; of `LOADS`, sum the work."""
     own = [tag for tag in hooks.whole if tag.of_nodes]
     whole = tuple([whole_nodes(s, tag, stage, what.target) for tag in own])
     _node_hooks(stage, what, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))
@@ -739,7 +726,7 @@ def _act_on_whole_points(what, task, call, count):
         if not tag.of_time:
             values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
         old = load_vector(kin, points.v, p)
-        found = kinds.results(tag, what, law, state, p, values, dt)
+        found = kinds.results(tag, what, kinds.Member(p, law, state, values, dt))
         numbers = kinds.written(tag, what, p, found)
         new = load_vector(kin, points.v, p)
         work = 0.5 * float(points.mass[p]) * dot(new - old, new + old)
@@ -799,7 +786,6 @@ def point_hooks(stage, then, hooks, s, arguments_of):
 
 
 def _positions(s, points, then):
-    """Return the positions before a step, and after it if `then`."""
     now = s.control.clock[0].now
     return points.x[now], points.x[1 - now if then else now]
 

@@ -37,6 +37,7 @@ from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import field, load_vector, store, vector
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.arrays import Index, Tag
 from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import volume_of
 
@@ -125,9 +126,19 @@ def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False
     return CompiledHook(function, "heated points", publishes, False, False, holds)
 
 
+class Member(NamedTuple):
+    """A point, or a node, that a function of whole members acts on."""
+
+    p: Index
+    law: Tag
+    state: tuple
+    values: tuple  # of formulas
+    dt: float
+
+
 @point_function()
-def results(tag, what, law, state, p, values, dt):
-    """Return the results of a function of whole points for point `p`: a tuple."""
+def results(tag, what, one):
+    """Return the results of a function of whole points for a `Member`: a tuple."""
 
 
 @point_function()
@@ -170,7 +181,6 @@ NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "vel
 
 
 def _field_reader(item: Any, number: Callable) -> Callable:
-    """Return the reader of a declared field, whose numbers are ``number(what, k, n)``."""
     shape = item.shape
     as_vector = shape is vector
 
@@ -250,9 +260,9 @@ def vector_hook(
     made.of_nodes, made.of_time = nodes, False  # type: ignore[attr-defined]
     alone = len(writes) + publishes == 1
 
-    def results_of(tag, what, law, state, p, values, dt):
-        given = [read(what, law, state, p) for read in readers]
-        found = function(*given, values, dt)
+    def results_of(tag, what, one):
+        items = [read(what, one.law, one.state, one.p) for read in readers]
+        found = function(*items, one.values, one.dt)
         return (found,) if alone else found
 
     def written_of(tag, what, p, found):

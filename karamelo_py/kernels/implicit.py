@@ -19,7 +19,6 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.sweep import places_of
 from karamelo_py.kernels.views import deformation_of, place_at, state_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.cpdi import AtCorners
@@ -61,6 +60,22 @@ class Pairs(NamedTuple):
     first: np.ndarray  # (m + 1,) int64: begin of the pairs of a node
 
 
+class Blocks(NamedTuple):
+    """Pairs of nodes, and the numbers of each."""
+
+    pairs: Pairs
+    values: np.ndarray
+
+
+class Tangent(NamedTuple):
+    """Derivatives of the stress of points from `first` to `end`."""
+
+    first: int
+    end: int
+    values: np.ndarray  # (t t, c) V0 dP/dH, a row of P after another
+    done: np.ndarray  # (m,) int64: entries of each node so far, see `add_stiffness`
+
+
 class Response(NamedTuple):
     """Stress of points after trial displacements; t components of a tensor."""
 
@@ -74,13 +89,9 @@ def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
     count, width = support(s.basis, s.kin), len(s.kin.Gradient._fields)
     none = np.zeros(0, np.int64)
     seen = Seen(
-        np.zeros(n, np.int32),
-        np.zeros((n, count), np.int64),
-        np.zeros((n, count)),
-        np.zeros((n, count, width)),
-        none,
-        none,
-    )
+        np.zeros(n, np.int32), np.zeros((n, count), np.int64), np.zeros((n, count)),
+        np.zeros((n, count, width)), none, none,
+    )  # fmt: skip
     rows = (rows_of_points((t, n), np.float64) for _ in range(2))
     return seen, Response(*rows, np.zeros(PARTS))
 
@@ -92,12 +103,12 @@ def points_of(count, k):
 
 
 @by_threads
-def see(frame, kin, basis, grids, points, laws, now, seen, part):
+def see(frame, at, matter, seen, part):
     """Find the nodes that points see, with weights and gradients at the present positions."""
-    points, laws, seen = at_hand(points), at_hand(laws), at_hand(seen)
-    where = places_of(frame, points, now, 1 - now).where
+    (basis, _, grids, of, where), seen = at_hand(at), at_hand(seen)
+    kin, points, laws = at_hand(matter)
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
-        grid = record(grids, points.grid[p])
+        grid = record(grids, of[p])
         stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
         count = 0
         for k in range(support(basis, kin)):
@@ -153,8 +164,9 @@ def strain(kin, seen, u, response, part):
     response.furthest[part] = most
 
 
-def strained_point(kin, points, laws, response, p):
+def strained_point(matter, response, p):
     """Load law and state of a point before the step, H, and its reference volume."""
+    kin, points, laws = matter
     law, state = state_at(kin, points, laws, p)
     mass = points.mass[p]
     H = load(response.increment, p, zero(kin, mass))
@@ -178,36 +190,37 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 @by_threads
-def respond(kin, points, laws, dt, response, part):
+def respond(matter, dt, response, part):
     """Find the stress of each point after its increment."""
-    points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
+    matter, response = at_hand(matter), at_hand(response)
+    kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
     end = points_of(points.mass.size, part + 1)
     for q in range(points_of(points.mass.size, part), end, lanes.width):
         p = points_from(lanes, q, end)
-        law, state, H, volume = strained_point(kin, points, laws, response, p)
+        law, state, H, volume = strained_point(matter, response, p)
         store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt))
 
 
 @by_threads
-def respond_to_changes(kin, points, laws, dt, response, first, end, tangent, part):
-    """Find V0 dP/dH (t t, c) of c points from `first` on, a row of P after another."""
-    points, laws, response = at_hand(points), at_hand(laws), at_hand(response)
+def respond_to_changes(matter, dt, response, tangent, part):
+    """Find the derivatives of the stress of some points."""
+    matter, response = at_hand(matter), at_hand(response)
+    kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
-    count = end - first
+    first, count = tangent.first, tangent.end - tangent.first
     last = points_of(count, part + 1)
     for q in range(points_of(count, part), last, lanes.width):
         p = points_from(lanes, first + q, first + last)
-        law, state, H, volume = strained_point(kin, points, laws, response, p)
+        law, state, H, volume = strained_point(matter, response, p)
         _, slopes = stress_and_tangent(law, kin, state, H, dt)
         own = points_from(lanes, q, last)
-        store(tangent, own, tuple([volume * s for row in slopes for s in row]))
+        store(tangent.values, own, tuple([volume * s for row in slopes for s in row]))
 
 
 @kernel
-def keep_stress(kin, points, laws, stress):
-    """Store V0 P of the present state, before positions change."""
-    points, laws = at_hand(points), at_hand(laws)
+def keep_stress(matter, stress):
+    kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         tau = kirchhoff_stress(law, kin, state)
@@ -312,19 +325,17 @@ def by_displacement(kin, D, g):
 
 
 @by_threads
-def add_stiffness(kin, seen, tangent, first, end, done, pairs, K, part):
-    """Add derivatives of the forces of points from `first` to `end` to blocks K (b, d d).
-
-    `done` (m,) counts the entries of each node so far.
-    """
-    seen, pairs = at_hand(seen), at_hand(pairs)
+def add_stiffness(kin, seen, tangent, blocks, part):
+    """Add derivatives of the forces of points to blocks K (b, d d)."""
+    seen, (pairs, K) = at_hand(seen), at_hand(blocks)
+    first, end, values, done = tangent
     t = kin.tensor_size
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
         e = seen.starts[a] + done[a]
         while e < seen.starts[a + 1] and seen.entries[e] < end * width:
             p, k = seen.entries[e] // width, seen.entries[e] % width
-            C = tuple([tangent[c, p - first] for c in range(t * t)])
+            C = tuple([values[c, p - first] for c in range(t * t)])
             D = by_gradient(kin, gradient_at(kin, seen, p, k), C)
             for other in range(seen.count[p]):
                 code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]

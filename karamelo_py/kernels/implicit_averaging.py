@@ -61,20 +61,21 @@ def cofactors(A):
 
 
 @by_threads
-def grow(kin, points, laws, response, averages, part):
+def grow(matter, response, averages, part):
     """Find the volume of each point before and after its increment, and its derivatives."""
-    points, laws = at_hand(points), at_hand(laws)
-    response, averages = at_hand(response), at_hand(averages)
+    matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
+    kin, points, _ = matter
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
-        law, state, H, volume = strained_point(kin, points, laws, response, p)
+        law, state, H, volume = strained_point(matter, response, p)
         A, volume = I + H, volume * jacobian(law, kin, state)
         averages.volume[0, p] = volume
         averages.grown[0, p] = volume * det(A)
         store(averages.cofactors, p, volume * cofactors(A))
 
 
-def averaged_stress(law, kin, state, H, ratio, dt):
+def averaged_stress(law, kin, state, change, dt):
     """Return P and q per reference volume, after an increment H with averaged volume ratio."""
+    H, ratio = change
     A = I + H
     dl = scaled_increment(Updated(), kin, H, (), ratio / det(A))
     tau = kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
@@ -87,19 +88,19 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 @by_threads
-def respond_averaged(kin, points, laws, dt, response, averages, part):
+def respond_averaged(matter, dt, response, averages, part):
     """Find P and q of each point, and their derivatives."""
-    points, laws = at_hand(points), at_hand(laws)
-    response, averages = at_hand(response), at_hand(averages)
+    matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
+    kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
     end = points_of(points.mass.size, part + 1)
     t = kin.tensor_size
     for q in range(points_of(points.mass.size, part), end, lanes.width):
         p = points_from(lanes, q, end)
-        law, state, H, volume = strained_point(kin, points, laws, response, p)
+        law, state, H, volume = strained_point(matter, response, p)
         (ratio,) = load(averages.ratio, p, (volume,))
         *by_H, by_ratio = seeded((*H, ratio))
-        P, pressure = averaged_stress(law, kin, state, tensor(kin, by_H), by_ratio, dt)
+        P, pressure = averaged_stress(law, kin, state, (tensor(kin, by_H), by_ratio), dt)
         slopes = [slopes_of(x, t + 1) for x in P]
         store(response.stress, p, volume * value_of(P))
         store(averages.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))
@@ -111,9 +112,9 @@ def respond_averaged(kin, points, laws, dt, response, averages, part):
 
 
 @kernel
-def keep_averaged_stress(kin, points, laws, response, averages):
+def keep_averaged_stress(matter, response, averages):
     """Store P and q of the present state, before positions change."""
-    points, laws = at_hand(points), at_hand(laws)
+    kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         tau = kirchhoff_stress(law, kin, state)
@@ -166,9 +167,9 @@ def average(seen, nodes, values, part):
 
 
 @by_threads
-def add_slopes(kin, seen, tensors, pairs, out, part):
+def add_slopes(kin, seen, tensors, blocks, part):
     """Add N_a T grad N_b of tensors T (t, n) of points to pairs of nodes, d numbers each."""
-    seen, pairs = at_hand(seen), at_hand(pairs)
+    seen, (pairs, out) = at_hand(seen), at_hand(blocks)
     d = kin.dimension
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -185,9 +186,9 @@ def add_slopes(kin, seen, tensors, pairs, out, part):
 
 
 @by_threads
-def add_products(seen, values, pairs, out, part):
+def add_products(seen, values, blocks, part):
     """Add N_a N_b times values (1, n) of points to pairs of nodes."""
-    seen, pairs = at_hand(seen), at_hand(pairs)
+    seen, (pairs, out) = at_hand(seen), at_hand(blocks)
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):

@@ -17,10 +17,7 @@ class OneByOne(NamedTuple):
 
 
 def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose `OneByOne`, `FourLanes` or `EightLanes` for a loop over points with these parts.
-
-    One by one if interpreted, or if a part or law does not work in lanes.
-    """
+    """Choose lanes for a loop over points; one by one if interpreted, or if a part has no lanes."""
     return OneByOne()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.kernels.arrays import vector_at
+from karamelo_py.kernels.arrays import Tag, vector_at
 from karamelo_py.kernels.views import state_at, volume_of
 from karamelo_py.points.bodies import (
     NEW,
@@ -38,6 +38,26 @@ class TwoBodies(NamedTuple):
     first2: int
 
 
+class OneOfTwo(NamedTuple):
+    """Ids of the points of two bodies: from and to before."""
+
+    begin1: int
+    end1: int
+    begin2: int
+    end2: int
+
+
+class Push(NamedTuple):
+    """Settings of the forces between two bodies."""
+
+    law: Tag  # of `points.bodies`
+    kin: Tag
+    reach: float  # points touch if they are closer than this in every direction
+    step: float  # time that points have moved for
+    dt: float  # `dt` and `kick` set the stiffness
+    kick: float
+
+
 class Cells(NamedTuple):
     """Scratch of the search."""
 
@@ -48,54 +68,56 @@ class Cells(NamedTuple):
     length: np.ndarray  # (3,) float64: lengths of their region
     count: np.ndarray  # (3,) int64: cells along each direction
     contact: np.ndarray  # (7,) of a point, see `_touch`
+    total: np.ndarray  # (3,) force on the first body
 
 
 def cells_for(points: int) -> Cells:
     return Cells(
         start=np.zeros(2 * points + 65, np.int64), cell=np.zeros(points, np.int64),
         order=np.zeros(points, np.int64), corner=np.zeros(3), length=np.zeros(3),
-        count=np.ones(3, np.int64), contact=np.zeros(7),
+        count=np.ones(3, np.int64), contact=np.zeros(7), total=np.zeros(3),
     )  # fmt: skip
 
 
 @noinline
-def _body(id, begin1, end1, begin2, end2):
-    """Return the body of the point with an id, 0 or 1; -1 for neither."""
-    if begin1 <= id < end1:
+def _body(id, bodies):
+    if bodies.begin1 <= id < bodies.end1:
         return 0
-    return 1 if begin2 <= id < end2 else -1
+    return 1 if bodies.begin2 <= id < bodies.end2 else -1
 
 
-def _radius(kin, x, points, laws, p):
+def _radius(matter, x, p):
+    kin, points, laws = matter
     law, state = state_at(kin, points, laws, p)
-    volume = volume_of(kin, points, law, state, p)
-    return radius(kin, float(volume), load_vector(kin, x, p))
+    return radius(kin, float(volume_of(kin, points, law, state, p)), load_vector(kin, x, p))
 
 
 @kernel
-def extend(kin, x, points, laws, begin1, end1, begin2, end2, extents):
-    """Extend the extents of two bodies by the points of a block.
+def extend(matter, x, ids, extents):
+    """Extend the extents of two bodies by the points of a block at `x` (w, n).
 
     `extents` (2, 7): for each body the largest of -x, -y, -z, x, y, z and of the radii.
     """
-    points, laws = at_hand(points), at_hand(laws)
+    matter = at_hand(matter)
+    points = matter.points
     for p in range(points.id.size):
-        body = _body(points.id[p], begin1, end1, begin2, end2)
+        body = _body(points.id[p], ids)
         if body >= 0:
-            for k in range(kin.dimension):
+            for k in range(matter.kin.dimension):
                 extents[body, k] = max(extents[body, k], -float(x[k, p]))
                 extents[body, 3 + k] = max(extents[body, 3 + k], float(x[k, p]))
-            extents[body, 6] = max(extents[body, 6], _radius(kin, x, points, laws, p))
+            extents[body, 6] = max(extents[body, 6], _radius(matter, x, p))
 
 
 @kernel
-def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
-    """Find the points of two bodies between two corners; return their number, fill `rows`."""
-    points, count = at_hand(points), 0
+def pick(matter, x, ids, corners, rows):
+    """Find the points of two bodies between `corners` (2, d); fill `rows`, return their number."""
+    matter, count = at_hand(matter), 0
+    points = matter.points
     for p in range(points.id.size):
-        inside = _body(points.id[p], begin1, end1, begin2, end2) >= 0
-        for k in range(kin.dimension):
-            inside = inside and low[k] <= x[k, p] <= high[k]
+        inside = _body(points.id[p], ids) >= 0
+        for k in range(matter.kin.dimension):
+            inside = inside and corners[0, k] <= x[k, p] <= corners[1, k]
         if inside:
             rows[count] = p
             count += 1
@@ -103,21 +125,21 @@ def pick(kin, x, points, begin1, end1, begin2, end2, low, high, rows):
 
 
 @kernel
-def collect(kin, x, points, laws, rows, found):
-    """Collect number, mass, radius, position and velocity of points of a block (n, 3 + 2 d)."""
-    points, laws, d = at_hand(points), at_hand(laws), kin.dimension
+def collect(matter, x, rows, out):
+    """Collect id, mass, radius, position and velocity of points in `out` (n, 3 + 2 d)."""
+    matter = at_hand(matter)
+    points, d = matter.points, matter.kin.dimension
     for i in range(rows.size):
         p = rows[i]
-        found[i, 0], found[i, 1] = points.id[p], points.mass[p]
-        found[i, 2] = _radius(kin, x, points, laws, p)
+        out[i, 0], out[i, 1] = points.id[p], points.mass[p]
+        out[i, 2] = _radius(matter, x, p)
         for k in range(d):
-            found[i, 3 + k] = x[k, p]
-            found[i, 3 + d + k] = points.v[k, p]
+            out[i, 3 + k] = x[k, p]
+            out[i, 3 + d + k] = points.v[k, p]
 
 
 @noinline
 def _range(x, begin, end, k):
-    """Return the least and largest coordinate k of some points."""
     lo, hi = inf, -inf
     for i in range(begin, end):
         lo = min(lo, x[i, k])
@@ -135,10 +157,7 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cover the region where the bodies may touch by cells; return their width, 0 if none.
-
-    As wide as touching points can be apart, or wider if there are too few cells.
-    """
+    """Cover the region where the bodies may touch by cells; return their width, 0 if none."""
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
     if not width > 0:
@@ -194,47 +213,50 @@ def _find_cells(d, bodies, cells, width):
 
 
 @noinline
-def _push_between(law, kin, bodies, reach, dt, kick, i, j):
+def _push_between(push, bodies, i, j):
     """Return the normal force on point `i` from point `j`, 0 if they do not touch."""
+    law, kin = push.law, push.kin
     x, none = bodies.x, zero_vector(kin, 0.0)
     dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)
     squared, near = 0.0, True
     for k in range(kin.dimension):
-        near = near and abs(dx[k]) < reach
+        near = near and abs(dx[k]) < push.reach
         squared += dx[k] * dx[k]
     both = bodies.radius[i] + bodies.radius[j]
     if not (near and 0 < squared < both * both):
         return none
     radii, masses = (bodies.radius[i], bodies.radius[j]), (bodies.mass[i], bodies.mass[j])
-    return force_between(law, kin, TouchingPair(dx, sqrt(squared), radii, masses, dt, kick))
+    pair = TouchingPair(dx, sqrt(squared), radii, masses, push.dt, push.kick)
+    return force_between(law, kin, pair)
 
 
 @noinline
-def _add(kin, bodies, i, j, force, total):
-    for k in range(kin.dimension):
-        bodies.force[i, k] += force[k]
-        bodies.force[j, k] -= force[k]
-        total[k] += force[k]
+def _add(bodies, i, j, force, total):
+    for k, component in enumerate(force):
+        bodies.force[i, k] += component
+        bodies.force[j, k] -= component
+        total[k] += component
 
 
 @noinline
-def _touch(law, kin, bodies, reach, dt, kick, i, j, total, contact):
+def _touch(push, bodies, cells, i, j):
     """Add the normal force between two points, if they touch; return 1 if so, else 0.
 
-    `contact` sums, for the friction on point `i`: the load, the normal force, and the stiffness of
-    each partner times its tangential velocity.
+    `cells.contact` sums, for the friction on point `i`: the load, the normal force, and the
+    stiffness of each partner times its tangential velocity.
     """
-    force, d = _push_between(law, kin, bodies, reach, dt, kick, i, j), kin.dimension
+    kin, contact = push.kin, cells.contact
+    force, d = _push_between(push, bodies, i, j), kin.dimension
     square = force.squared()
     if not square > 0:
         return 0
-    _add(kin, bodies, i, j, force, total)
+    _add(bodies, i, j, force, cells.total)
     if bodies.grip.shape[1] == 0:  # no friction
         return 1
     none, mass = zero_vector(kin, 0.0), bodies.mass
     dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
     reduced = mass[i] * mass[j] / (mass[i] + mass[j])
-    slide = reduced / (dt * kick) * along(dv, force)
+    slide = reduced / (push.dt * push.kick) * along(dv, force)
     contact[0] += sqrt(square)
     for k in range(d):
         contact[1 + k] += force[k]
@@ -243,16 +265,17 @@ def _touch(law, kin, bodies, reach, dt, kick, i, j, total, contact):
 
 
 @noinline
-def _rub(law, kin, bodies, step, dt, i, contact):
+def _rub(push, bodies, i, contact):
     """Compute the friction on point `i`, replacing the velocity in `contact`."""
+    kin = push.kin
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
-    slid = step if grip[i, d] > 0 else 0.0  # 0 if it did not touch before
+    slid = push.step if grip[i, d] > 0 else 0.0  # 0 if it did not touch before
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
     load = contact[0]
     memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
-    force, (hold, mean, unused) = rub(law.friction, load, memory, dt * slide)
+    force, (hold, mean, unused) = rub(push.law.friction, load, memory, push.dt * slide)
     for k in range(d):
         grip[i, k] = hold[k]
         contact[1 + d + k] = force[k]
@@ -260,31 +283,26 @@ def _rub(law, kin, bodies, step, dt, i, contact):
 
 
 @noinline
-def _pass_on(law, kin, bodies, reach, dt, kick, i, j, total, contact):
+def _pass_on(push, bodies, cells, i, j):
     """Apply a partner's part of the friction of point `i`, in proportion to the load."""
-    d = kin.dimension
-    square = _push_between(law, kin, bodies, reach, dt, kick, i, j).squared()
+    kin, contact, d = push.kin, cells.contact, push.kin.dimension
+    square = _push_between(push, bodies, i, j).squared()
     if square > 0:
         part = sqrt(square) / contact[0]
         force = kin.Vector._make([part * contact[1 + d + k] for k in range(d)])
-        _add(kin, bodies, i, j, force, total)
+        _add(bodies, i, j, force, cells.total)
 
 
 @kernel
-def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
-    """Add the forces of all touching pairs; return their number.
-
-    Two points touch if they are closer than the sum of their radii, and closer than `reach` in
-    every direction. `total` (3,) gets the force on the first body. Points have moved for the time
-    `step`; `dt` and `kick` set the stiffness.
-    """
+def push_apart(push, bodies, cells):
+    """Add the forces of all touching pairs; return their number. `cells.total` gets their sum."""
     bodies, cells = at_hand(bodies), at_hand(cells)
-    d = kin.dimension
-    total[:] = 0.0
+    d = push.kin.dimension
+    cells.total[:] = 0.0
     touching = 0
-    rubs = isinstance(law, MinimizePenetration) and bodies.grip.shape[1] > 0
+    rubs = isinstance(push.law, MinimizePenetration) and bodies.grip.shape[1] > 0
     contact = cells.contact
-    width = _lay_cells(d, bodies, cells, reach)
+    width = _lay_cells(d, bodies, cells, push.reach)
     if not width > 0:
         return touching
     _find_cells(d, bodies, cells, width)
@@ -301,7 +319,7 @@ def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
                     for k in range(d + 2):
                         bodies.grip[i, k] *= 1 - NEW
                     break
-                _rub(law, kin, bodies, step, dt, i, contact)
+                _rub(push, bodies, i, contact)
             for a in range(max(cx - 1, 0), min(cx + 2, nx)):
                 for b in range(max(cy - 1, 0), min(cy + 2, ny)):
                     # Cells along the last direction are adjacent, and so are their points.
@@ -311,9 +329,7 @@ def push_apart(law, kin, bodies, cells, reach, step, dt, kick, total):
                     for q in range(begin, cells.start[last]):
                         j = cells.order[q]
                         if turn == 0:
-                            touching += _touch(
-                                law, kin, bodies, reach, dt, kick, i, j, total, contact
-                            )
+                            touching += _touch(push, bodies, cells, i, j)
                         else:
-                            _pass_on(law, kin, bodies, reach, dt, kick, i, j, total, contact)
+                            _pass_on(push, bodies, cells, i, j)
     return touching

@@ -91,8 +91,7 @@ def _take_over_linked(ranks, due):
     _ask_if(due, ranks.address, TAKE, 0, 0)
 
 
-def _sweep_tiles(address, s, mode, visit, context, of_border):
-    """Sweep over the tiles that other processes wait for, or over the others."""
+def _sweep_tiles(s, mode, visit, context, of_border):
     for block in s.blocks:
         border = block.tiling.count[2]
         if of_border:
@@ -100,15 +99,15 @@ def _sweep_tiles(address, s, mode, visit, context, of_border):
         else:
             visit_shares(mode, block.tiling.count[1] - border, visit, context, block, border)
         if len(s.blocks) > 1:
-            _ask(address, NEXT, 0, 0)
+            _ask(s.control.ranks.address, NEXT, 0, 0)
 
 
 @sweep_blocks.on(Linked)
 def _sweep_blocks_linked(ranks, s, mode, visit, context):
     address = ranks.address
     _ask(address, SWEEP, 0, 0)
-    _sweep_tiles(address, s, mode, visit, context, True)
+    _sweep_tiles(s, mode, visit, context, True)
     if len(visit.quantities):
         due = context.scatters & (s.buffers.count[1] == 0)
         _ask_if(due, address, GIVE, s.buffers.number, arrays_given(visit.quantities, s.kin))
-    _sweep_tiles(address, s, mode, visit, context, False)
+    _sweep_tiles(s, mode, visit, context, False)

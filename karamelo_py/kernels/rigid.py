@@ -32,13 +32,18 @@ class RigidBodies(NamedTuple):
     slots: np.ndarray  # (r,) slots of forces and torques
 
 
+def _at_nodes(s):
+    return s.kin, s.nodes, field(s.nodes.fields, RigidSums)
+
+
 @noinline
-def _impose(kin, nodes, rigid, dt, control, n):
+def _impose(at, dt, control, n):
     """Set the velocity of a node with rigid points; store the force for that in `rigid`.
 
     Its work on other points is as for a prescribed velocity. The change v* - v includes that force:
     else FLIP points never acquire the velocity of the body.
     """
+    kin, nodes, rigid = at
     d = kin.dimension
     if not rigid[n, MASS] > 0:
         for k in range(d):
@@ -59,7 +64,8 @@ def _impose(kin, nodes, rigid, dt, control, n):
             add_to(control.totals, WORK, float(mass * impulse * velocity))
 
 
-def _impose_on_strain(kin, nodes, rigid, n):
+def _impose_on_strain(at, n):
+    kin, nodes, rigid = at
     if rigid[n, MASS] > 0:
         for k in range(kin.dimension):
             nodes.velocity[n, k] = rigid[n, of_momentum(kin) + k] / rigid[n, MASS]
@@ -86,7 +92,7 @@ def _add_forces(s, block, p):
 
 
 def _impose_node(s, n):
-    _impose(s.kin, s.nodes, field(s.nodes.fields, RigidSums), kick(s), s.control, n)
+    _impose(_at_nodes(s), kick(s), s.control, n)
 
 
 @kernel
@@ -106,5 +112,5 @@ def _publish_sums(s):
 PUBLISH = Once(_begin_sums), each_point(_add_forces, Rigid), Once(_publish_sums)
 RigidBodies.rows = (each_node(_impose_node), *PUBLISH)  # type: ignore[attr-defined]
 RigidBodies.rows_before = RigidBodies.rows_after = (  # type: ignore[attr-defined]
-    each_node(lambda s, n: _impose_on_strain(s.kin, s.nodes, field(s.nodes.fields, RigidSums), n)),
+    each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),
 )

@@ -1,22 +1,28 @@
 """Friction of points on tools, one by one, in double precision."""
 
+from typing import NamedTuple
+
+import numpy as np
+
 from karamelo_py.compiler import kernel
 from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.points.bodies import FrictionMemory, along, rub
 from karamelo_py.points.kinematics import zero_vector
 
 
-@kernel
-def rub_points(kin, mu, normal, load, pull, stop, grip, force):
-    """Add the friction of n points to their forces (n, d), and update their `grip` (n, d + 2).
+class Rubbing(NamedTuple):
+    """Contact of n points with a tool."""
 
-    Parameters
-    ----------
-    normal, load
-        (n, d) and (n,) of the contact: unit vectors, forces.
-    pull, stop
-        (n, d) what the springs are stretched by in the step, and what stops the slip: forces.
-    """
+    normal: np.ndarray  # (n, d) unit vectors
+    load: np.ndarray  # (n,) normal forces
+    pull: np.ndarray  # (n, d) forces by which the step stretches the springs
+    stop: np.ndarray  # (n, d) forces that stop the slip
+
+
+@kernel
+def rub_points(kin, mu, rubbing, grip, force):
+    """Add the friction of n points to their forces (n, d); update their `grip` (n, d + 2)."""
+    normal, load, pull, stop = rubbing
     d, none = kin.dimension, zero_vector(kin, 0.0)
     for i in range(load.size):
         n = vector_at(kin, normal, i, 0, none)

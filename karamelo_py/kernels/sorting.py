@@ -33,6 +33,14 @@ class Neighbourhood(NamedTuple):
     offset: float  # of the first node seen now, see points.basis.first_node
 
 
+class SortKeys(NamedTuple):
+    """Keys of the order of points."""
+
+    tiles: TileGrid
+    around: Neighbourhood
+    ids: np.ndarray  # (n,)
+
+
 class SortedOrder(NamedTuple):
     """Order and boxes of n points, sorted by threads in parts."""
 
@@ -47,10 +55,7 @@ class SortedOrder(NamedTuple):
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Find the cell of a point from its distance to the corner of the grid, in cells.
-
-    Clamped, since a hook may have moved a point anywhere; the next sweep detects that.
-    """
+    """Find the cell of a point at `at` cells, clamped: a hook may have moved a point anywhere."""
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
@@ -65,12 +70,9 @@ def _seen(grid, around, g, direction, at):
 
 
 @by_threads
-def find_tiles(kin, grids, tiles, x, of, ends, tile, k):
-    """Find the tile of each point of the k-th part at `x` (w, n), on grids `of` (n,).
-
-    Fills `tile` (n,), and `ends` (parts, T) with the number of these points in each tile.
-    """
-    grids, tiles = at_hand(grids), at_hand(tiles)
+def find_tiles(at, tiles, ends, tile, k):
+    """Find the `tile` (n,) of each point of a part, and counts `ends` (parts, T) by tile."""
+    (_, kin, grids, of, x), tiles = at_hand(at), at_hand(tiles)
     parts = ends.shape[0]
     for t in range(ends.shape[1]):
         ends[k, t] = 0
@@ -116,13 +118,13 @@ def _order_parts(found, k):
 
 
 @shared_out
-def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
+def _order_in_all_tiles(at, by, found, k):
     """Sort the points of each tile of the k-th part by their first node, then by id.
 
     Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
     first. The order follows from the positions alone.
     """
-    grids, tiles, found, around = at_hand(grids), at_hand(tiles), at_hand(found), at_hand(around)
+    (_, kin, grids, of, x), (tiles, around, ids), found = at_hand(at), at_hand(by), at_hand(found)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
     ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
     d = kin.dimension
@@ -138,10 +140,10 @@ def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
             grid = record(grids, of[p])
             number = 0
             for i in range(d):
-                at = in_cells(grid, i, x[i, p])
-                first = max(int(at + around.offset), 0)
+                place = in_cells(grid, i, x[i, p])
+                first = max(int(place + around.offset), 0)
                 number = number * tiles.size[i] + first % tiles.size[i]
-                low, high = _seen(grid, around, of[p], i, at)
+                low, high = _seen(grid, around, of[p], i, place)
                 boxes[0, t, i] = low if q == begin else min(boxes[0, t, i], low)
                 boxes[1, t, i] = high if q == begin else max(boxes[1, t, i], high)
             cell[0, q] = number
@@ -157,19 +159,19 @@ def _order_in_all_tiles(kin, grids, around, tiles, x, of, ids, found, k):
                     place += here
         for q in range(begin, end):
             c, p = cell[0, q], cell[1, q]
-            at = bins[k, 1, c]
+            last = bins[k, 1, c]
             bins[k, 1, c] += 1
             # Insertion sort: nearly all were in this order before.
-            while at > bins[k, 0, c] and ids[order[at - 1]] > ids[p]:
-                order[at] = order[at - 1]
-                at -= 1
-            order[at] = p
+            while last > bins[k, 0, c] and ids[order[last - 1]] > ids[p]:
+                order[last] = order[last - 1]
+                last -= 1
+            order[last] = p
 
 
 @by_threads
-def find_rows(kin, grids, around, x, tiling, parts, k):
-    """Find `Tiling.rows` of the k-th part of the tiles in 3D, with points at `x` (w, n)."""
-    grids, around, tiling = at_hand(grids), at_hand(around), at_hand(tiling)
+def find_rows(at, around, tiling, parts, k):
+    """Find `Tiling.rows` of the k-th part of the tiles in 3D."""
+    (_, _, grids, _, x), around, tiling = at_hand(at), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]
     for t in range(count * k // parts, count * (k + 1) // parts):
@@ -190,25 +192,24 @@ def find_rows(kin, grids, around, x, tiling, parts, k):
 
 
 @shared_out
-def _pick_all_rows(rows, first, last, order, room, parts, k):
-    """Copy the k-th part of the rows from `first` to `last` to `room`, in order."""
+def _pick_all_rows(rows, order, room, parts, k):
+    """Copy the k-th part of rows to `room`, in order."""
     begin, end = order.size * k // parts, order.size * (k + 1) // parts
-    for r in range(first, last + 1):
+    for r in range(rows.shape[0]):
         if rows[r, 1] == 4:
-            pick_items(rows[r, 0], np.int32(0), order, room, r - first, begin, end)
+            pick_items(rows[r, 0], np.int32(0), order, room, r, begin, end)
         else:
-            pick_items(rows[r, 0], np.int64(0), order, room, r - first, begin, end)
+            pick_items(rows[r, 0], np.int64(0), order, room, r, begin, end)
 
 
 @shared_out
-def _put_all_rows(rows, first, last, room, parts, k):
-    """Copy the k-th part of these rows back."""
+def _put_all_rows(rows, room, parts, k):
     begin, end = room.shape[1] * k // parts, room.shape[1] * (k + 1) // parts
-    for r in range(first, last + 1):
+    for r in range(rows.shape[0]):
         if rows[r, 1] == 4:
-            put_items(rows[r, 0], np.int32(0), room, r - first, begin, end)
+            put_items(rows[r, 0], np.int32(0), room, r, begin, end)
         else:
-            put_items(rows[r, 0], np.int64(0), room, r - first, begin, end)
+            put_items(rows[r, 0], np.int64(0), room, r, begin, end)
 
 
 @noinline
@@ -216,18 +217,19 @@ def _permute(mode, rows, order, room, parts):
     """Permute rows by `order`, a few at a time, without a copy of a whole field."""
     first = 0
     while first < rows.shape[0]:
-        last = min(first + room.shape[0], rows.shape[0]) - 1
-        _pick_all_rows(mode, parts, rows, first, last, order, room, parts)
-        _put_all_rows(mode, parts, rows, first, last, room, parts)
-        first = last + 1
+        last = min(first + room.shape[0], rows.shape[0])
+        some = rows[first:last]
+        _pick_all_rows(mode, parts, some, order, room, parts)
+        _put_all_rows(mode, parts, some, room, parts)
+        first = last
 
 
-def _sort(mode, kin, grids, around, tiles, x, of, ids, found, rows):
+def _sort(mode, at, by, found, rows):
     parts = found.ends.shape[0]
-    find_tiles(mode, parts, kin, grids, tiles, x, of, found.ends, found.tile)
+    find_tiles(mode, parts, at, by.tiles, found.ends, found.tile)
     _begin_tiles(found)
     _order_parts(mode, parts, found)
-    _order_in_all_tiles(mode, parts, kin, grids, around, tiles, x, of, ids, found)
+    _order_in_all_tiles(mode, parts, at, by, found)
     _permute(mode, rows, found.order, found.room, parts)
     return 0
 
@@ -236,20 +238,20 @@ _sort_by_team = by_team(_sort)
 
 
 @kernel
-def sort_points(mode, kin, grids, around, tiles, x, of, ids, found, rows):
-    """Sort points at places `x` (w, n) by tile, and within by the first node that they see.
+def sort_points(mode, at, by, found, rows):
+    """Sort points by tile, and within by the first node that they see.
 
-    They are on the grids `of` (n,) and have the ids `ids` (n,). Of all their arrays the addresses
-    of `rows` are given (:func:`~karamelo_py.compiler.fields.pick_items`): one kernel serves all
-    bases and laws of a dimension.
+    `rows` are the addresses of the rows of all their arrays, also `at.x` and `by.ids`
+    (:func:`~karamelo_py.compiler.fields.pick_items`): one kernel serves all bases and laws of a
+    dimension.
     """
-    _sort_by_team(mode, kin, grids, around, tiles, x, of, ids, found, rows)
+    _sort_by_team(mode, at, by, found, rows)
 
 
 @kernel
-def widest(kin, basis, grids, x, of):
+def widest(at):
     """Return the largest distance of a domain corner from its point, in cells."""
-    grids = at_hand(grids)
+    basis, kin, grids, of, x = at_hand(at)
     far = 0.0
     for p in range(x.shape[1]):
         far = max(far, extent(basis, kin, record(grids, of[p]), place_at(basis, kin, x, p)))

@@ -116,10 +116,7 @@ def affine_parts(quantities, w, stencil, loads):
 
 
 def all_by_corners(parts, w):
-    """Return True if all tasks or quantities are linear in the weight or gradient of a node.
-
-    `not_at_corners` lists exceptions. Moments are of velocities and positions of nodes.
-    """
+    """Return True if all parts are linear in the weight or gradient (see `not_at_corners`)."""
     asked = transfers.add_moment, transfers.nodal_momentum, transfers.gradient_weight
     there = {
         "moments": any(function.defined(type(w.transfer)) for function in asked),
@@ -136,12 +133,10 @@ def _seeing(basis, w):
 
 
 def in_block(w):
-    """Return the work with points that see blocks of nodes."""
     return _seeing(InBlock(w.basis), w)
 
 
 def shows_corners(tasks, w):
-    """Return True if the visit needs the velocities of corners."""
     return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
 
 
@@ -170,7 +165,6 @@ def _scatter(quantities, w, stencil, loads):
 
 
 def _even(w, stencil, asked):
-    """Return True if D^-1 is the same for all lanes, or not needed."""
     return all_lanes(product.evenly(w.basis, w.grid, stencil)) if asked else True
 
 
@@ -208,7 +202,7 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
 
 
 def _ask_ahead(tags, w, stencil):
-    """Prefetch node records after the last of a stencil; others were used before."""
+    """Prefetch node records after the last of a stencil."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
     for array in [type(tag).records for tag in tags]:
         if array:
@@ -216,7 +210,6 @@ def _ask_ahead(tags, w, stencil):
 
 
 def _gather_parts(tasks, w, stencil, totals):
-    """Gather what can be from all nodes at once, the rest node by node."""
     pairs = zip(tasks, totals, strict=True)
     found = [gathered_at_once(task, w, stencil, total) for task, total in pairs]
     rest = [k for k, total in enumerate(found) if not len(total)]
@@ -235,14 +228,14 @@ def _scatter_nodes_stencil(stencil, lanes, quantities, w, loads):
     if isinstance(lanes, OneByOne):
         _scatter(quantities, w, stencil, loads)
         return
-    parts = affine_parts(quantities, w, stencil, loads)
+    parts, given = affine_parts(quantities, w, stencil, loads), (quantities, loads)
     if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
     elif product.sees_same_nodes(stencil):
-        _scatter_parts(lanes, quantities, w, product.with_one_node(stencil), loads, parts)
+        _scatter_parts(lanes, w, product.with_one_node(stencil), given, parts)
     else:
         _ask_ahead(quantities, w, stencil)
-        _scatter_parts(lanes, quantities, w, stencil, loads, parts)
+        _scatter_parts(lanes, w, stencil, given, parts)
 
 
 @scatter_nodes.on(CornerStencil)
@@ -263,19 +256,19 @@ def _scatter_nodes_corner_stencil(stencil, lanes, quantities, w, loads):
 
 def _scatter_block(lanes, quantities, w, block, loads):
     at = in_block(w)
-    _scatter_parts(lanes, quantities, at, block, loads, affine_parts(quantities, at, block, loads))
+    parts = affine_parts(quantities, at, block, loads)
+    _scatter_parts(lanes, at, block, (quantities, loads), parts)
 
 
-def _scatter_parts(lanes, quantities, w, stencil, loads, parts):
-    """Scatter affine parts to all nodes at once, the rest node by node."""
-    known = tuple([part for part in parts if len(part)])
-    if len(known):
-        give_affine(lanes, w, stencil, known)
+def _scatter_parts(lanes, w, stencil, given, parts):
+    quantities, loads = given
+    affine = tuple([part for part in parts if len(part)])
+    if len(affine):
+        give_affine(lanes, w, stencil, affine)
     rest = [k for k, part in enumerate(parts) if not len(part)]
     if len(rest):
         _scatter(tuple([quantities[k] for k in rest]), w, stencil, tuple([loads[k] for k in rest]))
 
 
 def gathered_by(lanes: Tag, tasks: tuple, w: Work, stencil: tuple, x: tuple) -> tuple:
-    """Gather the totals of the tasks over a stencil."""
     return gather_nodes(stencil, lanes, tasks, w, eq.empty_all(tasks, w, x))

@@ -16,7 +16,7 @@ from karamelo_py.kernels import clock as clocks
 from karamelo_py.kernels import table
 from karamelo_py.kernels.arrays import DT, TIME, NoHooks, Setup, Tag
 from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
-from karamelo_py.kernels.sweep import sweep, sweep_nodes
+from karamelo_py.kernels.sweep import Extent, sweep, sweep_nodes
 from karamelo_py.kernels.table import Processor, take
 from karamelo_py.kernels.views import deformation_of, state_at
 from karamelo_py.kernels.watch import look, look_at_heat
@@ -71,19 +71,16 @@ class StepKind(NamedTuple):
 @take.on(table.AtPoints, Processor)
 def _at_points(row, s, step):
     at_points(step.hooks, row.stage, row.then, s)
-    return True
 
 
 @take.on(table.AtNodes, Processor)
 def _at_nodes(row, s, step):
     at_nodes(step.hooks, row.stage, row.target, s)
-    return True
 
 
 @take.on(table.WorkOfLoads, Processor)
 def _work_of_loads(row, s, step):
     add_work(step.hooks, s)
-    return True
 
 
 @take.on(table.NodeTask, Processor)
@@ -91,13 +88,11 @@ def _node_task(row, s, step):
     task = row.task(s) if callable(row.task) else row.task
     here = row.at(s) if row.at else s
     sweep_nodes(step.mode, task, here, (row.length or clocks.kick)(s))
-    return True
 
 
 @take.on(table.EachNode, Processor)
 def _each_node(row, s, step):
     row.loop(s)
-    return True
 
 
 @take.on(table.EachPoint, Processor)
@@ -105,20 +100,17 @@ def _each_point(row, s, step):
     for block in s.blocks:
         if isinstance(block.laws, row.law):
             row.loop(s, block)
-    return True
 
 
 @take.on(table.Once, Processor)
 def _once(row, s, step):
     row.function(s)
-    return True
 
 
 @take.on(table.Repeated, Processor)
 def _repeated(row, s, step):
     for k in range(row.count(s)):
         _take_all(row.rows(k), s, step)
-    return True
 
 
 @take.on(table.Check, Processor)
@@ -132,13 +124,14 @@ def _sweep(row, s, step):
     dt = whole if row.share == 1 else real(row.share, whole) * whole
     scatters = step.more if row.only_if_more else row.scatters
     here = row.at(s) if row.at else s
-    sweep(here, step.mode, row.visit, dt, row.gathers, scatters, row.moves)
+    sweep(here, step.mode, row.visit, Extent(dt, row.gathers, scatters, row.moves))
     return clocks.all_well(s, row.reported) if row.reported else True
 
 
 def _take_all(rows, s, step):
-    for row in table.plain(rows, s):  # noqa: SIM110  (no more rows after a failed point)
-        if not take.find((type(row), Processor))(row, s, step):
+    for row in table.plain(rows, s):
+        well = take.find((type(row), Processor))(row, s, step)
+        if well is not None and not well:
             return False
     return True
 
@@ -148,10 +141,7 @@ _begin_rows: Any = functools.cache(first_rows)
 
 
 def step(kind: StepKind, s: Setup, hooks: Tag, more: bool) -> bool:
-    """Take a step; return whether no point failed.
-
-    With `more` a fused step leaves the sums of the next one on the nodes.
-    """
+    """Take a step; with `more` a fused one leaves the next sums. Return whether no point failed."""
     scheme, visits, mode = kind
     return _take_all(_step_rows(type(scheme), type(visits)), s, InStep(mode, hooks, more))
 

@@ -50,8 +50,8 @@ def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
         yield from ((*columns, kind) for columns in columns_of(chosen, kin))
 
 
-def _take_record(quantities, kin, nodes, n, buffers, m, keep):
-    """Move record `m` of the buffers to node `n`, adding or replacing; zero it."""
+def _take_record(quantities, kin, into, out_of, keep):
+    (nodes, n), (buffers, m) = into, out_of
     for name, first, end, add in _columns(quantities, kin):
         array = found(nodes, name)
         if array is not None:
@@ -60,7 +60,6 @@ def _take_record(quantities, kin, nodes, n, buffers, m, keep):
 
 
 def _clear_record(quantities, kin, nodes, n):
-    """Clear the columns of node `n`, unless quantities add to them."""
     for name, first, end, add in _columns(quantities, kin):
         array = found(nodes, name)
         if array is not None and not add:
@@ -83,7 +82,5 @@ def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, shar
                         _clear_record(quantities, kin, nodes, index(n + k))
                 else:
                     for k in range(count):
-                        _take_record(
-                            quantities, kin, nodes, index(n + k), buffers.nodes, index(m + k),
-                            what == arrays.ADD,
-                        )  # fmt: skip
+                        into, out_of = (nodes, index(n + k)), (buffers.nodes, index(m + k))
+                        _take_record(quantities, kin, into, out_of, what == arrays.ADD)

@@ -78,7 +78,6 @@ def _corner(kin, surface, i, k):
 
 
 def _from_line(a, b, x):
-    """Squared distance of `x` from a segment."""
     way, local = b - a, x - a
     return (local - _share_along(way, local) * way).squared()
 
@@ -94,17 +93,16 @@ def _cross(a, b):
     )
 
 
-def _is_above(a, b, c, normal, size, x):
+def _is_above(corners, normal, size, x):
     """Return True if `x` projects into a triangle."""
-    above = size > TINY
+    (a, b, c), above = corners, size > TINY
     above = above and dot(_cross(b - a, x - a), normal) >= 0
     above = above and dot(_cross(c - b, x - b), normal) >= 0
     return above and dot(_cross(a - c, x - c), normal) >= 0
 
 
 @point_function()
-def _squared(kin, surface, i, x):
-    """Squared distance of `x` from face `i`."""
+def _squared(kin, surface, i, x): ...
 
 
 @_squared.on(KINEMATICS[1])
@@ -122,7 +120,7 @@ def _from_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
     normal = _cross(b - a, c - a)
     size = normal.squared()
-    if _is_above(a, b, c, normal, size, x):
+    if _is_above((a, b, c), normal, size, x):
         height = dot(x - a, normal)
         return height * height / size
     return min(min(_from_line(a, b, x), _from_line(b, c, x)), _from_line(c, a, x))
@@ -130,7 +128,6 @@ def _from_triangle(kin, surface, i, x):
 
 @noinline
 def _from_box(kin, surface, k, x):
-    """Squared distance of `x` from the box of node `k`."""
     found = 0.0
     for c in range(kin.dimension):
         away = max(max(surface.low[k, c] - x[c], x[c] - surface.high[k, c]), 0.0)
@@ -171,14 +168,12 @@ def distance(kin, surface, x, reach):
 
 
 def _on_line(a, b, x):
-    """Return the place on a segment nearest to `x`."""
     way = b - a
     return a + _share_along(way, x - a) * way
 
 
 @point_function()
-def _place_on(kin, surface, i, x):
-    """Return the place on face `i` nearest to `x`."""
+def _place_on(kin, surface, i, x): ...
 
 
 @_place_on.on(KINEMATICS[1])
@@ -196,7 +191,7 @@ def _place_on_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
     normal = _cross(b - a, c - a)
     size = normal.squared()
-    if _is_above(a, b, c, normal, size, x):
+    if _is_above((a, b, c), normal, size, x):
         return x - dot(x - a, normal) / size * normal
     found, best = _on_line(a, b, x), _from_line(a, b, x)
     if _from_line(b, c, x) < best:
@@ -227,8 +222,9 @@ def nearest(kin, surface, x, reach):
 
 
 @noinline
-def _crossed(ax, ay, bx, by, x, y):
+def _crossed(a, b, place):
     """Return 1 if a ray from (x, y) along x crosses a rising edge a b, -1 a falling one, else 0."""
+    (ax, ay), (bx, by), (x, y) = a, b, place
     if (ay > y) == (by > y):
         return 0
     if ay < by:  # the same for both faces of an edge
@@ -249,15 +245,17 @@ def _crossing_point(kin, surface, i, x):
 @_crossing.on(KINEMATICS[2])
 def _crossing_segment(kin, surface, i, x):
     a, b = _corner(kin, surface, i, 0), _corner(kin, surface, i, 1)
-    return _crossed(a[1], a[0], b[1], b[0], x[1], x[0])
+    return _crossed((a[1], a[0]), (b[1], b[0]), (x[1], x[0]))
 
 
 @_crossing.on(KINEMATICS[3])
 def _crossing_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
-    found = _crossed(a[0], a[1], b[0], b[1], x[0], x[1])
-    found += _crossed(b[0], b[1], c[0], c[1], x[0], x[1])
-    found += _crossed(c[0], c[1], a[0], a[1], x[0], x[1])
+    flat = [(corner[0], corner[1]) for corner in (a, b, c)]
+    place = x[0], x[1]
+    found = _crossed(flat[0], flat[1], place)
+    found += _crossed(flat[1], flat[2], place)
+    found += _crossed(flat[2], flat[0], place)
     if found == 0:
         return 0
     normal = _cross(b - a, c - a)
@@ -296,8 +294,8 @@ def _place(kin, x, p):
     return kin.Vector._make([x[p, c] for c in range(kin.dimension)])
 
 
-def _depths_of_some(kin, surface, x, reach, out, n):
-    surface = at_hand(surface)
+def _depths_of_some(shape, x, reach, out, n):
+    kin, surface = at_hand(shape)
     for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
         out[p] = _depth_in_surface(surface, kin, _place(kin, x, p), reach)
 
@@ -310,8 +308,8 @@ def depths(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
     return _of(_depths, surface, x, float(reach))
 
 
-def _distances_of_some(kin, surface, x, reach, found, n):
-    surface = at_hand(surface)
+def _distances_of_some(shape, x, reach, found, n):
+    kin, surface = at_hand(shape)
     for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
         found[p] = distance(kin, surface, _place(kin, x, p), reach)
 
@@ -327,7 +325,7 @@ def distances(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
 def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
     d = surface.low.shape[1]
     places, found = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
-    kernel(Serial(), -(-len(x) // CHUNK), KINEMATICS[d](), surface, places, *more, found)
+    kernel(Serial(), -(-len(x) // CHUNK), (KINEMATICS[d](), surface), places, *more, found)
     return found
 
 
@@ -365,13 +363,14 @@ def depth(shape, kin, x, reach):
 
 
 @point_function(otherwise=True)
-def slopes(shape, kin, x, reach, within, step):
+def slopes(shape, kin, x, reach, within_and_step):
     """Return the differences of depth from a step before `x`, at depth `within`, to a step on."""
-    return _slopes_across(shape, kin, x, reach, step)
+    return _slopes_across(shape, kin, x, reach, within_and_step[1])
 
 
 @slopes.on(Surface)
-def _slopes_at_surface(shape, kin, x, reach, within, step):
+def _slopes_at_surface(shape, kin, x, reach, within_and_step):
+    within, step = within_and_step
     near = abs(within)
     if near <= step:
         return _slopes_across(shape, kin, x, min(near + 1.01 * step, reach), step)

@@ -8,8 +8,6 @@ have one order, whatever the number of threads.
 from math import inf
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from karamelo_py.compiler import (
     all_lanes,
     at_hand,
@@ -57,6 +55,15 @@ class Visit(NamedTuple):
     weights: Tag  # of the scatter: `OldWeights` or `PresentWeights`
 
 
+class Extent(NamedTuple):
+    """The part of a visit that a sweep does."""
+
+    dt: Number
+    gathers: bool
+    scatters: bool
+    moves: bool  # new places go to the other of the two arrays
+
+
 class Context(NamedTuple):
     """The part of a `Setup` that a sweep needs; its type selects the kernel."""
 
@@ -79,14 +86,6 @@ class Context(NamedTuple):
     kick: Number  # time that forces act
 
 
-class NodesInUse(NamedTuple):
-    """Nodes of a task; `ranges` as in `Setup`."""
-
-    kin: Tag
-    nodes: Nodes
-    ranges: np.ndarray
-
-
 class OldWeights(NamedTuple):
     """Weights of the gather, at the place before the move."""
 
@@ -96,7 +95,6 @@ class PresentWeights(NamedTuple):
 
 
 def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
-    """Return the `Work` of a visit of a block; `nodes` belong to `grid`."""
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
         places, s.common, s.kick,
@@ -104,17 +102,13 @@ def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) 
 
 
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
-    """Return the stencil of the scatter; in the total frame the gather's."""
     if isinstance(weights, OldWeights) or not w.frame.moves:
         return stencil
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
-    """Return True while points scatter to nodes of their tile's box.
-
-    Points that left it are sorted before the next step, and scatter then.
-    """
+    """Return True while points scatter to their tile's box; others do after they are sorted."""
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
@@ -125,12 +119,10 @@ def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
 
 
 def position_of(w: Work, p: Index) -> tuple:
-    """Load a position (d,) before the move."""
     return load_vector(w.kin, w.places.x, p)
 
 
 def stencil_of(w: Work, p: Index) -> tuple:
-    """Return the stencil before the move."""
     return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.where, p))
 
 
@@ -215,14 +207,13 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
 
 @by_threads
 def visit_shares(visit: Visit, s: Context, block: Block, first: int, k: int) -> None:
-    """Visit the points of the tiles of part `first` + k."""
     share, order = block.tiling.share, block.tiling.order
     for t in range(share[first + k], share[first + k + 1]):
         visit_tile(visit, s, block, order[t])
 
 
 @by_threads
-def _visit_nodes(task: Tag, used: NodesInUse, dt: Number, k: int) -> None:
+def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
     kin, nodes, ranges = at_hand(used)
     for r in range(ranges[k, 0], ranges[k, 1]):
         for n in range(ranges[r, 0], ranges[r, 1]):
@@ -232,9 +223,8 @@ def _visit_nodes(task: Tag, used: NodesInUse, dt: Number, k: int) -> None:
 # --- threads ----------------------------------------------------------------------------------
 
 
-def context_of(s: Setup, dt: Number, gathers: bool, scatters: bool, moves: bool) -> Context:
-    """Return the context of a sweep that begins now."""
-    clock = s.control.clock[0]
+def context_of(s: Setup, extent: Extent) -> Context:
+    clock, (dt, gathers, scatters, moves) = s.control.clock[0], extent
     # A little more, so that points are sorted whenever one did not fit (see run.tiles).
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     return Context(
@@ -265,7 +255,7 @@ def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
 @point_function(otherwise=True)
 def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
     """Do `task` at every node in use."""
-    _visit_nodes(mode, s.ranges[0, 0], task, NodesInUse(s.kin, s.nodes, s.ranges), dt)
+    _visit_nodes(mode, s.ranges[0, 0], task, (s.kin, s.nodes, s.ranges), dt)
 
 
 # --- whole sweeps -----------------------------------------------------------------------------
@@ -278,18 +268,13 @@ def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context
         sweep_points(mode, visit, context, block)
 
 
-def sweep(
-    s: Setup, mode: Tag, visit: Visit, dt: Number, gathers: bool, scatters: bool, moves: bool
-) -> None:
-    """Visit all points and sum at the nodes.
-
-    With `moves` new places go to the other array. Tiles have the reports (`clock.read_reports`).
-    """
+def sweep(s: Setup, mode: Tag, visit: Visit, extent: Extent) -> None:
+    """Visit all points and sum at the nodes; tiles have the reports (`clock.read_reports`)."""
     # Without buffers, nodes start from zero.
-    direct = s.buffers.count[1]
+    direct, scatters = s.buffers.count[1], extent.scatters
     anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
     sum_given(mode, anew, s, scatters & (direct == 1))
-    context = context_of(s, dt, gathers, scatters, moves)
+    context = context_of(s, extent)
     sweep_blocks(s.control.ranks, s, mode, visit, context)
     sum_given(mode, visit.quantities, s, scatters & (direct == 0))
 

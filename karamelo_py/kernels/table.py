@@ -36,7 +36,7 @@ class Processor(NamedTuple):
 def take(row: Any, backend: Any) -> Any:
     """Take a row on a back end, `Processor` or `~.compiler.gpu.Card`: ``take.on(Row, Card)``.
 
-    Processor: ``(row, s, step)`` of a `Setup` and an `~.kernels.step.InStep`, traced; returns
+    Processor: ``(row, s, step)`` of a `Setup` and an `~.kernels.step.InStep`, traced; may return
     whether no point failed. Card: ``(row, steps)`` of a `~.run.gpu.StepsOnCard`; yields launches.
     """
 
@@ -136,8 +136,6 @@ class Sweep(NamedTuple):
 
 
 def each_node(function: Any) -> EachNode:
-    """Make a row of a function of a node."""
-
     @kernel
     def loop(s):
         for r in range(1, 1 + s.spans[0, 0]):
@@ -148,8 +146,6 @@ def each_node(function: Any) -> EachNode:
 
 
 def each_point(function: Any, law: type) -> EachPoint:
-    """Make a row of a function of a point."""
-
     @kernel
     def loop(s, block):
         for p in range(block.points.mass.size):
@@ -269,7 +265,6 @@ def _clear_radial(s, n):
 
 
 def _axis_of(grids, g):
-    """Return the range of the nodes on the axis of a grid."""
     first = grids.first[g]
     return first, first + (
         grids.step_x[g] if abs(grids.x0[g]) <= grids.slack[g] * grids.h[g] else 0
@@ -330,7 +325,6 @@ def average_stress(s: Setup) -> tuple:
 
 
 def at_nodes_with(kind: type, task: Tag) -> Any:
-    """Make the rows of a task at nodes, if they have a field."""
     return lambda s: (NodeTask(task),) if field(s.nodes.fields, kind) is not None else ()
 
 

@@ -57,9 +57,9 @@ def _grip_of_none(tag, what):
 
 
 @noinline
-def force_of(tag, what, volume, p, values, dt):
-    """Return the force (d,) of a shape on point `p`."""
-    kin, d = what.kin, what.kin.dimension
+def force_of(tag, what, volume, one):
+    """Return the force (d,) of a shape on a point, a `~.hooks.Member`."""
+    kin, d, (p, _, _, values, dt) = what.kin, what.kin.dimension, one
     none = zero_vector(kin, 0.0)
     way = none._make(values[:d])
     place = none._make([float(x) for x in load_vector(kin, what.x, p)])
@@ -75,7 +75,7 @@ def force_of(tag, what, volume, p, values, dt):
     if within > ball:
         within = depth(tag.shape, kin, x, tag.reach)
     step = ASIDE * tag.reach
-    normal = direction_of(slopes(tag.shape, kin, x, tag.reach, within, step), step)
+    normal = direction_of(slopes(tag.shape, kin, x, tag.reach, (within, step)), step)
     if normal.squared() == 0:
         if within > 0 and _call(tag.lost, what.ids[p]) == 0:
             raise RuntimeError("a point has no way out")
@@ -128,9 +128,9 @@ def touch_hook(tag: Callable) -> hooks.CompiledHook:
 
 
 @hooks.results.on(Touch)
-def _results_of_touch(tag, what, law, state, p, values, dt):
-    volume = volume_of(what.kin, what.points, law, state, p)
-    return force_of(tag, what, volume, p, values, dt)
+def _results_of_touch(tag, what, one):
+    volume = volume_of(what.kin, what.points, one.law, one.state, one.p)
+    return force_of(tag, what, volume, one)
 
 
 @hooks.written.on(Touch)

@@ -140,18 +140,15 @@ def node_of(w: Work, stencil: tuple, k: int) -> NodeView:
 
 
 def law_at(points: Points, laws: NamedTuple, p: Index) -> Tag:
-    """Load the law of point `p` with the parameters of its material."""
     return record(laws, index(points.material[p]))  # type: ignore[arg-type]
 
 
 def state_at(kin: Tag, points: Points, laws: NamedTuple, p: Index) -> tuple:
-    """Load law and state of point `p`."""
     law = law_at(points, laws, p)
     return law, load(points.state, p, initial_state(law, kin, points.mass[p]))
 
 
 def volume_of(kin: Tag, points: Points, law: Tag, state: tuple, p: Index) -> Number:
-    """Return the present volume of point `p`."""
     return points.mass[p] * specific_volume(law) * jacobian(law, kin, state)
 
 

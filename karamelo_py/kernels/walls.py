@@ -17,7 +17,6 @@ FRICTION = 3  # the program of the coefficient, after the components' programs
 
 @noinline
 def _is_free(held, programs, n, c):
-    """Return True if no fix holds node `n` in direction `c`."""
     return programs[c].begin < 0 and (held.size == 0 or held[n, c].slot == 0)
 
 
@@ -66,10 +65,7 @@ def rub(what, call, n, mu):
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Also stop the deforming velocity if friction stopped the node.
-
-    If it is mapped separately from v*, stress would do work on a spurious slip.
-    """
+    """Also stop the deforming velocity of a stuck node: stress would do work on a spurious slip."""
     d = kin.dimension
     for c in range(d):
         if programs[c].begin < 0 and nodes.update[n, c] != 0:

@@ -18,7 +18,7 @@ from karamelo_py.compiler.fields import field, load_vector
 from karamelo_py.compiler.lanes import added, of_present
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import totals
-from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws
+from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws, matter_of
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.records import put_at
@@ -67,9 +67,8 @@ def energies_of(kin, points, laws, p):
 
 
 @shared_out
-def _look_at_shares(kin, points, laws, tiling, firsts, k):
-    """Sum energies, mass and momentum of each tile of the k-th part in its report."""
-    points, laws, tiling = at_hand(points), at_hand(laws), at_hand(tiling)
+def _look_at_shares(matter, tiling, firsts, k):
+    (kin, points, laws), tiling = at_hand(matter), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
     for place in range(tiling.share[k], tiling.share[k + 1]):
         t = tiling.order[place]
@@ -91,8 +90,8 @@ def _look_at_shares(kin, points, laws, tiling, firsts, k):
 
 
 @kernel
-def _sum_energies(mode, kin, points, laws, tiling, control):
-    _look_at_shares(mode, tiling.count[1], kin, points, laws, tiling, control.firsts)
+def _sum_energies(mode, matter, tiling, control):
+    _look_at_shares(mode, tiling.count[1], matter, tiling, control.firsts)
     for t in range(tiling.count[0]):
         totals.add_to(control.totals, totals.KINETIC, tiling.report[t, ENERGIES])
         totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
@@ -100,7 +99,6 @@ def _sum_energies(mode, kin, points, laws, tiling, control):
 
 @kernel
 def _take_work(work, control):
-    """Add the work of forces on points to the work of loads on nodes."""
     for p in range(work.size):
         totals.add_to(control.totals, totals.WORK, float(work[0, p]))
         work[0, p] = 0
@@ -108,15 +106,11 @@ def _take_work(work, control):
 
 
 def sum_energies(s, mode):
-    """Sum kinetic, stored plus dissipated energy, and work, in the clock.
-
-    Rigid bodies have none: their motion is prescribed, and does work on other bodies.
-    """
+    """Sum kinetic, stored plus dissipated energy, and work, in the clock; of rigid bodies none."""
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
-        points = known_to_laws(block.points)
         if not is_rigid(block.laws):
-            _sum_energies(mode, s.kin, points, block.laws, block.tiling, s.control)
+            _sum_energies(mode, matter_of(s.kin, block), block.tiling, s.control)
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
             _take_work(work, s.control)
@@ -132,12 +126,12 @@ def take_energies(s):
 
 
 @kernel
-def _add_momenta(d, ids, masses, v, tiling, control):
+def _add_momenta(d, motion, tiling, control):
     """Add mass and momentum of each solid (1 + d) to the totals after the published values.
 
     Then elastic energy, and this times velocity, of all points.
     """
-    firsts, sums = control.firsts, control.answer
+    (ids, masses, v), firsts, sums = motion, control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
         for k in range(1 + d):
@@ -176,7 +170,7 @@ def _sum_drift(s):
     for block in s.blocks:
         points = block.points
         if not is_rigid(block.laws):
-            _add_momenta(d, points.id, points.mass, points.v, block.tiling, control)
+            _add_momenta(d, (points.id, points.mass, points.v), block.tiling, control)
     take_drift(s)
 
 

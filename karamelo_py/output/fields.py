@@ -14,8 +14,8 @@ from karamelo_py.kernels.arrays import (
     Points,
     Setup,
     arrays_of,
-    known_to_laws,
     made_of,
+    matter_of,
     some_of,
 )
 from karamelo_py.kernels.export import export
@@ -283,10 +283,9 @@ def _of_law(density: Callable) -> Callable:
     def energies(s: Setup, block: Block) -> np.ndarray | None:
         if not can(block.laws, density):
             return None
-        points = known_to_laws(block.points)
-        rows = np.zeros(len(points.id))
+        rows = np.zeros(len(block.points.id))
         if len(rows):
-            export(density.tag, True, s.kin, points, block.laws, rows)
+            export(density.tag, True, matter_of(s.kin, block), rows)
         return rows
 
     return energies

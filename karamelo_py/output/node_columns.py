@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.kernels.arrays import MASS, TIME, Block, known_to_laws, of_force, of_momentum
+from karamelo_py.kernels.arrays import MASS, TIME, Block, OnGrids, matter_of, of_force, of_momentum
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.export import EXPORTED, JACOBIAN, export_state, export_to_nodes
 from karamelo_py.kernels.hooks import CompiledHook
@@ -158,10 +158,10 @@ LOADS = "post_particles_to_grid"
 
 
 def _volume(simulation: Any, block: Block) -> np.ndarray:
-    points = known_to_laws(block.points)
-    rows = np.zeros((len(points.id), EXPORTED))
-    export_state(simulation.setup.kin, points, block.laws, rows)
-    return volumes_before(simulation.hub, points.id) * rows[:, JACOBIAN]
+    ids = block.points.id
+    rows = np.zeros((len(ids), EXPORTED))
+    export_state(matter_of(simulation.setup.kin, block), rows)
+    return volumes_before(simulation.hub, ids) * rows[:, JACOBIAN]
 
 
 def _force(axis: int, _: object, block: Block) -> np.ndarray | None:
@@ -191,7 +191,8 @@ def brought(simulation: Any, name: str) -> np.ndarray:
     for block, of in terms if largest > 0 else ():
         points = block.points
         where = points.x[simulation.now] if points.home is None else points.home
-        export_to_nodes(s.basis, s.kin, s.grids, points.grid, where, of, unit, out)
+        at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)
+        export_to_nodes(at, of, unit, out)
     return out
 
 

@@ -8,7 +8,16 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels import export
-from karamelo_py.kernels.arrays import TIMESTEP, Block, Points, Setup, known_to_laws, some_of
+from karamelo_py.kernels.arrays import (
+    TIMESTEP,
+    Block,
+    Matter,
+    OnGrids,
+    Points,
+    Setup,
+    known_to_laws,
+    some_of,
+)
 from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.language.scene import Scene
@@ -87,14 +96,14 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Numbers (n, *columns) by ``of(laws)(kin, points, laws, rows)``; 0 if it is None."""
+        """Numbers (n, *columns) by ``of(laws)(matter, rows)``; 0 if it is None."""
         local, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
             # Empty arrays have another type: another compilation.
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
-                fill(s.kin, points, part.block.laws, rows)
+                fill(Matter(s.kin, points, part.block.laws), rows)
                 local.append((part.places, rows.T))
         return self._filled(np.zeros((*columns, len(self.ids))), local)
 
@@ -277,7 +286,8 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
     moment = kept.copy()
     if s.transfer.traits.keeps_gradient:
         where = points.x[s.control.clock[0].now] if points.home is None else points.home
-        export.export_velocity_moment(s.basis, s.kin, s.grids, points.grid, where, kept, moment)
+        at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)
+        export.export_velocity_moment(at, kept, moment)
     if not s.frame.moves:
         export.move_moments(s.frame, s.kin, points, part.block.laws, moment)
     return moment

@@ -62,7 +62,7 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
         at, done, total = 0, 0, count * width
         while done < total:
             if not BYTEWISE:
-                done, at = write_rows(numbers[:count], integers, is_integer, done, text, at)
+                done, at = write_rows((numbers[:count], integers, is_integer), done, text, at)
                 if done == total:
                     break
             i, k = divmod(done, width)
@@ -74,14 +74,15 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 
 
 @kernel
-def write_rows(numbers, integers, is_integer, start, text, at):
+def write_rows(table, start, text, at):
     """Write numbers, row after row, until the end or one that is left to Python.
 
-    `numbers` (rows, columns) and `integers` view the same memory; `is_integer` (columns,) selects.
+    `table`: numbers (rows, columns), the same memory as integers, and which columns are integers.
     `start` is the index of the first number, along the rows. `text` has `NUMBER_BYTES` per number,
     and continues at `at`. Returns the index of the number left to Python (or their count), and the
     end of the text.
     """
+    numbers, integers, is_integer = table
     rows, columns = numbers.shape
     first = start % columns
     for i in range(start // columns, rows):

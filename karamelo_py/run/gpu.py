@@ -62,8 +62,7 @@ def as_rows(image: np.ndarray) -> np.ndarray:
     return as_strided(image.view(whole), (rows, image.shape[-1]), (step, image.itemsize))
 
 
-def _no_formula(*_):
-    """Evaluate nothing: the formulas of the hook are numbers."""
+def _no_formula(*_): ...
 
 
 class StepsOnCard:
@@ -170,7 +169,6 @@ class StepsOnCard:
         return [one for row in rows for one in take.find((type(row), Card))(row, self)]
 
     def _plain(self, rows: Iterable) -> Iterator[Any]:
-        """Yield the rows of the scene; repeated ones one after another."""
         for row in table.plain(rows, self.s):
             if isinstance(row, table.Repeated):
                 for k in range(row.count(self.s)):
@@ -179,14 +177,12 @@ class StepsOnCard:
                 yield row
 
     def gathers(self, row: Any) -> Iterator[KernelLaunch]:
-        """Yield the launches of a gather."""
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
             yield self.of_points(self.visits[id(row)].gather, block, cells)
         if row.reported:
             yield self.launch(gpu.take_reports(row.reported), 1, self.s)
 
     def scatters(self, row: Any) -> Iterator[KernelLaunch]:
-        """Yield the launches of a scatter."""
         s, visit = self.s, self.visits[id(row)]
         pairs = list(zip(s.blocks, self.cells, strict=True))
         if not row.gathers:
@@ -248,7 +244,6 @@ class StepsOnCard:
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
     def _has_formulas(self, h: int) -> bool:
-        """Return True for a hook with formulas that are not numbers."""
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
@@ -258,7 +253,6 @@ class StepsOnCard:
         return 1 + max(self._slots_read(), default=0)
 
     def _slots_read(self) -> list[int]:
-        """List the published values that formulas read."""
         return [int(slot) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL]
 
     def hooks_on_nodes(
@@ -292,7 +286,6 @@ class StepsOnCard:
         return tag
 
     def _act(self, function: Callable, h: int, s: arrays.Setup, *tag: arrays.Tag) -> KernelLaunch:
-        """Launch a function of the members of a hook on nodes."""
         about, called = fixes.Act(self.hooks, h, self.heavy, self.copies), self._called(h)
         row = self.table[h]
         count = self.nodes if row.begin < 0 else int(row.end - row.begin)
@@ -319,7 +312,6 @@ class StepsOnCard:
             yield from self._publish_at_once(h)
 
     def work_of_loads(self) -> Iterator[KernelLaunch]:
-        """Yield the launch that sums the work of loads on nodes."""
         if len(self.table) and self.hooks.loads.size:
             about = fixes.Act(self.hooks, 0, self.heavy, self.copies)
             called = self._called(0)
@@ -328,12 +320,10 @@ class StepsOnCard:
     # --- totals, and the energy monitor
 
     def _rows_of(self, h: int) -> tuple[int, int]:
-        """Return the range of rows of totals that a hook publishes."""
         row = self.table[h]
         return int(row.slot), int(row.slot) + max(3, int(row.totals))
 
     def _slots(self) -> tuple[int, int]:
-        """Return the range of rows of totals that all hooks publish."""
         rows = [self._rows_of(h) for h, row in enumerate(self.table) if row.slot >= 0]
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 

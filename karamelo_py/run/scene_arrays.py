@@ -15,7 +15,7 @@ from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.node_updates import SumsToVelocity
 from karamelo_py.kernels.heat import SHOW, Conducting
 from karamelo_py.kernels.step import take_rows
-from karamelo_py.kernels.sweep import Visit, sweep, sweep_nodes
+from karamelo_py.kernels.sweep import Extent, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.output.fields import Fields
@@ -217,7 +217,9 @@ class SceneArrays:
         self.sort_if_due()
         s = self.setup
         dt = step_size(s)
-        sweep(s, self.mode, Visit((), SUMS.quantities, SUMS.weights), dt, False, True, False)
+        sweep(
+            s, self.mode, Visit((), SUMS.quantities, SUMS.weights), Extent(dt, False, True, False)
+        )
         all_well(s)
         sweep_nodes(self.mode, SumsToVelocity(), s, dt)
         if isinstance(s.heat, Conducting):

@@ -151,7 +151,8 @@ class Tiles:
         """Bound the distance in cells from present positions to nodes, until the next sort."""
         far = 0.0
         if len(x) > self.dimension:
-            far = sorting.widest(s.kin, s.basis, s.grids, x, block.points.grid)
+            at = kernel_arrays.OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
+            far = sorting.widest(at)
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
@@ -164,8 +165,8 @@ class Tiles:
     def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
-        kin, of = planar(s.kin), points.grid
-        sorting.find_tiles(self.mode, len(ends), kin, s.grids, self._cut, x, of, ends, tile)
+        at = kernel_arrays.OnGrids((), planar(s.kin), s.grids, points.grid, x)
+        sorting.find_tiles(self.mode, len(ends), at, self._cut, ends, tile)
         return tile
 
     def _sort_block(self, s: kernel_arrays.Setup, block: kernel_arrays.Block) -> np.ndarray:
@@ -191,9 +192,10 @@ class Tiles:
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = float(first_node(s.basis, s.grids.h[0]))
         around = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
-        kin, of, ids = planar(s.kin), points.grid, points.id
+        at = kernel_arrays.OnGrids((), planar(s.kin), s.grids, points.grid, x)
+        by = sorting.SortKeys(self._cut, around, points.id)
         rows = addresses_of_rows(array for _, array in kernel_arrays.arrays_of(points))
-        sorting.sort_points(mode, kin, s.grids, around, self._cut, x, of, ids, result, rows)
+        sorting.sort_points(mode, at, by, result, rows)
         ends = result.ends[-1]
         begins = np.append(0, ends[:-1])
         occupied = np.flatnonzero(ends > begins)
@@ -206,7 +208,7 @@ class Tiles:
         tiling.grid[:count] = np.searchsorted(self.first, occupied, side="right") - 1
         tiling.box[:count] = np.concatenate(result.boxes[:, occupied], axis=1)
         if self._most_in_box:
-            sorting.find_rows(mode, parts, s.kin, s.grids, around, x, tiling, parts)
+            sorting.find_rows(mode, parts, at, around, tiling, parts)
         return occupied
 
     def box_bytes(self, s: kernel_arrays.Setup) -> int:

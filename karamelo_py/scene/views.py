@@ -16,7 +16,11 @@ from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations.heat import Supply, Temperature
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.move import VelocityBefore
-from karamelo_py.kernels.export import export_velocity_moment, impose_stress, impose_temperature
+from karamelo_py.kernels.export import (
+    export_velocity_moment,
+    impose_stress,
+    impose_temperature,
+)
 from karamelo_py.kernels.hook_loop import corners_that_move
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.ranks import Linked
@@ -421,7 +425,8 @@ class PointsView(View):
                 x = np.ascontiguousarray(x[:, rows])
                 gradients, grid = moment, points.grid[rows]
                 moment = np.zeros_like(gradients)
-                export_velocity_moment(s.basis, s.kin, s.grids, grid, x, gradients, moment)
+                at = arrays.OnGrids(s.basis, s.kin, s.grids, grid, x)
+                export_velocity_moment(at, gradients, moment)
             kept[here, rows] = moment[here]
 
     def set_stress(self, components: dict[str, np.ndarray]) -> None:
@@ -439,7 +444,8 @@ class PointsView(View):
                 chosen[rows] = True
                 stress = np.zeros((len(points.id), len(names)), values.dtype)
                 stress[rows] = values[places]
-                impose_stress(s.kin, points, block.laws, chosen, flags, stress)
+                matter = arrays.Matter(s.kin, points, block.laws)
+                impose_stress(matter, chosen, flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
         """Set temperatures (n,)."""

@@ -124,10 +124,7 @@ def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
 
 @point_function()
 def updated(task: Tag, pt: PointView, total: tuple, totals: tuple, fastest: Number) -> Report:
-    """Store the update from `total`, one of the `totals` of the visit.
-
-    The reported rate is the larger of the point's and `fastest`.
-    """
+    """Store the update from `total`; report the larger of the point's rate and `fastest`."""
 
 
 @point_function()
@@ -142,10 +139,7 @@ def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
 
 @point_function()
 def affine_part(quantity, w, stencil, load):
-    """Return (array, first component, value at the first node, increments per node), or ().
-
-    One increment per direction, or none if all nodes get the same.
-    """
+    """Return (array, first component, value at the first node, increments per node), or ()."""
 
 
 def _register(own: Any) -> None:
@@ -197,7 +191,6 @@ def _at_first(w, stencil, value, slopes):
 
 
 def _joined(parts):
-    """Join values and increments of sums into one record, with zeros for constants."""
     values = flat([value for value, _ in parts])
     growing = [growths for _, growths in parts if len(growths)]
     if not growing:

@@ -24,10 +24,7 @@ class VolumeRatio(StepField):
 
 
 class NodalMean(SummedField):
-    """Weighted sum of values, and sum of weights, at a node; then the mean.
-
-    Volume ratios weighted with volumes (F-bar); temperatures weighted with conductance.
-    """
+    """Weighted sum and weights at a node, then the mean: of volume ratios, of temperatures."""
 
     shape = pair
 
@@ -158,10 +155,7 @@ def gathered_ratio(node, total):
 
 
 def averaged(pt, dl, ratio):
-    """Give `dl` the averaged volume change, if there is one.
-
-    In the total frame `dl` is dt Fdot, and F + dl is scaled.
-    """
+    """Give `dl` the averaged volume change; in the total frame dl = dt Fdot, F + dl is scaled."""
     if not len(ratio):
         return dl
     _, _, f = pt.law_state_F

@@ -111,10 +111,7 @@ def energy_of(mass, momentum):
 
 
 def warm(pt, v):
-    """Heat a point by the energy it lost on the way to the nodes and back.
-
-    `v` is the nodal velocity at the point before the update.
-    """
+    """Heat a point by the energy it lost to the nodes and back; `v` is their velocity before."""
     if field(pt.w.nodes.fields, EnergyLoss) is not None:
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
         for node in pt.nodes:
@@ -146,17 +143,13 @@ def in_company(pt, moment):
 
 
 def _heat(pt, gone):
-    """Heat a point by an energy per mass."""
     law, state = pt.law_and_state
     warmed = laws.warmed(law, pt.kin, state, gone / laws.specific_volume(law))
     store(pt.w.points.state, pt.p, warmed)
 
 
 def reflect(pt, term, k):
-    """Subtract `term`, the k-th of XPIC's series, from the remainder at a point.
-
-    Also sums the energy lost by that (see the module).
-    """
+    """Subtract `term`, the k-th of XPIC's series, from the remainder; sum the energy lost."""
     reflected = pt.of(Reflected)
     if reflected is not None:
         v = pt.v
@@ -173,7 +166,6 @@ def reflect(pt, term, k):
 
 
 def _spread(pt, term):
-    """Sum N_i |w_i - term|^2 of the present term w of XPIC's series."""
     spread = term[0] - term[0]
     for node in pt.nodes:
         spread += node.N * (term_at(node, term) - term).squared()

@@ -79,7 +79,6 @@ class Move(Task):
 
 
 def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
-    """Return True if domain corners are gathered and move with their velocity."""
     return isinstance(basis, AtCorners) and carried(basis.basis, kin) > 0
 
 

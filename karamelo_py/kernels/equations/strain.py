@@ -121,7 +121,6 @@ def increment(dt, grad_v):
 
 
 def _deform_domain(task, pt, growth):
-    """Deform the domain of a point; return its further reach in cells."""
     w = pt.w
     x = w.places.y if isinstance(task, SecondStrain) else w.places.x
     before = place_at(w.basis, w.kin, x, pt.p)
@@ -137,10 +136,7 @@ def further_reach(basis, kin, grid, before, after):
 
 
 def _fastest_wave(pt, material, fastest):
-    """Return the larger of `fastest` and c + max |v_i - common_i| of a point.
-
-    `material` is law, state and F. c is computed only if a bound exceeds `fastest`.
-    """
+    """Return the larger of `fastest` and c + max |v_i - common_i|; c only if a bound is larger."""
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter

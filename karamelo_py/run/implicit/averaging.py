@@ -7,8 +7,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.kernels import implicit_averaging as loops
-from karamelo_py.kernels.arrays import known_to_laws
-from karamelo_py.kernels.implicit import PARTS
+from karamelo_py.kernels.arrays import matter_of
+from karamelo_py.kernels.implicit import PARTS, Blocks
 
 
 class AveragedVolumes:
@@ -20,7 +20,7 @@ class AveragedVolumes:
     def _parts(self) -> Iterator[tuple]:
         e = self.equations
         return (
-            (known_to_laws(block.points), block.laws, seen, response, averages)
+            (matter_of(e.s.kin, block), seen, response, averages)
             for block, (seen, response), averages in zip(
                 e.blocks, e.parts, self.averages, strict=True
             )
@@ -28,13 +28,13 @@ class AveragedVolumes:
 
     def _sums(self, name: str) -> np.ndarray:
         sums = np.zeros(len(self.equations.nodes))
-        for _, _, seen, _, averages in self._parts():
+        for _, seen, _, averages in self._parts():
             loops.sum_at_nodes(self.mode, PARTS, seen, getattr(averages, name), sums)
         return sums
 
     def _grow(self) -> None:
-        for points, laws, _, response, averages in self._parts():
-            loops.grow(self.mode, PARTS, self.equations.s.kin, points, laws, response, averages)
+        for matter, _, response, averages in self._parts():
+            loops.grow(self.mode, PARTS, matter, response, averages)
         self.volume = self._sums("volume")
         self.volume[self.volume == 0] = 1.0
 
@@ -42,21 +42,20 @@ class AveragedVolumes:
         """Compute the stresses after the increments of the points, and their derivatives."""
         self._grow()
         ratios = self._sums("grown") / self.volume
-        for points, laws, seen, response, averages in self._parts():
+        for matter, seen, response, averages in self._parts():
             loops.average(self.mode, PARTS, seen, ratios, averages.ratio)
-            kin = self.equations.s.kin
-            loops.respond_averaged(self.mode, PARTS, kin, points, laws, dt, response, averages)
+            loops.respond_averaged(self.mode, PARTS, matter, dt, response, averages)
         self._bring_mean()
 
     def keep_stress(self) -> None:
-        for points, laws, _, response, averages in self._parts():
-            loops.keep_averaged_stress(self.equations.s.kin, points, laws, response, averages)
+        for matter, _, response, averages in self._parts():
+            loops.keep_averaged_stress(matter, response, averages)
         self._grow()
         self._bring_mean()
 
     def _bring_mean(self) -> None:
         means = self._sums("pressure") / self.volume
-        for _, _, seen, response, averages in self._parts():
+        for _, seen, response, averages in self._parts():
             loops.average(self.mode, PARTS, seen, means, averages.mean)
             loops.bring_mean(self.mode, PARTS, self.equations.s.kin, response, averages)
 
@@ -65,9 +64,9 @@ class AveragedVolumes:
         e = self.equations
         columns = (e.pairs[1][:, None] * e.d + np.arange(e.d)).ravel()
         data = np.zeros(len(columns))
-        for _, _, seen, _, averages in self._parts():
+        for _, seen, _, averages in self._parts():
             tensors = getattr(averages, name)
-            loops.add_slopes(self.mode, PARTS, e.s.kin, seen, tensors, e.layout, data)
+            loops.add_slopes(self.mode, PARTS, e.s.kin, seen, tensors, Blocks(e.layout, data))
         m = len(e.nodes)
         return sp.csr_matrix((data, columns, e.d * e.layout.first), (m, m * e.d))
 
@@ -76,7 +75,7 @@ class AveragedVolumes:
         e, m = self.equations, len(self.equations.nodes)
         S = sp.diags(1 / self.volume) @ self._matrix("cofactors")
         data = np.zeros(len(e.pairs[1]))
-        for _, _, seen, _, averages in self._parts():
-            loops.add_products(self.mode, PARTS, seen, averages.stiffness, e.layout, data)
+        for _, seen, _, averages in self._parts():
+            loops.add_products(self.mode, PARTS, seen, averages.stiffness, Blocks(e.layout, data))
         Z = sp.csr_matrix((data, e.pairs[1], e.layout.first), (m, m))
         return self._matrix("by_ratio").T @ S + S.T @ (self._matrix("of_pressure") + Z @ S)

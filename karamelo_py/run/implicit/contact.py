@@ -13,7 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import TIMESTEP
-from karamelo_py.kernels.contact import list_pairs
+from karamelo_py.kernels.contact import Bodies, ListedPairs, list_pairs
 from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
@@ -39,7 +39,8 @@ class Contact:
         room = len(nodes) * len(tag.slot)
         pairs, gap = np.zeros((room, 2), np.int64), np.zeros(room)
         normal = np.zeros((room, self.d))
-        count = list_pairs(tag, s.kin, s.grids, s.nodes, s.spans, pairs, normal, gap)
+        listed = ListedPairs(pairs, normal, gap)
+        count = list_pairs(Bodies(tag, s.kin, s.nodes), s.grids, s.spans, listed)
         # Nodes with almost no mass sustain nothing: contact would only disturb them.
         shares = self._shares()[equations.number_of(pairs[:count])].min(1)
         chosen = np.flatnonzero(shares >= LIGHT)

@@ -12,7 +12,7 @@ from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import implicit as loops
-from karamelo_py.kernels.arrays import MASS, Block, Setup, Tag, known_to_laws
+from karamelo_py.kernels.arrays import MASS, Block, Matter, OnGrids, Setup, Tag, matter_of
 from karamelo_py.kernels.equations.fbar import FBar
 from karamelo_py.kernels.equations.heat import Conductance
 from karamelo_py.points.kinematics import Axisymmetric
@@ -104,18 +104,11 @@ class Equations:
     def _seen(self, block: Block) -> tuple[loops.Seen, loops.Response]:
         s = self.s
         seen, response = loops.nothing_seen(s, block)
-        loops.see(
-            self.mode,
-            loops.PARTS,
-            s.frame,
-            s.kin,
-            s.basis,
-            s.grids,
-            block.points,
-            block.laws,
-            int(s.control.clock[0].now),
-            seen,
-        )
+        points, now = block.points, s.control.clock[0].now
+        where = points.x[now] if s.frame.moves else points.home
+        at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)
+        matter = Matter(s.kin, points, block.laws)
+        loops.see(self.mode, loops.PARTS, s.frame, at, matter, seen)
         return seen, response
 
     def _led(self, tools: list[tuple[Block, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
@@ -195,8 +188,7 @@ class Equations:
             self.averaged.respond(dt)
         else:
             for block, (_, response) in zip(self.blocks, self.parts, strict=True):
-                points = known_to_laws(block.points)
-                loops.respond(self.mode, loops.PARTS, s.kin, points, block.laws, dt, response)
+                loops.respond(self.mode, loops.PARTS, matter_of(s.kin, block), dt, response)
         return self._forces()
 
     def _forces(self) -> np.ndarray:
@@ -235,7 +227,7 @@ class Equations:
             self.averaged.keep_stress()
         else:
             for block, (_, response) in zip(self.blocks, self.parts, strict=True):
-                loops.keep_stress(self.s.kin, block.points, block.laws, response.stress)
+                loops.keep_stress(Matter(self.s.kin, block.points, block.laws), response.stress)
         return self._forces()
 
     def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -269,20 +261,19 @@ class Equations:
         blocks[:] = 0
         alone = ~self.deforming[self.pairs[0]] & (self.pairs[0] == self.pairs[1])
         blocks[alone] = np.eye(d)  # sums of matrices drop blocks of zeros
-        into = self.layout, blocks.reshape(-1, d * d)
+        into = loops.Blocks(self.layout, blocks.reshape(-1, d * d))
         for k, (block, (seen, response)) in enumerate(zip(self.blocks, self.parts, strict=True)):
             n, done = block.points.mass.size, np.zeros(len(self.nodes), np.int64)
             if self.averaged is not None:
-                tangent = self.averaged.averages[k].tangent
-                loops.add_stiffness(self.mode, loops.PARTS, kin, seen, tangent, 0, n, done, *into)
+                some = loops.Tangent(0, n, self.averaged.averages[k].tangent, done)
+                loops.add_stiffness(self.mode, loops.PARTS, kin, seen, some, into)
                 continue
-            points = known_to_laws(block.points)
+            matter = matter_of(kin, block)
             tangent = rows_of_points((t * t, min(n, AT_ONCE)), np.float64)
             for first in range(0, n, AT_ONCE):
-                some = first, min(first + AT_ONCE, n)
-                of = points, block.laws, dt, response, *some, tangent
-                loops.respond_to_changes(self.mode, loops.PARTS, kin, *of)
-                loops.add_stiffness(self.mode, loops.PARTS, kin, seen, tangent, *some, done, *into)
+                some = loops.Tangent(first, min(first + AT_ONCE, n), tangent, done)
+                loops.respond_to_changes(self.mode, loops.PARTS, matter, dt, response, some)
+                loops.add_stiffness(self.mode, loops.PARTS, kin, seen, some, into)
         if ghost is not None:
             m = len(self.nodes)
             rows = np.repeat(np.arange(m), np.diff(ghost.indptr))

@@ -8,7 +8,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
-from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels.arrays import Block, Matter
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.rules import gain
@@ -108,8 +108,8 @@ class PairContact(Gripping):
         s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
-            x = block.points.x[simulation.now]
-            pairs.extend(s.kin, x, block.points, block.laws, *self._ranges, extents)
+            x, ids = block.points.x[simulation.now], pairs.OneOfTwo(*self._ranges)
+            pairs.extend(Matter(s.kin, block.points, block.laws), x, ids, extents)
         extents = simulation.comm.allreduce_max(extents)
         width = min(extents[:, 6].sum(), self._reach)
         low, high = -extents[:, :d].min(axis=0) - width, extents[:, 3 : 3 + d].min(axis=0) + width
@@ -118,15 +118,16 @@ class PairContact(Gripping):
         near = []
         for block in s.blocks:
             x, rows = block.points.x[simulation.now], np.empty(block.points.id.size, np.int64)
-            count = pairs.pick(s.kin, x, block.points, *self._ranges, low, high, rows)
+            matter, ids = Matter(s.kin, block.points, block.laws), pairs.OneOfTwo(*self._ranges)
+            count = pairs.pick(matter, x, ids, np.stack([low, high]), rows)
             near.append(rows[:count].copy())
         return near
 
     @staticmethod
     def _known(simulation: Any, block: Block, rows: np.ndarray, grip: Any) -> np.ndarray:
-        kin, x = simulation.kin, block.points.x[simulation.now]
-        table = np.empty((len(rows), 3 + 2 * kin.dimension))
-        pairs.collect(kin, x, block.points, block.laws, rows, table)
+        table = np.empty((len(rows), 3 + 2 * simulation.kin.dimension))
+        matter = Matter(simulation.kin, block.points, block.laws)
+        pairs.collect(matter, block.points.x[simulation.now], rows, table)
         return table if grip is None else np.concatenate([table, grip[:, rows].T], axis=1)
 
     def _push(
@@ -137,16 +138,17 @@ class PairContact(Gripping):
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
         order = np.lexsort((of_all[:, 0], second))
-        n, total = len(order), np.zeros(3)
+        n = len(order)
         of_all = of_all[order]
         _, mass, radius = np.ascontiguousarray(of_all[:, :3].T)
         x, v, grip = map(np.ascontiguousarray, np.split(of_all[:, 3:], [d, 2 * d], axis=1))
         bodies = pairs.TwoBodies(x, v, mass, radius, np.zeros((n, d)), grip, n - int(second.sum()))
-        pairs.push_apart(self.law(), kin, bodies, pairs.cells_for(n), self._reach, *times, total)
+        cells = pairs.cells_for(n)
+        pairs.push_apart(pairs.Push(self.law(), kin, self._reach, *times), bodies, cells)
         force = np.empty((n, d + grip.shape[1]))
         force[order] = np.concatenate([bodies.force, bodies.grip], axis=1)
         ends = np.cumsum([len(one) for one in tables])[:-1]
-        return [(rows, total) for rows in np.split(force, ends)]
+        return [(rows, cells.total) for rows in np.split(force, ends)]
 
 
 gain(

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.rubbing import rub_points
+from karamelo_py.kernels.rubbing import Rubbing, rub_points
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.views import PointsView
 from karamelo_py.styles.fixes.grip import GripOfTool, Gripping
@@ -55,7 +55,8 @@ class StiffTool(Gripping, ToolFix):
             slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
             stop = points.contact_dt * one * slip
             hold, rubbed = before[:, : d + 2].copy(), force[near]
-            rub_points(KINEMATICS[d](), self.mu, normal[near], load[near], pull, stop, hold, rubbed)
+            rubbing = Rubbing(normal[near], load[near], pull, stop)
+            rub_points(KINEMATICS[d](), self.mu, rubbing, hold, rubbed)
             force[near] = rubbed
             grip[:] = 0
             grip[near, : d + 2], grip[near, d + 2 :] = hold, seen[near]
