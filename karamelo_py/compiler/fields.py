@@ -98,7 +98,7 @@ class SummedField(StepField):
 
 
 def name_of(kind: type) -> str:
-    """Name of a field: its class name in lower case."""
+    """Class name of a field in lower case words."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
@@ -116,7 +116,7 @@ def columns_of(kind: type) -> tuple[str, ...]:
 
 
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
-    """Fields declared by `owners` in ``point_fields`` or ``node_fields``, each once."""
+    """Fields in ``point_fields`` or ``node_fields`` of `owners`, each once."""
     return tuple(dict.fromkeys(kind for owner in owners for kind in getattr(owner, attribute, ())))
 
 
@@ -183,7 +183,7 @@ def _start(kind: type, kin: Any, real: type) -> np.ndarray:
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
-    """Zeros (count, width) for nodes; untouched pages use no memory, records do not cross lines."""
+    """Zeros (count, width) for nodes; unused pages take no memory, records cross no lines."""
     room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
     first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
@@ -220,7 +220,7 @@ def load(array, p, like):
 
 
 def store(array, p, values):
-    """Set components 0, 1, ... of point `p` to `values`, unless `array` is None."""
+    """Set components of point `p` to `values`, unless `array` is None."""
     store_from(array, p, 0, values)
 
 
@@ -233,7 +233,7 @@ def store_from(array, p, first, values):
 
 
 def increase(array, p, values):
-    """Add `values` to components 0, 1, ... of point `p`, unless `array` is None."""
+    """Add `values` to components of point `p`, unless `array` is None."""
     if array is not None:
         for k, value in enumerate(values):
             array[k, p] += value
@@ -310,7 +310,7 @@ def pick_items(
 
 
 def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
-    """Set item p of such a row to ``room[c, p]``, for p from `begin` to `end`."""
+    """Set item p of a row to ``room[c, p]``, for p from `begin` to `end`."""
     row = _row(address, like, end)
     for p in range(begin, end):
         row[index(p)] = room[c, p]

@@ -33,7 +33,7 @@ def _refuse_of_others(about: os.stat_result) -> None:
 
 
 def _guard(directory: Path) -> None:
-    """Refuse a folder that others can write to; close this user's folders to others."""
+    """Refuse a folder that others can write to; close this user's folders."""
     for one in (directory, directory.parent):
         about = one.stat()
         if about.st_mode & stat.S_ISVTX:  # others may not delete files there
@@ -64,7 +64,7 @@ _reporter = contextvars.ContextVar[Callable[[str], None]]("reporter", default=_w
 
 
 def report(text: str) -> None:
-    """Tell the user of a problem, by `telling` or as a warning of Python."""
+    """Tell the user of a problem, by `telling` or as a warning."""
     _reporter.get()(text)
 
 
@@ -74,7 +74,7 @@ def report_error(error: OSError) -> None:
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Report problems with the folder through `tell`, once, within this context."""
+    """Report problems through `tell`, once, within this context."""
     texts: list[str] = []
 
     def tell_once(text: str) -> None:

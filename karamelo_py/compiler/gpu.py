@@ -74,7 +74,7 @@ def _largest(array, i, value):
 
 
 def raise_to(array: np.ndarray, i: int, value: float) -> None:
-    """Set a non-negative double of an array to the maximum of it and `value`, atomically."""
+    """Set a non-negative double to the maximum of it and `value`, atomically."""
     array[i] = max(array[i], value)
 
 
@@ -86,7 +86,7 @@ def _raise_to(array, i, value):
 
 @intrinsic
 def aligned_record(array, i, count):
-    """Read the first `count` numbers of record `i`, aligned to 16 bytes, or to its size if less."""
+    """Read `count` numbers of record `i`, aligned to 16 bytes, or its size if less."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(array.dtype, count.literal_value)
@@ -193,7 +193,7 @@ def text_of(
 
 
 def numbers_of(function: Callable, arguments: tuple) -> int:
-    """Count the numbers that a thread function returns for its further arguments."""
+    """Count the numbers that a thread function returns."""
     kinds = plan_for(arguments).types
     with in_one({}):
         return len(traced(function, (*kinds, types.int64)).result)
@@ -224,7 +224,7 @@ class Code(NamedTuple):
 
 
 class _Coded:
-    """Caches the code of thread functions in memory and on disk."""
+    """Caches code of thread functions in memory and on disk."""
 
     on_card: bool
     processor: str
@@ -265,7 +265,7 @@ class _Coded:
 
 
 class Emulator(_Coded):
-    """Runs thread functions on the processor, in separate memory."""
+    """Runs thread functions on the processor."""
 
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
@@ -495,7 +495,7 @@ class Images:
     """Arrays of the program with copies in device memory.
 
     An image is a NumPy array at a device address: kernels get its description, and the program
-    never reads or writes its items.
+    never accesses its items.
     """
 
     def __init__(self, card: Any):
@@ -564,7 +564,7 @@ class Images:
 
 
 class KernelLaunch:
-    """A thread function with its arguments on a GPU, run by `count` threads."""
+    """A thread function with its arguments, run by `count` threads."""
 
     def __init__(
         self, images: Images, function: Callable, count: int, *arguments: Any,

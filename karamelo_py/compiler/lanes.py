@@ -88,7 +88,7 @@ def _first(a):
 
 @shared
 def added(total: float, value: float) -> float:
-    """Add a value to `total`; lanes are added one after another, like numbers."""
+    """Add a value to `total`; lanes one after another, like numbers."""
     return total + value
 
 
@@ -116,7 +116,7 @@ implements(beside)(lambda first, steps: types.uint64(first + steps))
 
 @shared
 def of_present(p: int, value: float) -> float:
-    """Return `value`, with 0 in the lanes of a group that have no point."""
+    """Return `value`, with 0 in the lanes of a group without a point."""
     return value
 
 
@@ -128,7 +128,7 @@ def is_one(number: int) -> bool:
 
 @shared
 def prefetch(array: Any, at: tuple) -> None:
-    """Prefetch items that a loop over groups of points will read after this one."""
+    """Prefetch items that the next iterations over groups will read."""
 
 
 class LaneGroup(LaneType):
@@ -167,7 +167,7 @@ def lanes_for(bits: int) -> type:
 
 @intrinsic
 def group(tag, first, count):
-    """Make a group of the `count` points from `first` on, at most as many as the tag's lanes."""
+    """Make a group of `count` points from `first` on."""
     made = LaneGroup(tag.instance_class.width)
 
     def codegen(builder, _, *numbers):
@@ -183,7 +183,7 @@ def spread(tag, value):
 
 
 def room_for(points, numbers):
-    """Temporary array (components, points) for such numbers, on the stack of the function."""
+    """Array (components, points) for such numbers on the stack."""
     return np.zeros((len(numbers), points), np.asarray(numbers[0]).dtype)
 
 
@@ -351,7 +351,7 @@ def _prefetch(array, at):
 
 
 def at_lane(builder, kind, array, of, at, k, *rest):
-    """Return the address of an item whose first index is lane `k` of nodes `at`, or number `at`."""
+    """Return the address of an item at lane `k` of nodes `at`, or at number `at`."""
     if not lanes_of(of):
         return llvm.item_pointer(builder, kind, array, [at, *rest])
     steps = None

@@ -21,7 +21,7 @@ class LaneType(types.Type):
 
 
 class Lanes(LaneType):
-    """`width` numbers of a scalar type, side by side in a vector register."""
+    """`width` numbers of a scalar type in a vector register."""
 
     def __init__(self, scalar: types.Type, width: int):
         self.scalar, self.width = scalar, width
@@ -70,7 +70,7 @@ def is_empty(kind: types.Type) -> bool:
 
 
 def nothing() -> ir.Constant:
-    """Return the value of None, of classes and of functions."""
+    """Return the value of None, classes and functions."""
     return ir.Constant(NOTHING, None)
 
 
@@ -128,7 +128,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
 
 
 def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
-    """Name the instruction that converts a number; None if there is nothing to do."""
+    """Name the instruction that converts a number, or None."""
     whole, real = types.Integer | types.Boolean, types.Float
     signed = isinstance(kind, types.Integer) and kind.signed
     width = kind.bitwidth if isinstance(kind, types.Integer | real) else 1
@@ -183,7 +183,7 @@ def overloaded(kind: ir.Type) -> str:
 
 
 def room(builder: ir.IRBuilder, kind: ir.Type) -> ir.Value:
-    """Allocate stack memory of the present function, once for all iterations of a loop."""
+    """Allocate stack memory, once for all iterations of a loop."""
     with builder.goto_entry_block():
         return builder.alloca(kind)
 
@@ -322,7 +322,7 @@ def of_library(name: str) -> Callable:
 
 @contextmanager
 def counted(builder: ir.IRBuilder, count: ir.Value) -> Iterator[Any]:
-    """Write a loop over the numbers below `count`; its body is written within this context."""
+    """Write a loop over the numbers below `count`, around this context."""
     before = builder.block
     head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))
     builder.branch(head)

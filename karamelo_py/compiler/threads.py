@@ -55,7 +55,7 @@ class Threaded(NamedTuple):
 
 
 def many_threads() -> bool:
-    """Tell whether many threads may write to one number at a time, as on a GPU."""
+    """Tell whether many threads may write to one number, as on a GPU."""
     return False
 
 
@@ -165,7 +165,7 @@ if hasattr(os, "register_at_fork"):
 def _share_out(
     count: int, run_range: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
-    """Run a task for each index below `count`, by `part`, a function of a range of indices.
+    """Run a task for each index below `count` by a function of ranges.
 
     `threads` is the number of threads; 0 for all.
     """
@@ -212,7 +212,7 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
-    """Store items; return the addresses of a function of them and an index, and of the items."""
+    """Store items; return addresses of a function of them and an index, and of the items."""
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     chosen = traced(function.seen, (*kind, types.intp))
     stored = held_as(lowering, items, kind)
@@ -234,7 +234,7 @@ def _call(task, arguments, number):
 
 @in_kernels
 def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
-    """Call a function whose exceptions are left to the caller of the present one."""
+    """Call a function whose exceptions are left to the caller."""
     lowering.regardless = True
     try:
         return function(*arguments)
@@ -249,7 +249,7 @@ def _do_part(task, arguments, begin, end):
 
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
-    """Run a task for each index below `count`, by a thread pool (`_share_out`)."""
+    """Run a task for each index below `count` by a thread pool."""
     chosen = traced(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
@@ -283,7 +283,7 @@ _LEFT = (1 << 32) - 1  # of a ticket: the remaining indices; the upper bits are 
 
 
 def new_team(threads: int) -> np.ndarray:
-    """Make the shared memory of a team; its address goes into `Threaded`."""
+    """Make the shared memory of a team, for `Threaded`."""
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words

@@ -1,4 +1,4 @@
-"""Arguments of kernels: Python writes them to memory, and passes one address."""
+"""Arguments of kernels: words in memory, passed as one address."""
 
 import ctypes
 import functools
@@ -18,7 +18,7 @@ from karamelo_py.compiler.trace.session import session
 
 
 class _Array(NamedTuple):
-    """A living array; NumPy does not resize arrays that are referenced."""
+    """A living array; NumPy does not resize referenced ones."""
 
     alive: weakref.ref  # another array may get the id of a deleted one
     shape: tuple[int, ...]
@@ -62,7 +62,7 @@ def forget_array(array: np.ndarray) -> None:
 
 
 class Address(int):
-    """Address of a Python function for kernels; the function lives as long as this number."""
+    """Address of a Python function, which lives as long as this number."""
 
     callback: Any
 
@@ -77,7 +77,7 @@ class Plan(NamedTuple):
 
 
 class ArgumentBuffer:
-    """Collects the words of arguments: held tuples one after another, inner first."""
+    """Words of arguments: held tuples one after another, inner first."""
 
     __slots__ = ("kinds", "words")
 
@@ -171,7 +171,7 @@ def plan_for(arguments: tuple) -> Plan:
     end = 0
 
     def lay(kind: Any) -> int:
-        """Return the offset of a held tuple, which follows the tuples in it."""
+        """Return the offset of a held tuple, which follows its inner tuples."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in kind]
         model = kind.register_type().pointee
@@ -193,7 +193,7 @@ def plan_for(arguments: tuple) -> Plan:
 
 
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
-    """Return the bytes of a result, and a function that reads it."""
+    """Return the size of a result in bytes, and a function that reads it."""
     places: list[tuple[int, str]] = []
     size, _ = _lay(llvm.memory_type(kind), 0, places)
 

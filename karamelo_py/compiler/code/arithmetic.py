@@ -58,7 +58,6 @@ def _wider(a: types.Type, b: types.Type) -> types.Type:
 
 
 def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
-    """Return the common type of lanes and numbers; literals adapt."""
     if isinstance(a, Lanes) and isinstance(b, Lanes):
         if a == b:
             return a
@@ -196,7 +195,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
 
 
 def _real_parts(builder: ir.IRBuilder, kind: types.Float, x: ir.Value, y: ir.Value) -> tuple:
-    """Divide like Python's floats (Objects/floatobject.c); division by 0 gives NumPy's results."""
+    """Divide like Python (Objects/floatobject.c); division by 0 gives NumPy's results."""
     real = x.type
     zero, one = real(0.0), real(1.0)
     rest = builder.frem(x, y)
@@ -400,7 +399,7 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
-    """Call Python's gamma function, whose bits do not depend on the C library."""
+    """Call Python's gamma, whose bits do not depend on the C library."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it

@@ -18,7 +18,7 @@ from karamelo_py.compiler.code import machine
 
 
 class Failure(ctypes.Structure):
-    """The first exception of one kernel call; kernels read only the first word."""
+    """The first exception of a kernel call; kernels read only the first word."""
 
     _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
 

@@ -29,7 +29,7 @@ def features() -> str:
 
 @functools.cache
 def describe() -> str:
-    """Describe everything that determines the code besides its text."""
+    """Describe what determines the code besides its text."""
     words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
     return repr((*words, features(), OPTIONS, LEVEL))
 
@@ -85,7 +85,7 @@ def compile_text(text: str) -> bytes:
 
 
 def assembly(text: str, triple: str, processor: str, library: bytes | None = None) -> str:
-    """Compile module text to assembly for another processor; `library` is LLVM bitcode."""
+    """Compile module text to assembly of a GPU; `library` is LLVM bitcode."""
     _set_options()
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()

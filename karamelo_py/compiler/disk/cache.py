@@ -45,7 +45,7 @@ _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
 
 class Unknown(Exception):
-    """A kernel depends on a thing without a name that is the same in another process."""
+    """A kernel depends on a thing without a name in other processes."""
 
 
 def short_hash(*words: str) -> str:
@@ -70,7 +70,7 @@ def _sources() -> str:
 
 
 def _stamp(name: str) -> str:
-    """Hash a module elsewhere, and the modules not installed that it refers to."""
+    """Hash a module elsewhere, and the modules not installed that it uses."""
     words: dict[str, str] = {}
     ahead = {name}
     while ahead:
@@ -96,13 +96,12 @@ def _names_in(module: str) -> dict[str, Any]:
 
 
 def _is_own(module: str, top: str) -> bool:
-    """Tell whether a module is of the package `top`, or of no installed package."""
     file = _names_in(module).get("__file__") or _INSTALLED[0]
     return module.partition(".")[0] == top or not file.startswith(_INSTALLED)
 
 
 def _words(thing: Any) -> str:
-    """Describe the parts of a function in words that are the same in every process."""
+    """Describe the parts of a function, equally in every process."""
     if isinstance(thing, _PLAIN):
         return f"{type(thing).__name__} {thing!r}"
     if isinstance(thing, dict):
@@ -147,7 +146,7 @@ def _class(one: type, by_name: bool = False) -> str:
 
 
 def describe(numba_type: Any) -> str:
-    """Describe a type in words that are the same in every process; tags with their fields."""
+    """Describe a type, equally in every process; tags with their fields."""
     how = type(numba_type).__name__  # held or a value
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
@@ -171,7 +170,7 @@ class KernelFiles:
         self._called = called
 
     def kernel(self, kinds: tuple, result: Any, compiled: Callable[[], Any]) -> Any:
-        """Read a kernel; if there is none, compile it, while other processes wait for the file."""
+        """Read a kernel, or compile it while other processes wait."""
         try:
             key = self._key(kinds, result)
         except (Unknown, RecursionError):
@@ -242,7 +241,7 @@ def code_of(name: str) -> bytes:
 
 
 def _content(path: Path) -> bytes | None:
-    """Read a file; warn of a damaged one and delete it. None if nothing can be read."""
+    """Read a file, None if impossible; delete a damaged one."""
     try:
         content = files.read(path)
     except (FileNotFoundError, NotADirectoryError):

@@ -25,7 +25,7 @@ waiting = contextlib.nullcontext  # context while a process waits, reported as c
 
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
-    """Hold the lock on `path`, if it is available in time."""
+    """Hold the lock on `path`, if available in time."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # read-only, or no locks
             _take(path, stack)

@@ -27,7 +27,7 @@ IN_A_LOOP = " between iterations of a loop"
 
 
 class Edge(NamedTuple):
-    """End of a branch: its last block, the variables, and items read from held tuples."""
+    """End of a branch: last block, variables, items read from held tuples."""
 
     block: Any
     names: dict[str, Any]
@@ -88,7 +88,7 @@ class Grows(Untraceable):
 
 
 def is_number_type(thing: Any) -> bool:
-    """Tell whether a thing is a number of a class of tuples (`algebra`)."""
+    """Tell whether a thing is a number of an `algebra`."""
     return hasattr(type(thing), "constant")
 
 
@@ -100,7 +100,7 @@ def _counter(kinds: tuple) -> types.Integer:
 
 
 class Flow:
-    """Writes the control flow of one call of a function; without a builder, only its types."""
+    """Writes the control flow of a call; without a builder, only types."""
 
     def __init__(self, lowering: Any):
         self.lowering, self.builder = lowering, lowering.builder
@@ -125,7 +125,7 @@ class Flow:
         self.lowering.read = edge.read
 
     def meet(self, edges: list[Edge]) -> dict[str, Any]:
-        """Continue where branches merge; return the variables that are defined there."""
+        """Merge branches; return the variables that are defined there."""
         first = edges[0]
         if len(edges) == 1:
             self.start(first)
@@ -203,7 +203,7 @@ class Flow:
     ) -> tuple[LoopHeader, dict[str, Any]]:
         """Start a loop; return the variables, with phis for those that change.
 
-        `grown` are their new types, from `Grows`.
+        `grown` are new types, from `Grows`.
         """
         phis: list[Phi] = []
         paths: list[tuple] = []

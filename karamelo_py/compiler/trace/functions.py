@@ -40,7 +40,7 @@ class CannotCompile(TypeError):
 
 
 class Undefined(TypeError):
-    """A point function is not defined for these classes (or words for other types)."""
+    """A point function is not defined for these classes."""
 
     def __init__(self, function: str, classes: tuple):
         names = ", ".join(c.__name__ if isinstance(c, type) else str(c) for c in classes)
@@ -55,7 +55,7 @@ def _reason(error: BaseException) -> str:
 
 
 def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
-    """Yield files and lines in the traceback of an exception, innermost first."""
+    """Yield files and lines of an exception, innermost first."""
     if isinstance(error, CannotCompile):
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
@@ -159,7 +159,7 @@ def _copied(function: Callable) -> AstFunction:
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """Trace a method, or a point function, that plain Python calls."""
+    """Trace a method or point function called by plain Python."""
     return _seen(dispatch)(*arguments)
 
 
@@ -182,7 +182,7 @@ def _is_plain(thing: Any) -> bool:
 
 
 def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | None:
-    """Determine the result type of a function by tracing it without code."""
+    """Determine a function's result type by tracing it without code."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen)
@@ -204,7 +204,7 @@ def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | Non
 
 
 def traced(dispatch: Callable, kinds: tuple) -> TracedFunction | None:
-    """Return the function to run for arguments of these types; None if none is selected."""
+    """Return the function for arguments of these types; None if none is selected."""
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
         cached = session.functions
@@ -230,7 +230,7 @@ def forget() -> None:
 
 
 def outdate_kernels() -> None:
-    """Let kernels be looked up again: some of their functions have changed."""
+    """Let kernels be looked up again: functions have changed."""
     session.changes += 1
 
 
@@ -248,7 +248,7 @@ class PointFunction:
         self._nearest: dict[tuple[type, ...], Callable | None] = {}
 
     def find(self, classes: tuple) -> Callable | None:
-        """Find the implementation for these classes, or for the nearest of their bases."""
+        """Find the implementation for classes, or the nearest of their bases."""
         nearest = self._nearest  # another thread of Python may add implementations meanwhile
         if classes not in nearest:
             bases = [c.__mro__ if isinstance(c, type) else (c,) for c in classes]
@@ -270,7 +270,7 @@ class PointFunction:
     __call__ = _plain if INTERPRETED else _watched
 
     def on(self, *classes: type) -> Callable[[Callable], Callable]:
-        """Decorate the implementation for these classes, and for classes derived from them."""
+        """Decorate the implementation for classes and derived ones."""
 
         def register(implementation: Callable) -> Callable:
             self._table[classes] = implementation

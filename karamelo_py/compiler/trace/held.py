@@ -18,7 +18,7 @@ from karamelo_py.compiler.trace.values import HeldValue, builtin
 
 
 def _words(kind: Any) -> str:
-    """Name a type, with the modules of its classes, which Numba's names omit."""
+    """Name a type with the modules of its classes."""
     if isinstance(kind, types.BaseTuple) and not isinstance(kind, HeldTuple):
         tag = tag_class(kind) or tuple
         return f"{tag.__module__}.{tag.__qualname__}({', '.join(map(_words, kind))})"
@@ -66,7 +66,7 @@ def _has_arrays(kind: Any) -> bool:
 
 
 def held_type(kind: Any) -> Any:
-    """Return the type of a value when held; unchanged without tuples that contain arrays."""
+    """Return the type of a held value; tuples without arrays are not held."""
     is_tuple = isinstance(kind, types.BaseTuple) and not isinstance(kind, HeldTuple)
     if not is_tuple or not _has_arrays(kind):
         return kind

@@ -73,7 +73,7 @@ class Compilation:
 
     @contextmanager
     def told_to(self, listener: Any) -> Iterator[None]:
-        """Call ``on_start(name)`` and ``on_end()`` of a listener within this context."""
+        """Call ``on_start(name)`` and ``on_end()`` of a listener."""
         before = self._listeners.set((*self._listeners.get(), listener))
         try:
             yield
@@ -98,7 +98,7 @@ lock.waiting = compilation
 
 @contextmanager
 def _no_collections() -> Iterator[None]:
-    """Disable Python's garbage collector: a trace has much to traverse and nothing to free."""
+    """Disable the garbage collector, which would traverse a trace in vain."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -214,7 +214,7 @@ class Kernel:
         self._planned(ArgumentBuffer(arguments), arguments)
 
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
-        """Return layout of arguments, entry, and size and reader of the result."""
+        """Return argument layout, entry, and size and reader of the result."""
         kinds = tuple(written.kinds)
         self._find_changes()
         plans = self._plans
@@ -248,7 +248,7 @@ def kernel(function: Callable) -> Callable:
 
 
 def noinline(function: Callable) -> Callable:
-    """Mark a function that is too large to be inlined in kernels."""
+    """Mark a function too large to be inlined in kernels."""
     if not choices.INTERPRETED:
         not_inlined.add(function)
         shared(function)
@@ -289,7 +289,7 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
 
 
 def caller_of(signature: Any) -> Callable:
-    """Make ``call(address, ...)``, which calls a function of this signature by address."""
+    """Make ``call(address, ...)`` of functions of this signature."""
     result, parameters = signature.return_type, signature.args
 
     if choices.INTERPRETED:

@@ -1,4 +1,4 @@
-"""Code for operations on values, by the table of operations and by intrinsics."""
+"""Code for operations on values."""
 
 import functools
 import operator
@@ -33,7 +33,7 @@ _TRACED = traced.Value, traced.HeldValue
 
 @functools.cache
 def _is_of_values(one: type) -> bool:
-    """Tell whether a class of types is of values; Numba's abstract classes are slow to ask."""
+    """Tell whether a class of types is of values; Numba's abstract classes are slow."""
     others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
     return not issubclass(one, others)
 
@@ -190,7 +190,7 @@ class Lowering:
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """Return the separate function of the present module for `run`."""
+        """Return the module's separate function for `run`."""
         module = self.builder.module
         functions = vars(module).setdefault("own", {})
         if (run, kinds) not in functions:
@@ -216,7 +216,7 @@ class Lowering:
                 self.builder.ret(self.lowered(value, result))
 
     def call_own(self, traced: Any, kinds: tuple, arguments: tuple) -> Any:
-        """Call a separate function of this module, made from a `TracedFunction`."""
+        """Call a separate function of this module."""
         if self.builder is None:
             return self.wrapped(traced.result, None)
         function = self.function(traced.name, traced.run, kinds, traced.result)
@@ -233,14 +233,14 @@ class Lowering:
 
 
 def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
-    """Return the LLVM type of a function of these types; empty ones are not passed."""
+    """Return the LLVM type of a function; empty arguments are not passed."""
     gives = ir.VoidType() if llvm.is_empty(result) else llvm.register_type(result)
     arguments = [llvm.register_type(k) for k in kinds if not llvm.is_empty(k)]
     return ir.FunctionType(gives, [*arguments, *more])
 
 
 def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str) -> ir.Function:
-    """Start an LLVM function; except on GPUs its last argument is the address of a `Failure`."""
+    """Start an LLVM function; except on GPUs it gets a `Failure`."""
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
     return exceptions.passing(ir.Function(module, function_type(kinds, result, llvm.I64), name))

@@ -55,7 +55,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
 
 
 def shared(function: Callable) -> Callable:
-    """Mark a helper that may have implementations for lanes or number types (`implements`)."""
+    """Mark a helper that may have other implementations (`implements`)."""
     return implements(function)(function)
 
 
@@ -90,12 +90,12 @@ def point_function(
 
 
 def real(value: float, like: Any) -> Any:
-    """Convert `value` to the number type of `like`, for literals without another operand."""
+    """Convert a literal to the number type of `like`."""
     return type(like)(value)
 
 
 def lanes_of(numba_type: Any) -> int:
-    """Count the lanes of a type or a value: 0 for numbers, the maximum for tuples."""
+    """Count the lanes of a type or value; 0 for numbers."""
     if isinstance(numba_type, tuple | types.BaseTuple):
         return max(map(lanes_of, numba_type), default=0)
     return numba_type.width if isinstance(numba_type, LaneType) else 0
@@ -126,7 +126,7 @@ def _truncated(a):
 
 
 def round_off(like: Any) -> Any:
-    """Return the relative error of one operation in the number type of `like`."""
+    """Return the relative error of an operation in the type of `like`."""
     return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
 
 
@@ -184,7 +184,7 @@ def select(condition, a, b):
 
 @shared
 def where(condition: bool, a: float, b: float) -> float:
-    """Select `a` if `condition`, else `b`; evaluates both, without a branch."""
+    """Select `a` if `condition`, else `b`; evaluates both."""
     return a if condition else b
 
 

@@ -36,7 +36,7 @@ one_at_a_time = threading.RLock()
 
 
 def importable(module: str, name: str, make: Callable[[], type]) -> type:
-    """Return the class of this name in a module; `make` it first, where cached kernels find it."""
+    """Return the class of this name in a module, where cached kernels find it; or `make` it."""
     names = vars(sys.modules[module])
     with one_at_a_time:
         if name not in names:

@@ -58,7 +58,7 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
 
 @functools.cache
 def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """List functions by name and first line, decorators included."""
+    """List functions by name and first line, with decorators."""
     functions: dict[tuple[str, int], list] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
@@ -147,7 +147,7 @@ def _bound(
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Replace values by types; `within` are the functions whose closures are being read."""
+    """Replace values by types; `within` are functions whose closures are read."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):
@@ -212,7 +212,7 @@ class AstCompiler:
 
     @property
     def branches(self) -> bool:
-        """Tell whether this is in a branch or a loop of the kernel."""
+        """Tell whether this is in a branch or loop of the kernel."""
         return bool(self.depth or self.returns or self.breaks or self.continues)
 
     # --- branches
@@ -224,7 +224,7 @@ class AstCompiler:
         return [self.edge()] if self.goes else []
 
     def leave(self, edges: list[Edge]) -> None:
-        """End this branch here: it continues where `edges` merge."""
+        """End this branch: it continues where `edges` merge."""
         edges.append(self.edge())
         self.goes = False
 
@@ -598,7 +598,7 @@ class AstCompiler:
             self.unroll(node, through)
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
-        """Tell whether a loop over a known range is long and can remain a loop."""
+        """Tell whether a known range is long and can remain a loop."""
         if len(through) <= LONG:
             return False
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))

@@ -39,7 +39,7 @@ _WORDS = (
 
 
 def _only_at_run_time(use: str) -> Callable:
-    """Make a method of values for a `use` that needs their value at compile time."""
+    """Make a method for a `use` that needs the value at compile time."""
 
     def ask(*arguments: Any) -> Any:
         raise Untraceable(f"{use} is only known when the kernel runs")
@@ -67,12 +67,12 @@ def writing(lowering: Any) -> Iterator[None]:
 
 
 def at_work() -> bool:
-    """Tell whether this Python thread is compiling a kernel."""
+    """Tell whether this Python thread compiles."""
     return bool(_lowerings.get())
 
 
 def is_begun(key: tuple) -> bool:
-    """Tell whether the result type of a function is being determined."""
+    """Tell whether this function's result type is being determined."""
     return any(lowering.key == key for lowering in _lowerings.get())
 
 
@@ -83,7 +83,7 @@ def _real_kind(thing: Any) -> Any:
 
 
 def alike(arguments: tuple) -> tuple:
-    """Convert literals and integers to the widest type of the real numbers among the arguments."""
+    """Convert literals and integers to the widest real type among arguments."""
     kinds = [kind for kind in map(_real_kind, arguments) if kind is not None]
     if not kinds:
         return arguments
@@ -139,7 +139,7 @@ BUILTINS: dict[Callable, Callable] = {}
 
 
 def builtin(function: Callable) -> Callable[[Callable], Callable]:
-    """Decorate the code of `function` in kernels: ``made(lowering, *arguments)``, traced."""
+    """Decorate the code of `function`: ``made(lowering, *arguments)``, traced."""
 
     def register(made: Callable) -> Callable:
         BUILTINS[function] = made
@@ -149,7 +149,7 @@ def builtin(function: Callable) -> Callable[[Callable], Callable]:
 
 
 def in_kernels(made: Callable) -> Callable:
-    """Decorate a function that exists in kernels only, and is its own code."""
+    """Decorate a function that exists in kernels only."""
     return builtin(made)(made)
 
 
@@ -172,7 +172,7 @@ intrinsic = Intrinsic
 
 
 class Value:
-    """A number, lanes or an array of the function that is compiled."""
+    """A number, lanes or an array of the traced function."""
 
     __slots__ = ("_kind", "_value")
     __array_ufunc__ = None  # NumPy leaves operations to this
@@ -309,7 +309,7 @@ def is_literal(thing: Any) -> bool:
 
 
 class Emitted:
-    """Calls a function that has another version in compiled code."""
+    """Calls a function that has another version in kernels."""
 
     def __init__(self, function: Callable):
         self.seen = function
