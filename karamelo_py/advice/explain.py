@@ -89,10 +89,10 @@ def _gained(hub: Hub, simulation: Simulation) -> Trouble:
         )
         fix = "check the parameters of its material, and fixes in Python that act on it"
         return Trouble(message, fix, "not-a-number")
-    given = abs(clock.first_balance) + clock.supplied
+    supplied = abs(clock.first_balance) + clock.supplied
     cause, fix = energy.cause_of_gain(hub, simulation)
     gain = clock.balance - clock.first_balance
-    much = f"{gain / given:.3g} x" if given > 0 else f"{gain:.3g} more than"
+    much = f"{gain / supplied:.3g} x" if supplied > 0 else f"{gain:.3g} more than"
     message = (
         f"energy balance: {much} the initial energy and applied work has appeared "
         f"({when(simulation)})"

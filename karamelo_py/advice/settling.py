@@ -64,8 +64,8 @@ def _rests(other: BodyMotion, motion: BodyMotion, k: int, h: float, *, down: boo
 def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
     """Return True if fixes hold a body along k at one end only."""
     h = lattice_at(facts, body).h
-    held = [x[:, k] for fix, x in fixes_at(facts, body) if fix.formulas[k] is not None]
-    x = np.concatenate(held) if held else np.zeros(0)
+    ends = [x[:, k] for fix, x in fixes_at(facts, body) if fix.formulas[k] is not None]
+    x = np.concatenate(ends) if ends else np.zeros(0)
     if not len(x):
         return False
     return bool(x.max() < body.motion.low[k] + h or x.min() > body.motion.high[k] - h)

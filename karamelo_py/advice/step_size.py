@@ -31,7 +31,7 @@ def _stable_in_place(simulation: Simulation) -> float:
 
 
 def blows_up(simulation: Simulation) -> bool:
-    """Return True if the step is so far above the stable one that a run fails."""
+    """Return True if a run with this step will fail."""
     return simulation.dt > LOST * _stable_in_place(simulation)
 
 
@@ -49,7 +49,7 @@ def what_follows(simulation: Simulation, step: float) -> str:
 
 
 def own_step_instead_of(simulation: Simulation) -> float | None:
-    """Return the default step; None if the script does not override it."""
+    """Return the default step if the script overrides it."""
     update = simulation.hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return None
@@ -57,19 +57,19 @@ def own_step_instead_of(simulation: Simulation) -> float | None:
 
 
 def words_of_own_step(simulation: Simulation, step: float) -> str:
-    """Describe the default step, see `own_step_instead_of`, and the one that follows it."""
+    """Describe the default step, and the one after a quarter of a cell."""
     after = own_step(simulation, still=False)
     far = f", {after:.6g} once points have gone a quarter of a cell"
     return f"{step:.6g}" + (far if after < step else "")
 
 
 def stable_step(simulation: Simulation, limit: float) -> float:
-    """Return the stable step if a script sets the step: `limit`, or the default's."""
+    """Return the larger of `limit` and the default's stable step."""
     return max(limit, own_step(simulation) / USUAL)
 
 
 def own_step_instead(simulation: Simulation, command: str = "") -> str:
-    """Return the fix for a step that is too large, by the command that set it."""
+    """Return the fix for a step above the limit, by the command that set it."""
     update = simulation.hub.update
     if command == "set_dt" or (not command and update.fixed_dt is not None):
         return f"set_dt({own_step(simulation):.3g}) or less, or remove set_dt"
@@ -78,12 +78,12 @@ def own_step_instead(simulation: Simulation, command: str = "") -> str:
 
 
 def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
-    """Name the step set by a script, as a key for messages already given."""
+    """Name the script's step, as a key for messages."""
     return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
 
 
 def words_of_share(simulation: Simulation) -> str:
-    """Describe the fraction of the stable step, and its meaning."""
+    """Describe the fraction of the stable step."""
     hub, steps = simulation.hub, simulation.steps
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:

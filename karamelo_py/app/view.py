@@ -174,8 +174,8 @@ def _log_beside(
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
     text = " ".join(filter(None, formulas))
     words = re.findall(r"[^\W\d]\w*\b(?! *\()", text)  # without calls
-    known = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
-    if known.issuperset(words) and not (options.script and options.outlines):
+    names = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
+    if names.issuperset(words) and not (options.script and options.outlines):
         return {}
     rows = []
     for name in ("log.mpm", "log.csv"):
