@@ -31,24 +31,24 @@ class NodesByNumber:
         for first, end in ranges(hub.fields.node_count):
             if comm.size == 1:
                 arrays = {name: array[first:end] for name, array in of_nodes(s)}
-                own = {name: of[first:end] for name, of in sums.items()}
+                totals = {name: of[first:end] for name, of in sums.items()}
             else:
-                found = rows_at(simulation, np.arange(first, end), gather)
-                own = self._sums_between(first, end, sums, gather)
-                if found is None:
+                rows = rows_at(simulation, np.arange(first, end), gather)
+                totals = self._sums_between(first, end, sums, gather)
+                if rows is None:
                     continue
-                arrays = found | {f"nodes/{name}": array[first:end] for name, array in kept}
-            own = {name: of.sum(axis=1) for name, of in own.items()}
-            yield NodeTable(hub, np.arange(first, end), s.kin, arrays, own, weights)
+                arrays = rows | {f"nodes/{name}": array[first:end] for name, array in kept}
+            totals = {name: of.sum(axis=1) for name, of in totals.items()}
+            yield NodeTable(hub, np.arange(first, end), s.kin, arrays, totals, weights)
 
     def _sums_between(self, first: int, end: int, sums: dict, gather: Callable) -> dict:
         nodes = numbers(self.simulation.setup.spans)
         used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
-        own = {name: np.zeros((end - first, 2)) for name in sums}
+        totals = {name: np.zeros((end - first, 2)) for name in sums}
         for there, parts in gather((used, [of[used] for of in sums.values()])) or ():
-            for total, of in zip(own.values(), parts, strict=True):
+            for total, of in zip(totals.values(), parts, strict=True):
                 total[there - first] += of
-        return own
+        return totals
 
     def counted(self) -> np.ndarray:
         return self.simulation.domain.counted()

@@ -128,10 +128,10 @@ def buffers_of(s: Setup) -> list[Buffers]:
     return [s.buffers] + ([s.heat.buffers] if isinstance(s.heat, Conducting) else [])
 
 
-def chosen_of(nodes: Nodes, what: int) -> list[np.ndarray]:
-    """Return the arrays that points scatter to, of the kinds in `what` (`sums.arrays_given`)."""
+def chosen_of(nodes: Nodes, kinds: int) -> list[np.ndarray]:
+    """Return the arrays that points scatter to, of some `kinds` (`sums.arrays_given`)."""
     sums, velocity, *rest = summed(nodes)
-    return [sums] * (what & 1) + [velocity] * (what >> 1 & 1) + rest * (what >> 2 & 1)
+    return [sums] * (kinds & 1) + [velocity] * (kinds >> 1 & 1) + rest * (kinds >> 2 & 1)
 
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
@@ -145,9 +145,9 @@ def beyond(contact: Tag) -> int:
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 
-def room_of(rows: int, like: np.ndarray) -> np.ndarray:
+def room_of(rows: int, array: np.ndarray) -> np.ndarray:
     """Return `rows` zero rows of the width and type of an array; with none it can grow."""
-    width, kind = like.shape[1], like.dtype
+    width, kind = array.shape[1], array.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 
 

@@ -206,11 +206,11 @@ class Point:
             return self._slopes(self.state, dl, dt, ways)[prescribed]
 
         unknown = self._newton(misfit, slopes, rate * (b - a), increment, target)
-        found = after(unknown)
+        after_increment = after(unknown)
         self.last = (self.state, self._strained(increment, motion.shear) + rigid, dt)
-        if found is None or not np.isfinite(found[1]).all():
+        if after_increment is None or not np.isfinite(after_increment[1]).all():
             raise Unreachable("the point is turned inside out (det F <= 0) or has no stress")
-        self._accept(found[0], increment)
+        self._accept(after_increment[0], increment)
         return unknown
 
     def tangent(self) -> np.ndarray:
@@ -264,12 +264,12 @@ class Point:
             step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
             for halving in range(HALVINGS):
                 trial = unknown + step / 2**halving
-                there = misfit(trial)
-                if np.linalg.norm(there) < size:
+                trial_residual = misfit(trial)
+                if np.linalg.norm(trial_residual) < size:
                     break
             else:
                 break
-            unknown, residual = trial, there
+            unknown, residual = trial, trial_residual
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:

@@ -107,10 +107,10 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
 
     def stiffness(u: np.ndarray) -> np.ndarray:
         """Return M^-1/2 K M^-1/2 u (nodes, d), in units of c^2."""
-        there = (u / root[:, None])[at]
-        gradient = np.stack([(there * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
+        u_of_points = (u / root[:, None])[at]
+        gradient = np.stack([(u_of_points * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
         trace = np.trace(gradient, axis1=1, axis2=2)
-        around = 0.0 if hoop is None else (there[:, :, 0] * hoop).sum(axis=1)
+        around = 0.0 if hoop is None else (u_of_points[:, :, 0] * hoop).sum(axis=1)
         pressure = (1 - 2 * shear) * (trace + around)
         stress = shear * (gradient + gradient.transpose(0, 2, 1))
         stress += pressure[:, None, None] * np.eye(kin.dimension)

@@ -141,8 +141,8 @@ class SimulationOnCard(Simulation):
         steps, hooks, functions = self._steps, self.hooks, self.fixes.lasting.functions
         if steps is not None and functions == steps.functions and alike(hooks, steps.hooks):
             hooks = steps.hooks  # of a run before
-        known = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
-        if steps is None or known != self._known:
+        key = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
+        if steps is None or key != self._known:
             self._fetch()
             if steps is not None:
                 steps.images.close()
@@ -150,7 +150,7 @@ class SimulationOnCard(Simulation):
             card, acting = self.hub.settings.card, (hooks, functions)
             with missing_told(self.hub):
                 steps = StepsOnCard(card, self._setup, program, acting)
-            self._steps, self._known, self._sent = steps, known, False
+            self._steps, self._known, self._sent = steps, key, False
         return steps
 
     def _advance_to(self, target: int) -> int:

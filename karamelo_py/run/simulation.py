@@ -62,14 +62,14 @@ class Simulation(SceneArrays):
     def flags(self) -> tuple[bool, ...]:
         """Facts about the state besides its arrays, for restart files."""
         watch = self.energy_watch
-        told = watch.told_of_growth, watch.told_of_loss
-        return self.steps.measured, self.mapped, watch.followed, *told
+        reported = watch.told_of_growth, watch.told_of_loss
+        return self.steps.measured, self.mapped, watch.followed, *reported
 
     @flags.setter
     def flags(self, flags: tuple[bool, ...]) -> None:
         watch = self.energy_watch
-        self.steps.measured, self.mapped, watch.followed, *told = flags
-        watch.told_of_growth, watch.told_of_loss = told
+        self.steps.measured, self.mapped, watch.followed, *reported = flags
+        watch.told_of_growth, watch.told_of_loss = reported
 
     @property
     def moves(self) -> bool:

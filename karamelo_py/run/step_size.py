@@ -56,14 +56,14 @@ class StepPolicy(NamedTuple):
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
         """Return fields of the clock after a `path` of the points, in cells."""
-        (courant, share), part = self.still if path <= STILL else self.moving, 1 / 2**halvings
+        (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
             "courant_moving": self.moving[0],
-            "fixed_dt": self.fixed_dt * part,
-            "heat_factor": self.heat_factor * part,
-            "dt_factor": share * part,
-            "dt_factor_moving": self.moving[1] * part,
+            "fixed_dt": self.fixed_dt * scale,
+            "heat_factor": self.heat_factor * scale,
+            "dt_factor": share * scale,
+            "dt_factor_moving": self.moving[1] * scale,
         }
 
 

@@ -250,10 +250,10 @@ class Tiles:
         # The largest part first: mostly it has all the nodes of the rest.
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
         shares = self._shares(s)
-        own = order[reached.box[order] < len(shares)][::-1]  # the largest last
+        local = order[reached.box[order] < len(shares)][::-1]  # the largest last
         beside = self._beside(reached.tile, boxes.grid[reached.box])
         owner = np.zeros(self._first_of_nodes[-1], np.int64)
-        owner[beside[own]] = shares[reached.box[own]]
+        owner[beside[local]] = shares[reached.box[local]]
         owner = owner[beside]
         order = order[np.argsort(owner[order], kind="stable")]
         box, tile, begin, end, _ = (array[order] for array in reached)
@@ -264,15 +264,17 @@ class Tiles:
         parts = self._parts(grid, begin, end, first[box], steps[box])
         parts[:, 9] = kernel_arrays.ADD
         parts[starts[~more], 9] = kernel_arrays.TAKE
-        own = self._parts(grid[starts], own_begin, own_end, 0, 0)
-        parts = np.insert(parts, starts[more], own[more], axis=0)
+        local = self._parts(grid[starts], own_begin, own_end, 0, 0)
+        parts = np.insert(parts, starts[more], local[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
-        owner = _evenly(own, beside[order][starts])
+        owner = _evenly(local, beside[order][starts])
         firsts = np.append(starts + np.cumsum(more) - more, len(parts))
-        rows = np.stack(grid_boxes.rows_of(own), axis=1)
-        ranges = grid_boxes.ranges_of_shares(rows, np.repeat(owner, own[:, 2] * own[:, 3]), SHARES)
+        rows = np.stack(grid_boxes.rows_of(local), axis=1)
+        ranges = grid_boxes.ranges_of_shares(
+            rows, np.repeat(owner, local[:, 2] * local[:, 3]), SHARES
+        )
         firsts = firsts[np.searchsorted(owner, np.arange(SHARES + 1))]
-        return grid_boxes.joined_spans(own), ranges, firsts, parts
+        return grid_boxes.joined_spans(local), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
         """Return the first of the tiles of nodes (n,) in the same set as each.

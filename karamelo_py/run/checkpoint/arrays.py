@@ -361,11 +361,11 @@ def remembered_at(simulation: Backend, spans: np.ndarray) -> list[np.ndarray]:
     return simulation.hub.update.method.remembered(simulation.setup.contact, spans)
 
 
-def _checked(arrays: ArraysByName, name: str, like: np.ndarray, *, read: bool = True) -> Any:
-    there = arrays.get(name)
-    if there is None or there.shape != like.shape or there.dtype != like.dtype:
+def _checked(arrays: ArraysByName, name: str, expected: np.ndarray, *, read: bool = True) -> Any:
+    array = arrays.get(name)
+    if array is None or array.shape != expected.shape or array.dtype != expected.dtype:
         raise _misfit(name)
-    return there[()] if read else None
+    return array[()] if read else None
 
 
 def _misfit(what: str) -> ScriptError:
@@ -378,12 +378,12 @@ def _misfit(what: str) -> ScriptError:
 # --- of several processes -------------------------------------------------------------------------
 
 
-def _joined(simulation: Backend, own: dict[str, np.ndarray]) -> Iterator[Stored]:
+def _joined(simulation: Backend, local: dict[str, np.ndarray]) -> Iterator[Stored]:
     s, comm = simulation.setup, simulation.comm
     state: dict[str, Any] = {
-        "tiling": [stripped(own, f"tiling/{k}/") for k in range(len(s.blocks))],
-        "work": own["work"].copy(),
-        "touched": stripped(own, "touched/"),
+        "tiling": [stripped(local, f"tiling/{k}/") for k in range(len(s.blocks))],
+        "work": local["work"].copy(),
+        "touched": stripped(local, "touched/"),
     }
     parts = comm.gather(state)
     # Tiles as in a serial run.
@@ -391,19 +391,19 @@ def _joined(simulation: Backend, own: dict[str, np.ndarray]) -> Iterator[Stored]
     rows: dict[str, np.ndarray] = {}
     for k, tiling in enumerate(tilings if parts is not None else ()):
         tiling.count[1] = 1 if simulation.tiles.direct else SHARES
-        join_tilings(tiling, [part["tiling"][k] for part in parts])
+        join_tilings(tiling, [piece["tiling"][k] for piece in parts])
         rows |= {f"tiling/{k}/{name}": getattr(tiling, name)[:n] for name, n in in_use(tiling)}
     if parts is not None:
-        work = sum(part["work"] for part in parts)
-        at_nodes = {name: array for name, array in own.items() if name.startswith("kept/")}
-        yield from in_file(rows | {"clock": own["clock"], "work": work} | at_nodes)
+        work = sum(piece["work"] for piece in parts)
+        at_nodes = {name: array for name, array in local.items() if name.startswith("kept/")}
+        yield from in_file(rows | {"clock": local["clock"], "work": work} | at_nodes)
     for k, tiling in enumerate(tilings):
-        yield from _points(simulation, k, tiling, own)
-    if "values" in own:
-        yield from wholes({"values": own["values"]})
-    if found := [part["touched"] for part in parts or () if part["touched"]]:
-        nodes, first = np.unique(np.concatenate([of["nodes"] for of in found]), True)
-        of_nodes = np.concatenate([of["rows"] for of in found])[first]
+        yield from _points(simulation, k, tiling, local)
+    if "values" in local:
+        yield from wholes({"values": local["values"]})
+    if touched_parts := [piece["touched"] for piece in parts or () if piece["touched"]]:
+        nodes, first = np.unique(np.concatenate([of["nodes"] for of in touched_parts]), True)
+        of_nodes = np.concatenate([of["rows"] for of in touched_parts])[first]
         yield from wholes({"touched/nodes": nodes, "touched/rows": of_nodes})
 
 
@@ -420,7 +420,7 @@ def points_of_tiles(
 
 
 def _points(
-    simulation: Backend, k: int, tiling: Tiling, own: dict[str, np.ndarray]
+    simulation: Backend, k: int, tiling: Tiling, local: dict[str, np.ndarray]
 ) -> Iterator[Stored]:
     comm = simulation.comm
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
@@ -430,18 +430,19 @@ def _points(
         for first, end in _cuts(ends)
     ]
     names = [name for name, _ in arrays_of(simulation.setup.blocks[k].points)]
-    arrays = [own[f"points/{k}/{name}"] for name in names]
+    arrays = [local[f"points/{k}/{name}"] for name in names]
     begin = 0
     for of_piece in comm.bcast(limits):
         if of_piece is not None:
-            found = comm.gather(points_of_tiles(stripped(own, f"tiling/{k}/"), arrays, *of_piece))
+            tiles = stripped(local, f"tiling/{k}/")
+            gathered = comm.gather(points_of_tiles(tiles, arrays, *of_piece))
         else:  # not sorted yet: each process has an equal range of the ids
-            found = comm.gather({"points": arrays})
-        if found is None:
+            gathered = comm.gather({"points": arrays})
+        if gathered is None:
             continue
-        total = total or sum(part["points"][0].shape[-1] for part in found)
-        order = np.arange(total) if of_piece is None else by_tile(found)
-        for name, *same in zip(names, *(part["points"] for part in found), strict=True):
+        total = total or sum(piece["points"][0].shape[-1] for piece in gathered)
+        order = np.arange(total) if of_piece is None else by_tile(gathered)
+        for name, *same in zip(names, *(piece["points"] for piece in gathered), strict=True):
             array = np.take(np.concatenate(same, axis=-1), order, axis=-1)
             where = ..., slice(begin, begin + len(order))
             yield f"points/{k}/{name}", (*array.shape[:-1], total), where, array

@@ -190,11 +190,11 @@ class Restart:
         self.path = path = _latest(path, out)
         if not path.is_file():
             raise _no_file(path, out)
-        what = f"{path} is not a restart file of this program"
+        message = f"{path} is not a restart file of this program"
         try:
             with h5py.File(path, "r", locking=False) as root:
                 if root.attrs.get("format") != FORMAT:
-                    raise ScriptError(what, argument="file", expected=OURS)
+                    raise ScriptError(message, argument="file", expected=OURS)
                 version = int(root.attrs["version"])
                 if version != VERSION:
                     age = "an older" if version < VERSION else "a newer"
@@ -211,7 +211,7 @@ class Restart:
                 _ = root["state"], *(self.content[name] for name in CONTENT)
         except (OSError, KeyError, ValueError, TypeError) as error:
             why = "" if "signature" in str(error) else f": {error}"
-            raise ScriptError(f"{what}{why}", argument="file", expected=OURS) from None
+            raise ScriptError(f"{message}{why}", argument="file", expected=OURS) from None
 
     def presets(self, requested: dict[str, str]) -> dict[str, str]:
         before = self.content["presets"]

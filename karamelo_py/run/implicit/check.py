@@ -70,11 +70,12 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 solid.place,
             )
     for fix in hub.fixes.values():
-        own = registry.origin("fix", fix.style).startswith("karamelo-py ") and fix.style != "python"
+        ours = registry.origin("fix", fix.style).startswith("karamelo-py ")
+        built_in = ours and fix.style != "python"
         other = [
             hook
             for hook in fix.hooks()
-            if hook not in (_MOMENTS + _OF_HEAT if own else _OF_PLUGINS)
+            if hook not in (_MOMENTS + _OF_HEAT if built_in else _OF_PLUGINS)
         ]
         prescribes = fix.prescribes_velocity or fix.first_step_only
         if prescribes:
@@ -91,7 +92,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         elif other:
             yield (
                 f"knows no fix {fix.style}, which acts at a moment that only explicit steps have"
-                + ("" if own else f": {other[0]}"),
+                + ("" if built_in else f": {other[0]}"),
                 "fix velocity_nodes, or loads: force_particles, edge_traction; velocity_particles "
                 "for rigid solids",
                 fix.place,

@@ -26,24 +26,24 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
     sums, update = heated.sums, heated.update
     capacity = sums[nodes, MASS].astype(float)
     some = capacity > 0
-    own = np.divide(sums[nodes, MASS + 1], capacity, out=np.zeros(len(nodes)), where=some)
+    T = np.divide(sums[nodes, MASS + 1], capacity, out=np.zeros(len(nodes)), where=some)
     mapped = heated.velocity[nodes, 0].astype(float)
     flow = sums[nodes, of_force(Line())].astype(float)
     K = equations.conduction()
     holding = [fix for fix in fixes if "post_update_grid_heat" in fix.hooks()]
-    given, temperatures = (of[:, 0] for of in equations.prescribed(holding, 1))
-    free = some & ~given
-    change = np.where(given, temperatures - mapped, 0.0)
+    held, temperatures = (of[:, 0] for of in equations.prescribed(holding, 1))
+    free = some & ~held
+    change = np.where(held, temperatures - mapped, 0.0)
     stored = capacity / dt
-    balance = flow + stored * (own - mapped)
+    balance = flow + stored * (T - mapped)
     A = (K + sp.diags(stored)).tocsr()
     if np.any(free):
         change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
     # Fixes get the temperature without them, and publish the heat that they supply.
-    without = new - np.where(given, np.divide(
+    without = new - np.where(held, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
-    update[nodes, 0], update[nodes, 1] = without, without - own
+    update[nodes, 0], update[nodes, 1] = without, without - T
     take_rows((HOLD,), s, mode, hooks)
-    update[nodes, 0], update[nodes, 1] = new, new - own
+    update[nodes, 0], update[nodes, 1] = new, new - T
     take_rows((WARM._replace(reported=None),), s, mode, hooks)

@@ -50,7 +50,7 @@ class Moduli(NamedTuple):
     of_laws: list[np.ndarray]  # (2, k) numbers of the laws of each block; their specific volumes
 
     def alike(self) -> bool:
-        every = (own[0, own[1] > 0] for own in self.of_laws)
+        every = (table[0, table[1] > 0] for table in self.of_laws)
         return len(np.unique(np.concatenate([np.zeros(0), *every]))) <= 1
 
 
@@ -123,11 +123,11 @@ class Equations:
     def _numbered(self, seen: loops.Seen) -> loops.Seen:
         most = int(seen.count.max(initial=1))
         number = self.number_of(seen.nodes[:, :most])
-        own = valid(seen)[:, :most] & (number >= 0)
-        first = number[np.arange(len(number)), own.argmax(1)]
+        in_use = valid(seen)[:, :most] & (number >= 0)
+        first = number[np.arange(len(number)), in_use.argmax(1)]
         small = np.int32 if number.size < 2**31 else np.int64
         seen = seen._replace(
-            nodes=np.where(own, number, first[:, None]).astype(np.int32),
+            nodes=np.where(in_use, number, first[:, None]).astype(np.int32),
             weights=seen.weights[:, :most].copy(),
             gradients=seen.gradients[:, :most].copy(),
             starts=np.zeros(len(self.nodes) + 1, np.int64),
@@ -155,14 +155,14 @@ class Equations:
         shift = np.stack(np.unravel_index(offsets, (row,) * d), 1) - reach
         columns = self.number_of(self.nodes[rows] + (shift * self.steps[rows]).sum(1))
         self.joined = rows.astype(np.int32), columns.astype(np.int32)
-        own = every = rows * m + columns
+        pairs = every = rows * m + columns
         if stabilised:
             lines = self.differences[0]
             ghosts = lines[:, np.repeat(range(3), 3)] * m + lines[:, np.tile(range(3), 3)]
-            every = np.union1d(own, ghosts)
+            every = np.union1d(pairs, ghosts)
         self.pairs = tuple(one.astype(np.int32) for one in np.divmod(every, m))
         np.cumsum(np.bincount(self.pairs[0], minlength=m), out=self.layout.first[1:])
-        rank[rows, offsets] = np.searchsorted(every, own) - self.layout.first[rows]
+        rank[rows, offsets] = np.searchsorted(every, pairs) - self.layout.first[rows]
         self.K = sp.bsr_matrix(
             (np.zeros((len(every), d, d)), self.pairs[1], self.layout.first), (m * d, m * d)
         )
@@ -232,12 +232,12 @@ class Equations:
 
     def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
         """Return a mask (m, count) of prescribed components, and their values."""
-        given, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
+        mask, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
         for fix in fixes:  # the last one decides
-            own, value = fix.prescribed(self.nodes, self.positions)
-            given |= own
-            values[own] = value[own]
-        return given, values
+            mask_of_fix, value = fix.prescribed(self.nodes, self.positions)
+            mask |= mask_of_fix
+            values[mask_of_fix] = value[mask_of_fix]
+        return mask, values
 
     @cached_property
     def positions(self) -> np.ndarray:
@@ -310,8 +310,8 @@ class Equations:
                 state = initial_state(law, kin, 1.0)
                 _, C = on_numbers(loops.stress_and_tangent)(law, kin, state, rest, 1.0)
                 one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
-                own = float(points.mass[points.material == k].sum() * specific_volume(law))
-                total, volume = total + own * float(one), volume + own
+                rows = float(points.mass[points.material == k].sum() * specific_volume(law))
+                total, volume = total + rows * float(one), volume + rows
                 of_own[:, k] = one, specific_volume(law)
                 on = points.grid[points.material == k]
                 own_of = np.bincount(on, points.mass[points.material == k], of_grids.shape[1])

@@ -121,6 +121,6 @@ class Motion:
             block.points.v[:] = kept * old
             gather(seen, new - kept * self.v, block.points.v)
         more = np.where(self.given, 0.0, a - self._demand(a))
-        for (seen, _), own in zip(self.equations.parts, self.surplus, strict=False):
-            own[:] = 0
-            gather(seen, more, own)
+        for (seen, _), surplus in zip(self.equations.parts, self.surplus, strict=False):
+            surplus[:] = 0
+            gather(seen, more, surplus)

@@ -97,12 +97,12 @@ class LoadSteps:
             end = float(control.clock[0].end_time)
         if not self.dynamic and step == 0:
             self._check_at_rest()
-        left, part, most, iterations, residual = 1.0, 1.0, 1.0, 0, 0.0
+        left, fraction, most, iterations, residual = 1.0, 1.0, 1.0, 0, 0.0
         self.parts, before = 0, None
         while left > 1e-9:
-            part = min(part, left)
+            fraction = min(fraction, left)
             try:
-                taken, residual = self._part(hooks, part * whole)
+                taken, residual = self._part(hooks, fraction * whole)
             except Broken:
                 if self.parts:
                     self.simulation.restore(before)
@@ -110,22 +110,24 @@ class LoadSteps:
             except Failed as reason:
                 if before is None:  # the user may want to leave the step between parts
                     before = self.simulation.snapshot()
-                if part <= 2.0**-HALVINGS:
+                if fraction <= 2.0**-HALVINGS:
                     if self.scheme.limit == "error":
-                        share = f" even in 1/{round(1 / part)} of the load step"
+                        share = f" even in 1/{round(1 / fraction)} of the load step"
                         raise NoEquilibrium(f"{reason}{share}") from None
                     end = self._limit_reached(reason)
                     break
-                part /= 2
+                fraction /= 2
                 if isinstance(reason, TooFar):
                     # In as many equal parts as the distance needs.
-                    part = most = 2 * part / min(max(ceil(1.1 * reason.at), 2), 4)
+                    fraction = most = 2 * fraction / min(max(ceil(1.1 * reason.at), 2), 4)
                 continue
-            left -= part
+            left -= fraction
             control.values[TIMESTEP] = step
             self.parts, iterations = self.parts + 1, iterations + taken
             if left > 1e-9:
-                part = min(2 * part, most) if taken <= self.scheme.iterations // 2 else part
+                fraction = (
+                    min(2 * fraction, most) if taken <= self.scheme.iterations // 2 else fraction
+                )
                 if control.clock[0].drift > control.clock[0].drift_limit:
                     self.simulation.sort_if_due()
         for name, value in zip(PUBLISHED, (iterations, residual, self.parts), strict=True):

@@ -24,14 +24,14 @@ class Unconverged(Exception):
     """Multigrid leaves more than 1 % of the residual."""
 
 
-def hold(A: sp.bsr_matrix, given: np.ndarray, more: np.ndarray) -> None:
-    """Decouple the `given` components (m, d) of a matrix; add `more` (m,) to the others."""
-    rows = np.repeat(np.arange(len(given)), np.diff(A.indptr))
-    some = np.any(given, axis=1)
+def hold(A: sp.bsr_matrix, held: np.ndarray, more: np.ndarray) -> None:
+    """Decouple the `held` components (m, d) of a matrix; add `more` (m,) to the others."""
+    rows = np.repeat(np.arange(len(held)), np.diff(A.indptr))
+    some = np.any(held, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
-    A.data[at] *= ~(given[rows[at]][:, :, None] | given[A.indices[at]][:, None, :])
-    own, i = np.flatnonzero(rows == A.indices), np.arange(given.shape[1])
-    A.data[own[:, None], i, i] += np.where(given, 1.0, more[:, None])[rows[own]]
+    A.data[at] *= ~(held[rows[at]][:, :, None] | held[A.indices[at]][:, None, :])
+    diagonal, i = np.flatnonzero(rows == A.indices), np.arange(held.shape[1])
+    A.data[diagonal[:, None], i, i] += np.where(held, 1.0, more[:, None])[rows[diagonal]]
 
 
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:

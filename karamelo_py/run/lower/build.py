@@ -245,10 +245,12 @@ def lower_points(
 ) -> tuple[arrays.Points, NamedTuple]:
     """Lower the points of solids whose laws are of one kind, and these laws."""
     method = hub.update.method
-    known = [law_on(s.material.law, s.h, s.T0) for s in solids]
+    law_of_solids = [law_on(s.material.law, s.h, s.T0) for s in solids]
     if hub.fields.rate_is_asked_for():
-        known = [with_rate(law, kin, s.h) for law, s in zip(known, solids, strict=True)]
-    laws_of_solids = list(dict.fromkeys(known))
+        law_of_solids = [
+            with_rate(law, kin, s.h) for law, s in zip(law_of_solids, solids, strict=True)
+        ]
+    laws_of_solids = list(dict.fromkeys(law_of_solids))
     used = law_table(laws_of_solids, real)
     ends = np.cumsum([s.count for s in solids])
     count = int(ends[-1])
@@ -271,7 +273,7 @@ def lower_points(
             state = laws.with_temperature(law, kin, state, real(solid.T0))
         return np.array(flat(state), real)[:, None]
 
-    states = (at_rest(s, law_in(k, real)) for s, k in zip(solids, known, strict=True))
+    states = (at_rest(s, law_in(k, real)) for s, k in zip(solids, law_of_solids, strict=True))
     places = joined((method.places(kin, s, real).T for s in solids), real)
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
@@ -282,7 +284,7 @@ def lower_points(
         x=x, home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
         mass=joined((s.mass for s in solids), real), state=joined(states, real),
-        material=joined((laws_of_solids.index(law) for law in known), np.int32),
+        material=joined((laws_of_solids.index(law) for law in law_of_solids), np.int32),
         grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
         fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),

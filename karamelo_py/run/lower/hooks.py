@@ -39,7 +39,7 @@ def lower_hooks(
     if not builder.rows:
         return arrays.NoHooks()
     solids = hub.solids.values() if builder.uses_first else ()
-    own, values = threads if threads > 1 else 0, len(hub.values.array)
+    copies, values = threads if threads > 1 else 0, len(hub.values.array)
     return arrays.Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
         table=np.array(builder.rows, arrays.HOOK).view(np.recarray),
@@ -56,11 +56,11 @@ def lower_hooks(
         mode=mode or Serial(),
         # Values per thread, with padding in between.
         apart=arrays.Apart(
-            chosen=np.zeros((own, BLOCK), np.int64),
-            scratch=np.zeros((own, STACK + ROWS + 1, BLOCK)),
-            values=np.zeros((own, values + 16)),
-            totals=np.zeros((own, values, LIMBS), np.int64),
-            clock=np.zeros((own, 1), arrays.CLOCK).view(np.recarray),
+            chosen=np.zeros((copies, BLOCK), np.int64),
+            scratch=np.zeros((copies, STACK + ROWS + 1, BLOCK)),
+            values=np.zeros((copies, values + 16)),
+            totals=np.zeros((copies, values, LIMBS), np.int64),
+            clock=np.zeros((copies, 1), arrays.CLOCK).view(np.recarray),
         ),
         whole=tuple(builder.whole),
     )

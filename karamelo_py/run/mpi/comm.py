@@ -100,14 +100,14 @@ class MpiComm(SerialComm):
             raise Quit
 
     def agree(self, word: int, patience: float = inf) -> np.ndarray | None:
-        own, found = np.array([word], np.int64), np.empty(self.size, np.int64)
-        request = self._aside.Iallgather(own, found)
+        own, words = np.array([word], np.int64), np.empty(self.size, np.int64)
+        request = self._aside.Iallgather(own, words)
         end = time.monotonic() + patience
         while not request.Test():
             if time.monotonic() > end:
                 return None
             time.sleep(PAUSE)
-        return found
+        return words
 
     def bcast(self, thing: Any = None) -> Any:
         return self.world.bcast(thing)

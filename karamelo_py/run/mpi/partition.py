@@ -150,14 +150,14 @@ class SharedTiles(Tiles):
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
         self.balance(work_of(loads, costs))
-        own, me = [self.owner[of] for of in tiles], self.comm.rank
-        others = self.partners(sum(np.bincount(to, minlength=self.comm.size) for to in own))
+        owners, me = [self.owner[of] for of in tiles], self.comm.rank
+        others = self.partners(sum(np.bincount(to, minlength=self.comm.size) for to in owners))
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
                 # Contiguous, unlike what a mask gives.
                 [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
-                for block, to in zip(s.blocks, own, strict=True)
+                for block, to in zip(s.blocks, owners, strict=True)
             ]
 
         come = list(self.comm.exchange({rank: parts(rank) for rank in others}).values())
@@ -165,7 +165,7 @@ class SharedTiles(Tiles):
             return s
         blocks = tuple(
             block._replace(points=self._with(k, block.points, np.flatnonzero(to == me), parts))
-            for k, (block, to, *parts) in enumerate(zip(s.blocks, own, *come, strict=True))
+            for k, (block, to, *parts) in enumerate(zip(s.blocks, owners, *come, strict=True))
         )
         return s._replace(blocks=blocks)
 
@@ -199,11 +199,11 @@ class SharedTiles(Tiles):
 
     def _boxes(self, s: Setup) -> Boxes:
         """Return the own boxes, then boxes of others that may contain the same nodes."""
-        own, me = self.own_boxes(s), self.comm.rank
+        local, me = self.own_boxes(s), self.comm.rank
         self._looks_beyond = beyond(s.contact) > 0
-        of_all = {me: own, **dict(enumerate(self.comm.allgather(own)))}
-        if len(own.grid):
-            low, high = own.lo.min(axis=0), own.hi.max(axis=0)
+        of_all = {me: local, **dict(enumerate(self.comm.allgather(local)))}
+        if len(local.grid):
+            low, high = local.lo.min(axis=0), local.hi.max(axis=0)
             for rank, boxes in of_all.items():
                 near = ((boxes.lo <= high) & (boxes.hi >= low)).all(axis=1)
                 of_all[rank] = Boxes(*(array[near] for array in boxes))
@@ -230,10 +230,10 @@ class SharedTiles(Tiles):
         begin = 0
         for block in s.blocks:
             tiling = block.tiling
-            own = awaited[begin : begin + tiling.count[0]]
+            waiting = awaited[begin : begin + tiling.count[0]]
             begin += tiling.count[0]
-            border = np.count_nonzero(own)
-            order = np.argsort(~own, kind="stable")
+            border = np.count_nonzero(waiting)
+            order = np.argsort(~waiting, kind="stable")
             tiling.order[: len(order)] = order
             tiling.count[1:] = 2 * SHARES, SHARES
             for k, tiles in enumerate((order[:border], order[border:])):
@@ -260,14 +260,16 @@ class SharedTiles(Tiles):
             for here in [of == rank]
         }
         self._inner = self._inner_boxes(boxes) if self._looks_beyond else {}
-        own, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
+        local, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
         self._passed, self._from = {}, of[:0]
-        if not len(own):
-            return Boxes(*(array[:0] for array in boxes)), Reached(*(a[own] for a in reached))
+        if not len(local):
+            return Boxes(*(array[:0] for array in boxes)), Reached(*(a[local] for a in reached))
         for rank, needs in self._needs.items():
             if rank != me:
-                which, low, high = needs.among(place[own], reached.begin[own], reached.end[own])
-                self._passed[rank] = reached.box[own][which], low, high
+                which, low, high = needs.among(
+                    place[local], reached.begin[local], reached.end[local]
+                )
+                self._passed[rank] = reached.box[local][which], low, high
         which, low, high = self._needs[me].among(
             place[others], reached.begin[others], reached.end[others]
         )
@@ -276,12 +278,12 @@ class SharedTiles(Tiles):
         # Their rows were cut in `_reached` of the base.
         more = Boxes(boxes.order[box], boxes.grid[box], low, high, boxes.rows[box])
         count = np.count_nonzero(self._of == me)
-        found = Reached(*(array[np.append(own, pieces)] for array in reached))
-        found.box[len(own) :] = count + np.arange(len(pieces))
-        found.begin[len(own) :], found.end[len(own) :] = low, high
+        result = Reached(*(array[np.append(local, pieces)] for array in reached))
+        result.box[len(local) :] = count + np.arange(len(pieces))
+        result.begin[len(local) :], result.end[len(local) :] = low, high
         return Boxes(
             *(np.append(a[:count], b, axis=0) for a, b in zip(boxes, more, strict=True))
-        ), found
+        ), result
 
     def _inner_boxes(self, boxes: Boxes) -> dict[int, tuple]:
         """Shrink boxes to nodes whose neighbours are in them, too, by process."""
@@ -302,11 +304,11 @@ class SharedTiles(Tiles):
             if len(which)  # hulls may overlap without a common node
         }
         ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
-        own = len(ends) - 1 - len(self._from)
+        local = len(ends) - 1 - len(self._from)
         self._taken = {}
         for rank in unique(self._from):
             begin, end = np.searchsorted(self._from, [rank, rank + 1])
-            self._taken[int(rank)] = slice(int(ends[own + begin]), int(ends[own + end]))
+            self._taken[int(rank)] = slice(int(ends[local + begin]), int(ends[local + end]))
         return first, steps
 
     def _see_nodes(
@@ -330,19 +332,19 @@ class SharedTiles(Tiles):
         count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
         place = nodes % count
         for rank, boxes in sorted(self._inner.items()):
-            known = np.isin(place, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
+            seen = np.isin(place, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
             if rank == self.comm.rank:
-                return nodes[~known]
-            place = np.where(known, -1, place)
+                return nodes[~seen]
+            place = np.where(seen, -1, place)
         return nodes
 
-    def give(self, s: Setup, number: int, what: int) -> None:
+    def give(self, s: Setup, number: int, kinds: int) -> None:
         """Begin to exchange the contributions of tiles to nodes of other processes."""
-        link = self._links.get((number, what))
+        link = self._links.get((number, kinds))
         if link is None:
             of = next(one for one in buffers_of(s) if one.number == number)
-            link = self._link(chosen_of(of.nodes, what))
-            self._links[number, what] = link
+            link = self._link(chosen_of(of.nodes, kinds))
+            self._links[number, kinds] = link
         packed, self._under_way = link
         for array, rows, room in packed:
             np.take(array, rows, axis=0, out=room, mode="clip")
@@ -352,14 +354,14 @@ class SharedTiles(Tiles):
         self.comm.finish(self._under_way)
 
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
-        packed, given, taken = [], [], []
+        packed, sent, taken = [], [], []
         for array in arrays:
             for rank, rows in self.given.items():
                 room = np.empty((len(rows), array.shape[1]), array.dtype)
                 packed.append((array, rows, room))
-                given.append((rank, room))
+                sent.append((rank, room))
             taken += [(rank, array[rows]) for rank, rows in self._taken.items()]
-        return packed, self.comm.connect(given, taken)
+        return packed, self.comm.connect(sent, taken)
 
 
 def work_of(loads: np.ndarray, costs: np.ndarray) -> np.ndarray:

@@ -112,12 +112,12 @@ class Subdomain(WholeDomain):
         return [*self.contact_memory(), *(array for _, array in kept)]
 
     def share_memory(self) -> None:
-        own, step, contact = self.counted(), self.simulation.step, self.contact_memory()
+        nodes, step, contact = self.counted(), self.simulation.step, self.contact_memory()
         self.share_kept()
         if contact:
             last = max(step - self.simulation.setup.contact.memory.max(), 0)
-            touched = [(np.abs(one[own]) > last).any(axis=1) for one in contact]
-            self._share(own[np.any(touched, axis=0)], contact)
+            touched = [(np.abs(one[nodes]) > last).any(axis=1) for one in contact]
+            self._share(nodes[np.any(touched, axis=0)], contact)
 
     def share_kept(self) -> None:
         if kept := kept_at_nodes(self.simulation.setup):
@@ -185,30 +185,30 @@ class Subdomain(WholeDomain):
         mine = partition.share_of(s, tiles.owner == self.comm.rank)
         self.put([mine, *self.comm.exchange(given).values()])
 
-    def answer(self, what: int, a: int, b: int) -> int:
+    def answer(self, request: int, a: int, b: int) -> int:
         try:
             self.load.note()
-            found = self._answer(what, a, b)
-            if what == ranks.NEXT:
+            found = self._answer(request, a, b)
+            if request == ranks.NEXT:
                 self.load.next_block()
             else:
-                self.load.resume(0 if what in {ranks.SWEEP, ranks.GIVE} else None)
+                self.load.resume(0 if request in {ranks.SWEEP, ranks.GIVE} else None)
             return found
         except BaseException as error:
             # Exceptions cannot pass through a kernel, and the others wait.
             self.comm.fail(error)
             raise
 
-    def _answer(self, what: int, a: int, b: int) -> int:
-        if what == ranks.GIVE:
+    def _answer(self, request: int, a: int, b: int) -> int:
+        if request == ranks.GIVE:
             self.tiles.give(self.simulation.setup, a, b)
-        elif what == ranks.TAKE:
+        elif request == ranks.TAKE:
             self.tiles.take()
-        elif what == ranks.TOTALS:
+        elif request == ranks.TOTALS:
             self._totals(a, b)
-        elif what == ranks.LARGEST:
+        elif request == ranks.LARGEST:
             self.comm.allreduce_max(self.control.answer[:a])
-        elif what == ranks.NUMBER:
+        elif request == ranks.NUMBER:
             return int(self.comm.allreduce(np.array([a]))[0])
         return 0  # the other calls only mark the time
 

@@ -102,7 +102,7 @@ class Whole:
 
     def _own(self) -> dict:
         simulation, subdomain = self.simulation, self.subdomain
-        s, own = simulation.setup, subdomain.counted()
+        s, nodes = simulation.setup, subdomain.counted()
         return {
             "counts": [block.points.mass.size for block in s.blocks],
             "tiling": [
@@ -110,9 +110,9 @@ class Whole:
                 | {"report": tiling.report[: tiling.count[0]]}
                 for tiling in (block.tiling for block in s.blocks)
             ],
-            "nodes": own,
-            "at nodes": [array[own] for _, array in of_nodes(s)],
-            "memory": [array[own] for array in subdomain.memory()],
+            "nodes": nodes,
+            "at nodes": [array[nodes] for _, array in of_nodes(s)],
+            "memory": [array[nodes] for array in subdomain.memory()],
         }
 
     def _join(self, parts: list[dict]) -> None:
