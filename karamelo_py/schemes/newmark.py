@@ -16,7 +16,6 @@ class Surplus(Field):
 
 
 def _damping(scheme: "Newmark") -> str:
-    """Name what damps vibrations; empty if nothing does."""
     if scheme.rule == "euler":
         return "rule=euler"
     if scheme.rho < 1:
@@ -27,9 +26,9 @@ def _damping(scheme: "Newmark") -> str:
 class Newmark(NamedTuple):
     """Implicit time steps with inertia, not limited by waves (Newmark 1959).
 
-    The step is set by `set_dt`. Vibrations that it does not resolve are undamped, unless `gamma` is
+    `set_dt` sets the step. Vibrations that it does not resolve are undamped, unless `gamma` is
     above 1/2, `rho` is below 1, or the rule is euler. The acceleration at the beginning of a step
-    comes from the forces there; with `rho` from the rule.
+    follows from the forces there; with `rho` from the rule.
 
     Parameters
     ----------
@@ -38,12 +37,11 @@ class Newmark(NamedTuple):
         v + dt ((1 - gamma) a + gamma a'). The defaults, 1/4 and 1/2, are the trapezoidal rule,
         which conserves the energy of linear bodies. Gamma above 1/2 damps, high frequencies most.
     rule
-        ``newmark``, or ``euler``: the backward Euler rule, which damps all vibrations.
+        ``newmark``, or ``euler``: backward Euler, which damps all vibrations.
     rho
-        Spectral radius at high frequency, i.e. the fraction of vibrations much faster than the step
-        that remains after a step: generalized-alpha (Chung & Hulbert 1993). Forces and
-        accelerations are then in balance between the beginning and the end of a step. Slow
-        vibrations are hardly damped. 1: no damping; 0: they vanish in one step.
+        Spectral radius at high frequency: the fraction of vibrations much faster than the step that
+        remains after a step, by generalized-alpha (Chung & Hulbert 1993), which hardly damps slow
+        vibrations. 1: no damping; 0: they vanish in one step.
     tolerance, iterations, solver, stabilisation
         As in quasi-static.
 
@@ -83,7 +81,6 @@ class Newmark(NamedTuple):
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        """Return the fields that points carry from one step to the next."""
         return (Surplus,) if self.rho < 1 else ()
 
     @classmethod
@@ -99,7 +96,6 @@ class Newmark(NamedTuple):
         solver: Literal["auto", "direct", "amg"] = "auto",
         stabilisation: Annotated[float, NonNegative] = 0.0,
     ) -> Any:
-        """Make the scheme from the words of a script."""
         if rho is not None:
             if beta is not None or gamma is not None or rule != "newmark":
                 raise ScriptError(

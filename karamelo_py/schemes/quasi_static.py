@@ -33,9 +33,9 @@ Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.0
 class QuasiStatic(NamedTuple):
     """Load steps without inertia: each ends in equilibrium, found by Newton's method.
 
-    Each step of the run is a load step. Loads are formulas of `time`, which is only a load
-    parameter. The tangent is exact for every law and basis, so Newton's method converges
-    quadratically. A step that does not converge is subdivided.
+    Each step of the run is a load step; loads are formulas of `time`, which is only a load
+    parameter. The tangent is exact for every law and basis, so convergence is quadratic. A step
+    that does not converge is subdivided.
 
     Parameters
     ----------
@@ -46,15 +46,14 @@ class QuasiStatic(NamedTuple):
         Number of corrections before a step is halved.
     solver
         Linear solver: ``direct``, ``amg`` (conjugate gradients with algebraic multigrid), or
-        ``auto``. auto takes amg from 5000 unknowns in 2D if the matrix is symmetric, and from 2000
-        in 3D.
+        ``auto``: amg from 5000 unknowns in 2D if the matrix is symmetric, and from 2000 in 3D.
     stabilisation
-        Ghost stabilisation (Coombs 2023): penalises gradient jumps at the border of a body, with
-        this fraction of Young's modulus. It stabilises nodes that overlap only a sliver of the
+        Ghost stabilisation (Coombs 2023): penalises gradient jumps at the border of a body with
+        this fraction of Young's modulus, and stabilises nodes that overlap only a sliver of the
         body. 0: none.
     limit
-        What to do if no equilibrium is found even with 1/1024 of a step: raise an ``error``, or end
-        the run (``stop``). With ``stop`` the script continues, and `time` belongs to the last
+        What to do without equilibrium even with 1/1024 of a step: raise an ``error``, or end the
+        run (``stop``). With ``stop`` the script continues, and `time` belongs to the last
         equilibrium: loads as formulas of it are the limit load.
 
     Example
@@ -65,9 +64,8 @@ class QuasiStatic(NamedTuple):
 
     Notes
     -----
-    Velocities and kinetic energies are zero after a step. A script can show `iterations`,
-    `residual` and `parts` of the last step: corrections, remaining fraction of the forces, and
-    number of substeps.
+    Velocities and kinetic energies are zero after a step. A script can show `iterations`
+    (corrections), `residual` (fraction of the forces) and `parts` (substeps) of the last step.
 
     A step is also subdivided if points would move more than half a cell towards nodes that move
     differently, or towards held nodes without points.
@@ -95,5 +93,4 @@ class QuasiStatic(NamedTuple):
         stabilisation: Annotated[float, NonNegative] = 1 / 30,
         limit: Literal["error", "stop"] = "error",
     ):
-        """Make the scheme from the words of a script."""
         return cls(tolerance, iterations, solver, stabilisation, limit)

@@ -17,12 +17,12 @@ class USL(NamedTuple):
 
     The fastest scheme, with one pass over the points per step. It dissipates a little.
 
-    The stable step is 0.65 h/c, and 0.4 h/c with one point per cell. With bernstein-quadratic it is
-    0.7 times as large. The points average some nodal modes away. Only the strain of such a mode
-    responds to forces: e <- (1 - (w dt)^2) e. This is stable for w dt < sqrt(2) instead of 2.
+    The stable step is 0.65 h/c, 0.4 h/c with one point per cell, and 0.7 times that with
+    bernstein-quadratic. The points average some nodal modes away; only the strain of such a mode
+    responds to forces: e <- (1 - (w dt)^2) e, stable for w dt < sqrt(2) instead of 2.
 
-    A node with almost no mass gets a large velocity. The mass limit is the mean mass of the points
-    around the node times d (c dt / h)^2, at most 1. Below it, the velocity change that enters the
+    A node with almost no mass gets a large velocity. Its mass limit is the mean mass of the points
+    around it times d (c dt / h)^2, at most 1. Below it, the velocity change that enters the
     gradient is scaled by nodal mass / limit. Momentum is conserved.
 
     Example
@@ -45,7 +45,6 @@ class USL(NamedTuple):
 
 
 def _thin_edges(scheme, scene):
-    """Return True if boxes have edges on which moments act."""
     boxes = scene.basis.traits.steep_edge and scene.basis.traits.cells > 1
     return scene.moments and boxes and not gradient_weight.defined(type(scene.transfer))
 
@@ -73,7 +72,6 @@ known_failure(
 
 
 def any_node(s):
-    """Nodal mass below which the gradient is limited: none."""
     return UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
 
 
