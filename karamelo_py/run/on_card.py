@@ -86,8 +86,6 @@ class SimulationOnCard(Simulation):
             self._steps.fetch()
             self.tiles.unsort(self.control, limit=0.0)  # tiles know nothing of these steps
 
-    # --- changes here
-
     def changed(self) -> None:
         self._sent = False
         super().changed()
@@ -104,8 +102,6 @@ class SimulationOnCard(Simulation):
         self._ahead = self._nodes_ahead = False  # the state of the card is obsolete
         super().restore(snapshot)
 
-    # --- what needs points that are sorted: sums by tile, which nodes are in use
-
     def sort_if_due(self) -> None:
         self._fetch()
         super().sort_if_due()
@@ -121,8 +117,6 @@ class SimulationOnCard(Simulation):
         self.sort_if_due()
         self._sent = False  # the work of forces is taken from the points
         return super().in_tiles()
-
-    # --- steps
 
     def refuse(self) -> None:
         refuse(self.hub, self._setup)

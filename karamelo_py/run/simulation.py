@@ -120,8 +120,6 @@ class Simulation(SceneArrays):
         self.steps.measured = True
         return mass, kinetic + stored
 
-    # --- steps
-
     @property
     def step_kind(self) -> StepKind:
         """Tags that select the code of a step."""

@@ -375,9 +375,6 @@ def _misfit(what: str) -> ScriptError:
     )
 
 
-# --- of several processes -------------------------------------------------------------------------
-
-
 def _joined(simulation: Backend, local: dict[str, np.ndarray]) -> Iterator[Stored]:
     s, comm = simulation.setup, simulation.comm
     state: dict[str, Any] = {

@@ -289,9 +289,6 @@ def _no_file(path: Path, out: Path | None) -> ScriptError:
     )
 
 
-# ---- whether a scene is the one that wrote a file ----------------------------------------------
-
-
 def described(hub: Hub) -> dict[str, str]:
     update, domain = hub.update, hub.domain
     box = zip(domain.lo.tolist(), domain.hi.tolist(), strict=True)

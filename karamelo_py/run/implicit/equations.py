@@ -293,8 +293,6 @@ class Equations:
         m = len(self.nodes)
         return sp.csr_matrix((data, self.pairs[1], self.layout.first), (m, m))
 
-    # --- ghost stabilisation ----------------------------------------------------------------------
-
     def moduli(self) -> "Moduli":
         """Estimate Young's moduli at rest: 2.6 times the mean shear modulus."""
         kin = self.s.kin
