@@ -4,7 +4,7 @@ import inspect
 import linecache
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -345,9 +345,9 @@ def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
     """Part defined in a file, or else in its package."""
     path = Path(file).resolve()
     for part in parts:
-        file_of_module = getattr(sys.modules.get(part.kind.__module__), "__file__", None)
-        if file_of_module and Path(file_of_module).resolve() == path:
-            return part
+        with suppress(TypeError, OSError):  # of a built-in module
+            if Path(inspect.getfile(part.kind)).resolve() == path:
+                return part
     for part in parts:
         package = sys.modules.get(part.kind.__module__.partition(".")[0])
         folders = getattr(package, "__path__", ())

@@ -10,7 +10,6 @@ import numpy as np
 from karamelo_py.language.kinds import TableFile
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.output import snapshots
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.reading import read_text
@@ -44,6 +43,8 @@ def _is_dump(path: Path) -> bool:
 
 def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
     """Return the columns of the last snapshot that a new solid can have, without zero ones."""
+    from karamelo_py.output import snapshots  # with XML, for dumps only
+
     *_, last = snapshots.read(path)
     domain = require_domain(hub)
     axes = "xyz"[: domain.dimension]
