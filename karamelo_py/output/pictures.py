@@ -74,8 +74,6 @@ class Options(NamedTuple):
 
 
 class DrawnPoints(Artist):
-    """Points of one state, drawn in batches."""
-
     def __init__(self, picture: Picture):
         super().__init__()
         self.picture = picture
@@ -363,7 +361,7 @@ def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
 
 
 class PlanePicture(Picture):
-    """2D: points at their positions."""
+    """2D."""
 
     def _prepare(self) -> Any:
         lo, hi = self.domain.lo, self.domain.hi
@@ -562,7 +560,7 @@ class SpacePicture(PlanePicture):
 
 
 class LinePicture(Picture):
-    """1D: the field over x."""
+    """1D."""
 
     def _prepare(self) -> Any:
         self.axes.set_xlim(self.domain.lo[0], self.domain.hi[0])

@@ -61,8 +61,6 @@ STYLES = {
 
 
 class Units(NamedTuple):
-    """Units by name."""
-
     length: str
     mass: str
     time: str

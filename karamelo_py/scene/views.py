@@ -448,7 +448,6 @@ class PointsView(View):
                 impose_stress(matter, chosen, flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
-        """Set temperatures (n,)."""
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             points = arrays.known_to_laws(block.points)

@@ -14,8 +14,6 @@ DIMENSIONS = {
 
 
 class CellBlock(NamedTuple):
-    """Cells of one type."""
-
     type: str  # meshio's, such as tetra10
     nodes: np.ndarray  # (n, c) numbers from 0, corners first
     # (c, d) natural coordinates of the nodes; None: VTK's order.
