@@ -16,8 +16,8 @@ import numpy as np
 from karamelo_py import Simulation
 from karamelo_py.advice import energy
 from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.points.laws import moves_as_told
-from karamelo_py.run.energy import share_lost, unknown_work
+from karamelo_py.points.laws import is_rigid
+from karamelo_py.run.energy import unknown_work
 
 ROOT = Path(__file__).parent.parent
 INPUTS, PAGE = ROOT / "inputs", ROOT / "docs" / "balance.md"
@@ -59,7 +59,7 @@ class Balance(NamedTuple):
 def outer_forces(hub: Any) -> dict[str, float]:
     """Names of the forces on the points that are not rigid, and by what they count."""
     solids = list(hub.solids.values())
-    rigid = [s for s in solids if moves_as_told(s.material.law)]
+    rigid = [s for s in solids if is_rigid(s.material.law)]
     masses = {s.id: float(np.sum(np.broadcast_to(s.mass, s.count))) for s in solids}
     # Weight is published with that of rigid bodies where they have nodes of their own.
     own = rigid if hub.update.method.fields_per_solid else []
@@ -96,7 +96,7 @@ def measure(script: Path, *, full: bool = False) -> Balance:
         sim = Simulation(script)
         hub = sim.hub
         d, forces = hub.domain.dimension, outer_forces(hub)
-        soft = [s.id for s in hub.solids.values() if not moves_as_told(s.material.law)]
+        soft = [s.id for s in hub.solids.values() if not is_rigid(s.material.law)]
         sim.command(f"""
             region(of_balance, block, {", ".join(["INF"] * 2 * d)})
             group(of_balance, particles, region, of_balance, solid, {", ".join(soft)})
@@ -125,11 +125,11 @@ def measure(script: Path, *, full: bool = False) -> Balance:
     mass = sum(
         block.points.mass.sum()
         for block in simulation.setup.blocks
-        if not moves_as_told(block.laws)
+        if not is_rigid(block.laws)
     )
     size = max(np.sqrt(2 * mass * log["E_balance"].max()), np.abs(impulse).max())
     watched = simulation.control.clock[0].watch_energy
-    lost = share_lost(simulation) if watched else np.nan
+    lost = simulation.energy_watch.share_lost() if watched else np.nan
     # Forces of implicit steps are those of their ends.
     momentum = np.nan if simulation.implicit else 100 * left / size if size else 0.0
     return Balance(len(dt), -100 * lost, momentum, why(hub, simulation, lost))

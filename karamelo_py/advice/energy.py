@@ -128,11 +128,6 @@ def taken_by(hub: Hub) -> list[str]:
     if flip_coefficient(transfer) < 1:
         share = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
-    if hub.update.method.fields_per_solid:
-        # Contact reverses the motion that damping has reduced, within the step: nodes chatter, and
-        # points are damped less than nodes.
-        braking = dict.fromkeys(fix.style for fix in hub.fixes.values() if fix.brakes)
-        takers += [f"fix {style}" for style in braking]
     return takers
 
 

@@ -269,6 +269,7 @@ FINAL_INTEGRATE = 6
 POST_HEAT_TO_GRID = 7
 SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
+POST_CONTACT = 10  # damping, of the forces of contact as well
 
 # Where in the node arrays a hook acts.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2

@@ -37,16 +37,18 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     DT,
     MASS,
+    ON_UPDATE,
+    POST_CONTACT,
     TIMESTEP,
     Nodes,
     Tag,
     of_change,
     of_momentum,
     vector_at,
-)  # fmt: skip
+)
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.equations.mass_momentum import Centre, Normal
-from karamelo_py.kernels.table import Once, each_node
+from karamelo_py.kernels.table import AtNodes, Once, each_node
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
@@ -615,6 +617,7 @@ SeparateFields.rows = (  # type: ignore[attr-defined]
     each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
     each_node(lambda s, n: touch_node(_bodies(s), s.grids, s.control, n)),
     Once(_publish_forces),
+    AtNodes(POST_CONTACT, ON_UPDATE),
 )
 
 

@@ -431,7 +431,8 @@ def _change_update(what, call, c, q):
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
     # Contact may still change the velocity of a free node, and a rigid body of any node.
-    late, rigid = hook.stage == arrays.POST_UPDATE_GRID_STATE, field(nodes.fields, RigidSums)
+    late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
+    rigid = field(nodes.fields, RigidSums)
     if late and (hook.holds == 0 or _is_taken(rigid, n)):
         hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
     elif not _moves_as_told(hooks, n):

@@ -111,7 +111,10 @@ class _Builder:
         uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
         uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))
-        self.rows.append((address, STAGES[moment], begin, end, slot, *uses))
+        late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
+        after_contact = late and fix.brakes and self.hub.update.method.fields_per_solid
+        stage = arrays.POST_CONTACT if after_contact else STAGES[moment]
+        self.rows.append((address, stage, begin, end, slot, *uses))
         whole = hook.tag is not None  # its functions take all directions
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
         programs = list(map(self._program, formulas_of_hook))
@@ -121,7 +124,6 @@ class _Builder:
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)
         early = STAGES[moment] == arrays.POST_PARTICLES_TO_GRID
-        late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
         rubs = fix.wall_friction is not None
         if early or (late and (not holds or rubs or self.rigid)):
             self.loaded_nodes = fix.group.total()

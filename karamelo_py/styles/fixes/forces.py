@@ -239,9 +239,8 @@ class LocalDamping(Fix):
     prescribed constant velocity are not damped, and their reactions are correct. Publishes the sum
     of the damping forces as ID_x, ID_y, ID_z.
 
-    In method ulmpm/contacts it acts before solids push each other: bodies in contact stick as with
-    friction, between 1 - alpha and 1 + alpha of the load. Reduce alpha to 0 there, as in 0.8*max(1
-    - time/T, 0).
+    In method ulmpm/contacts it acts after contact, on the net force: bodies that touch come to rest
+    with the correct forces between them.
 
     See Also
     --------
@@ -257,15 +256,6 @@ class LocalDamping(Fix):
     def __init__(self, hub: Hub, group: NodeGroup, alpha: Annotated[Expression, In(0, 1)] = 0.8):
         super().__init__(hub, group)
         self.formulas = (Expression(alpha),) * hub.domain.dimension
-
-    def defined(self) -> None:
-        """Warn if the state of rest would differ from the one without damping."""
-        alpha = self.formulas[0]
-        if alpha.is_constant and alpha.constant > 0 and self.hub.update.method.fields_per_solid:
-            self.hub.warn(
-                "bodies that touch come to rest anywhere near their balance while damping acts",
-                hint="an alpha that goes to 0: 0.8*max(1 - time/T, 0)",
-            )
 
 
 NAMES = ("11", "22", "33", "23", "13", "12")
