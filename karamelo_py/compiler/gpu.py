@@ -186,8 +186,8 @@ def text_of(
     text = str(module)
     if on_card:
         outside = [f.name for f in module.functions if not f.blocks]
-        for other, own in [(f, _of_nvidia(f)) for f in outside]:
-            text = text.replace(f'@"{other}"', f'@"{own}"') if own else text
+        for other, replacement in [(f, _of_nvidia(f)) for f in outside]:
+            text = text.replace(f'@"{other}"', f'@"{replacement}"') if replacement else text
     name = f"{function.__name__}_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
     return name, text.replace(NAME + ENTRY, f"{name}_entry").replace(NAME, name)
 

@@ -183,13 +183,13 @@ def plan_for(arguments: tuple) -> Plan:
         end = at
         return begin
 
-    held = HeldTuple(tuple(held_type(typeof(argument)) for argument in arguments))
-    first = lay(held)
+    outer = HeldTuple(tuple(held_type(typeof(argument)) for argument in arguments))
+    first = lay(outer)
     text, at = "=", 0
     for offset, word in places:
         text += f"{offset - at}x{word}"
         at = offset + struct.calcsize(f"={word}")
-    return Plan(struct.Struct(text), tuple(tuples), first, held.types)
+    return Plan(struct.Struct(text), tuple(tuples), first, outer.types)
 
 
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:

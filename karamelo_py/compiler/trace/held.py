@@ -84,43 +84,43 @@ def hold(value: Any) -> Any:
 @builtin(hold)
 def _hold(lowering: Any, thing: Any) -> Any:
     kind = types.unliteral(lowering.kind_of(thing))
-    held = held_type(kind)
-    return thing if held == kind else held_as(lowering, thing, held)
+    wanted = held_type(kind)
+    return thing if wanted == kind else held_as(lowering, thing, wanted)
 
 
-def held_as(lowering: Any, things: Iterable, held: HeldTuple) -> HeldValue:
+def held_as(lowering: Any, things: Iterable, kind_of_tuple: HeldTuple) -> HeldValue:
     builder = lowering.builder
     items = [_hold(lowering, thing) for thing in things]
-    room = builder and llvm.room(builder, held.register_type().pointee)
+    room = builder and llvm.room(builder, kind_of_tuple.register_type().pointee)
     if builder:
-        for k, (kind, item) in enumerate(zip(held, items, strict=True)):
+        for k, (kind, item) in enumerate(zip(kind_of_tuple, items, strict=True)):
             llvm.put(builder, kind, lowering.lowered(item, kind), llvm.at(builder, room, 0, k))
-    return HeldValue(held, room)
+    return HeldValue(kind_of_tuple, room)
 
 
-def item_of(builder: ir.IRBuilder, held: HeldTuple, pointer: ir.Value, k: int) -> ir.Value:
-    return llvm.get(builder, held[k], llvm.at(builder, pointer, 0, k))
+def item_of(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: int) -> ir.Value:
+    return llvm.get(builder, kind[k], llvm.at(builder, pointer, 0, k))
 
 
-def at_hand(held: Any) -> Any:
+def at_hand(value: Any) -> Any:
     """Copy a held tuple to private memory, so that its items stay in registers.
 
     For kernels with loops, before the loops; inside, LLVM cannot know that the items do not change.
     """
-    return held
+    return value
 
 
 @builtin(at_hand)
-def _at_hand(lowering: Any, held: Any) -> Any:
-    if not isinstance(held, HeldValue) or lowering.builder is None:
-        return held
-    return HeldValue(held._kind, _copy(lowering.builder, held._kind, held._value))
+def _at_hand(lowering: Any, value: Any) -> Any:
+    if not isinstance(value, HeldValue) or lowering.builder is None:
+        return value
+    return HeldValue(value._kind, _copy(lowering.builder, value._kind, value._value))
 
 
-def _copy(builder: ir.IRBuilder, held: HeldTuple, source: ir.Value) -> ir.Value:
+def _copy(builder: ir.IRBuilder, kind: HeldTuple, source: ir.Value) -> ir.Value:
     room = llvm.room(builder, source.type.pointee)
     builder.store(builder.load(source), room)
-    for k, item in enumerate(held):
+    for k, item in enumerate(kind):
         if is_held(item):
             at = llvm.at(builder, room, 0, k)
             builder.store(_copy(builder, item, builder.load(at)), at)

@@ -182,11 +182,11 @@ class Lowering:
 
     attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
-    def item(self, held: traced.HeldValue, k: int) -> Any:
-        key = id(held), k
+    def item(self, parent: traced.HeldValue, k: int) -> Any:
+        key = id(parent), k
         if key not in self.read:
-            value = self.builder and item_of(self.builder, held._kind, held._value, k)
-            self.read[key] = self.wrapped(held._kind[k], value), held  # keeps its id unique
+            value = self.builder and item_of(self.builder, parent._kind, parent._value, k)
+            self.read[key] = self.wrapped(parent._kind[k], value), parent  # keeps its id unique
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
