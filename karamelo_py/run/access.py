@@ -19,7 +19,7 @@ class NodesByNumber:
         self.points, self.simulation = points, points.simulation
 
     def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeTable]:
-        """Yield all nodes in pieces, with the sums over points that the columns `names` need."""
+        """Yield all nodes in pieces, with the sums over points for the columns `names`."""
         simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
         simulation.show_on_nodes()
         s = simulation.setup

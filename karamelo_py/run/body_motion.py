@@ -28,7 +28,7 @@ class BodyMotion(NamedTuple):
         return float((self.high - self.low).max()) / 2
 
     def drift(self, axisymmetric: bool) -> np.ndarray:
-        """Return the rigid velocity (d,); the radial component is 0."""
+        """Return the rigid velocity (d,), without a radial component."""
         return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
 
     @property

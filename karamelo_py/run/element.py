@@ -29,7 +29,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Targets at the end of a load path; strains that are not named do not change."""
+    """Targets at the end of a load path; other strains do not change."""
 
     increments: int  # number of equal ones
     duration: float
@@ -362,7 +362,6 @@ class Response:
             np.savetxt(file, self.rows, fmt=formats, delimiter="", header=header, comments="")
 
     def draw(self, path: Path, title: str) -> None:
-        """Plot the stresses over the strain that changes most, and q over p."""
         table = dict(zip(self.names, np.transpose(self.rows), strict=True))
         strains = [name for name in self.names if name.startswith("e") and name[1:] in COMPONENTS]
         driven = max(strains, key=lambda name: np.ptp(table[name]))

@@ -44,7 +44,7 @@ class _Line(NamedTuple):
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
     """Return the stable step over h/c that the nodes of all solids allow; inf if unknown.
 
-    Rounded down to four digits, so that sums in another order give the same step.
+    Rounded down to four digits: sums in another order give the same step.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf

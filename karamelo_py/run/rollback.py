@@ -39,8 +39,6 @@ def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
 
 
 class RollBack:
-    """Stores the last good state of a run, and returns to it."""
-
     def __init__(self, hub: Hub, tell: Callable, *, halve: bool):
         self.hub, self.tell, self.place = hub, tell, hub.place
         self.point = RollbackPoint(hub, halve)

@@ -36,7 +36,7 @@ Key = tuple[str, str, str]  # family, ID and style of a part
 
 
 class PartStates(NamedTuple):
-    """The memories of parts at one state, as JSON knows them, and the published values."""
+    """The memories of parts and the published values at one state, as JSON knows them."""
 
     parts: dict[Key, dict[str, Any]]
     arrays: list[np.ndarray]  # indexed by the numbers in `parts`
@@ -238,7 +238,6 @@ class RollbackPoint:
         self.arrays, self.step, self._parts = arrays, step, {step: parts}
 
     def note(self, *, always: bool) -> None:
-        """Note the memory of parts now, `always` or if an output has just been written."""
         step = self.hub.update.step
         outputs = (part for key, part in parts_of(self.hub) if key[0] in OUTPUTS)
         if always or any(part.last_step == step for part in outputs):

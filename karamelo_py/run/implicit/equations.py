@@ -173,7 +173,6 @@ class Equations:
         return np.where(inside, self.numbers[np.where(inside, at, 0)], -1)
 
     def bodies(self) -> np.ndarray:
-        """Number (m,) the bodies of the nodes: components that points connect."""
         rows, columns = self.joined
         m = len(self.nodes)
         graph = sp.csr_matrix((np.ones(len(rows), bool), (rows, columns)), (m, m))

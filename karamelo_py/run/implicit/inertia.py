@@ -12,8 +12,6 @@ from karamelo_py.schemes.newmark import Surplus
 
 
 class Rest:
-    """No inertia: load steps."""
-
     diagonal = 0.0  # of the stiffness, in units of a nodal mass
 
     def __init__(self, equations: Equations):

@@ -188,7 +188,7 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 def returns_loss(hub: Hub) -> bool:
     """Return True if kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 dissipates none that does not vanish with the step, unless it stores moments. XPIC is
+    FLIP 1 dissipates none that does not vanish with the step, unless it stores moments; XPIC is
     handled in `kernels.equations.loss.reflect`.
     """
     transfer = hub.update.transfer

@@ -144,7 +144,6 @@ def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
 
 
 def least_bytes(hub: Hub, real: type, copied: bool) -> float:
-    """Return the least bytes of points, their copy, and the nodes of the cells they fill."""
     kin = hub.update.method.kinematics(hub)
     kinds = point_kinds(hub)
     points, cells = 0, [0.0]

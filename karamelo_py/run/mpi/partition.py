@@ -242,7 +242,6 @@ class SharedTiles(Tiles):
                 tiling.share[k * SHARES : (k + 1) * SHARES + 1] = share
 
     def own_boxes(self, s: Setup) -> Boxes:
-        """Return the boxes of the own tiles, with their order in a serial run."""
         order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
         return super()._boxes(s)._replace(order=np.concatenate(order))
 
@@ -389,7 +388,6 @@ def sized(points: Points, count: int) -> Points:
 
 
 def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
-    """Return the hull of boxes (m, d) at each place (m,)."""
     order = np.argsort(place, kind="stable")
     starts = np.flatnonzero(np.diff(place[order], prepend=-1))
     return Needs(place[order][starts], *extents(starts, begin[order], end[order]))

@@ -57,7 +57,6 @@ class _PretendedComm(SerialComm):
 
 
 def bytes_of_node(simulation: Simulation) -> int:
-    """Return the bytes sent per step for each node in reach of another process."""
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()

@@ -41,7 +41,6 @@ class Load:
             self._spent[0, self._at] += time.perf_counter_ns() - self._since
 
     def resume(self, block: int | None = None) -> None:
-        """Begin to count the time of a sweep over the points of a block, or of something else."""
         self._at = self._rest if block is None else block
         self._since = time.perf_counter_ns()
 
