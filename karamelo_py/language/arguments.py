@@ -150,7 +150,7 @@ class Named:
     catalogue = ""  # attribute of the scene
 
     @classmethod
-    def from_script(cls, hub: Any, argument: Argument) -> Any:
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
         return look_up(getattr(hub, cls.catalogue), argument)
 
 

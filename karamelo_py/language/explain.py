@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Sequence
-from typing import Any
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NUMBER, Argument, with_gap
 from karamelo_py.language.kinds import Parameter, Unfit
+from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import longer
 from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
 
@@ -93,7 +93,7 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
 
 
 def swapped(
-    hub: Any, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
+    hub: Scene, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
 ) -> str | None:
     """Write the hint for two arguments that fit in each other's place."""
 

@@ -170,7 +170,7 @@ def _shown(value: Value) -> str:
     return number_text(value)
 
 
-def _to_number(hub: Any, argument: Argument) -> float:
+def _to_number(hub: Scene, argument: Argument) -> float:
     if argument.text.lstrip("+-") in WORDS and argument.text not in argument._interpreter.variables:
         raise Unfit(argument.text)
     try:
@@ -201,7 +201,7 @@ def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
         error.hint = meant(name, numbers) or f"set it first: {name} = ..."
 
 
-def _to_integer(hub: Any, argument: Argument) -> int:
+def _to_integer(hub: Scene, argument: Argument) -> int:
     value = _to_number(hub, argument)
     if math.isnan(value):
         return 1  # unknown in a rehearsal; 1 passes every check
@@ -212,7 +212,7 @@ def _to_integer(hub: Any, argument: Argument) -> int:
     return round(value)
 
 
-def _to_text(hub: Any, argument: Argument) -> str:
+def _to_text(hub: Scene, argument: Argument) -> str:
     word = argument.words()
     if word == argument.text:
         if NUMBER.fullmatch(word):
@@ -231,7 +231,7 @@ class StyleOf:
     family: str
     script_kind = "a word"
 
-    def from_script(self, hub: Any, argument: Argument) -> str:
+    def from_script(self, hub: Scene, argument: Argument) -> str:
         if registry.knows(self.family, argument.text):
             return argument.text
         joined = "-".join(argument.text.split())
@@ -240,7 +240,7 @@ class StyleOf:
         return _to_text(hub, argument)
 
 
-def _to_expression(hub: Any, argument: Argument) -> Expression:
+def _to_expression(hub: Scene, argument: Argument) -> Expression:
     value = argument.value(hub)
     if isinstance(value, str):
         raise Unfit(_shown(value))
@@ -248,7 +248,7 @@ def _to_expression(hub: Any, argument: Argument) -> Expression:
 
 
 def _of_words(words: tuple[str, ...]) -> Callable[[Any, Argument], str]:
-    def convert(hub: Any, argument: Argument) -> str:
+    def convert(hub: Scene, argument: Argument) -> str:
         word = argument.words(words)
         if word not in words:
             raise _no_word_of(words, word, argument)
@@ -319,7 +319,7 @@ def is_raw(kind: Kind) -> bool:
 
 
 def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
-    def convert(hub: Any, argument: Argument) -> Any:
+    def convert(hub: Scene, argument: Argument) -> Any:
         value = kind.convert(hub, argument)
         number = value.constant if isinstance(value, Expression) and value.is_constant else value
         if isinstance(number, (int, float)) and not math.isnan(number):
@@ -338,7 +338,7 @@ def _union(kinds: list[Kind]) -> Kind:
     # Words first: a literal word takes precedence over a variable of that name.
     tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
-    def convert(hub: Any, argument: Argument) -> Any:
+    def convert(hub: Scene, argument: Argument) -> Any:
         if nullable and argument.is_null:
             return None
         last: Exception | None = None

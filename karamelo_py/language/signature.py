@@ -36,6 +36,7 @@ from karamelo_py.language.kinds import (
     is_raw,
     kind_of,
 )
+from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import renamed
 from karamelo_py.script.errors import ScriptError, meant
 
@@ -88,7 +89,7 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 
 
 def call(
-    target: Callable, hub: Any, arguments: Sequence[Argument], name: str, converted: Any = None
+    target: Callable, hub: Scene, arguments: Sequence[Argument], name: str, converted: Any = None
 ) -> Any:
     """Call a command or make a style with script arguments; store their values in `converted`.
 
@@ -137,7 +138,7 @@ def call(
 
 
 def style_of(
-    hub: Any,
+    hub: Scene,
     family: str,
     ID: str,
     style: str,
@@ -152,7 +153,7 @@ def style_of(
 
 
 def remade(
-    hub: Any, family: str, style: str, values: dict, arguments: Sequence[Argument]
+    hub: Scene, family: str, style: str, values: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
     """Make a law again from its `values`, changed by ``name=value`` arguments; return it and its
     values.
@@ -197,7 +198,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
         raise
 
 
-def make(target: Callable, hub: Any, name: str, *values: Any, **named: Any) -> Any:
+def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
     """Call a command or make a style with values; report faults as its author's."""
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
@@ -244,7 +245,7 @@ def _bind(
             bound.setdefault(parameter.name, []).append(argument)
 
 
-def convert(hub: Any, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
+def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:
     if argument.is_null and not parameter.kind.nullable and not is_raw(parameter.kind):
         raise explain.misfit(parameter, argument, number, Unfit(NULL))
     try:
