@@ -271,7 +271,7 @@ class Interpreter:
         unknown.check_name(name)
         if name in self.presets:
             return self.presets.stand_for(statement)
-        if name not in self.variables and hasattr(self.hub, "warn"):
+        if name not in self.variables:
             means = "from here on it means the variable that is assigned here"
             if name in FUNCTIONS or registry.knows("command", name):
                 kind = "function" if name in FUNCTIONS else "command"

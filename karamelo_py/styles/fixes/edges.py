@@ -19,7 +19,6 @@ from karamelo_py.styles.fixes.forces import PointForces
 from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
-
 PARTS = 4  # per direction of a box, for measuring the surface
 
 

@@ -17,7 +17,6 @@ class StiffTool(Gripping, ToolFix):
     """Base of tools that stop a point within a step, with friction."""
 
     by_sizes = True
-
     impulsive = True
     kind_of_grip = GripOfTool
 
