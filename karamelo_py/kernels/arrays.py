@@ -26,10 +26,7 @@ Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
-    """Fields of the nodes of all grids, dense in node number; untouched pages cost no memory.
-
-    Components: ``nodes.sums[n, of_force(kin) + k]``.
-    """
+    """Fields of all nodes, dense in node number: ``nodes.sums[n, of_force(kin) + k]``."""
 
     sums: np.ndarray  # mass, momentum, force, as scattered by the points
     update: np.ndarray  # v* after the momentum update, and v* - v
@@ -65,10 +62,7 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
-    """Points of one constitutive law, in the order of the tiles.
-
-    A place (w numbers) is a position, then the stored shape of the domain if weights follow motion.
-    """
+    """Points of one law, by tile. A place (w numbers) is a position, then a stored domain shape."""
 
     x: np.ndarray  # (2, w, n): places now and after the move; `clock.now` is the index
     home: np.ndarray | None  # (w, n) reference places (total frame)

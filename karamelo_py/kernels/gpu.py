@@ -61,10 +61,7 @@ OTHERS = "clock, reports, totals"
 
 
 class CellLists(NamedTuple):
-    """The n points of a block by cell; N nodes.
-
-    Each corner of a domain is listed in its cell: corner c of point p as c n + p.
-    """
+    """The n points of a block by cell, of N nodes; corner c of point p is listed as c n + p."""
 
     count: np.ndarray  # (N,) int32: points of each cell that are not yet listed
     number: np.ndarray  # (n,) int32: the cell of each point

@@ -71,11 +71,7 @@ class WholeNodes(HookedNodes):
 
 
 class MovingPoints(NamedTuple):
-    """Points whose velocity point functions change, with the places y that follow from x.
-
-    After the d coordinates of a point, `y` has `corners` corners. Moving rigid points is no work;
-    they do work where they touch other points.
-    """
+    """Points whose velocity point functions change; `y` has corners after the d coordinates."""
 
     ids: np.ndarray
     v: np.ndarray  # (d, n)
@@ -770,11 +766,7 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 
 
 def point_hooks(stage, then, hooks, s, arguments_of):
-    """Call the point functions of `stage` on the members in each block; sum over them.
-
-    `arguments_of`: ``what_of(s, block, then)`` for functions of a component, ``heat_of(points)``
-    for the heat of functions of whole points.
-    """
+    """Call the point functions of `stage` in each block; `arguments_of`: what_of, heat_of."""
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)
     of_points = [tag for tag in hooks.whole if not tag.of_nodes]

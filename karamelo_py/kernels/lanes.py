@@ -39,20 +39,15 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Choose three loops over a stretch of points (gather, update, scatter) instead of one.
 
-    For visits in lanes that only strain: processors cache some thousand instructions, and a law
-    alone may have as many. Where points move, there is little to update, and finding stencils twice
-    costs more than it gains.
+    For visits in lanes that only strain: a law alone may fill the instruction cache. Where points
+    move, there is little to update, and finding stencils twice costs more.
     """
     strains = [isinstance(task, Strain) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Choose the lanes of the update: for doubles in stretches, twice as many as in the gather.
-
-    Chains of dependent operations take the same time for eight points as for four. Gather and
-    scatter are faster with four.
-    """
+    """Choose the lanes of the update: twice as many in stretches, as chains of operations wait."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 

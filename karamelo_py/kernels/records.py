@@ -66,10 +66,7 @@ def accumulate_affine(array, nodes, first, weights, field):
 
 
 def move_record(target, source, first, like, keep):
-    """Add components of a record to one of another array, as many as `like` has, and zero them.
-
-    `target` and `source` are arrays with a row. If not `keep`, the old content is replaced.
-    """
+    """Add components of a record of `source` to one of `target` and zero them; `keep`: add."""
     array, i = target
     other, j = source
     for k in range(first, first + len(like)):
@@ -119,10 +116,7 @@ def _record(builder: ir.IRBuilder, kind: Any, pointer: ir.Value, components: int
 
 
 def _chunks(count: int) -> list[tuple[int, int]]:
-    """Split components into register-wide chunks: (first, number), with 4, 2 or 1; 3 count as 4.
-
-    Records are padded accordingly.
-    """
+    """Split components into register-wide chunks: (first, number), with 4, 2 or 1; 3 count as 4."""
     out, first = [], 0
     while first < count:
         left = count - first

@@ -119,11 +119,7 @@ def _order_parts(found, k):
 
 @shared_out
 def _order_in_all_tiles(at, by, found, k):
-    """Sort the points of each tile of the k-th part by their first node, then by id.
-
-    Groups of `width` points then mostly see the same nodes: cells whose points fill groups come
-    first. The order follows from the positions alone.
-    """
+    """Sort a tile's points by first node, then id: cells that fill groups of `width` first."""
     (_, kin, grids, of, x), (tiles, around, ids), found = at_hand(at), at_hand(by), at_hand(found)
     boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
     ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
@@ -239,12 +235,7 @@ _sort_by_team = by_team(_sort)
 
 @kernel
 def sort_points(mode, at, by, found, rows):
-    """Sort points by tile, and within by the first node that they see.
-
-    `rows` are the addresses of the rows of all their arrays, also `at.x` and `by.ids`
-    (:func:`~karamelo_py.compiler.fields.pick_items`): one kernel serves all bases and laws of a
-    dimension.
-    """
+    """Sort points by tile, then by first node; `rows` has the addresses of all their rows."""
     _sort_by_team(mode, at, by, found, rows)
 
 

@@ -44,7 +44,6 @@ from karamelo_py.points.transfers import in_step
 
 ROUNDING = 1e-3  # rounding of distances, in cells
 STRETCH = 64  # points, whose totals and arrays fit in the nearest cache
-WHOLE = 1 << 40  # points, more than any tile has
 
 
 class Visit(NamedTuple):
@@ -131,16 +130,27 @@ def scatter_point(visit: Visit, lanes: Tag, pt: PointView, out: Work) -> None:
     scatter_nodes(stencil, lanes, visit.quantities, out, load_all(visit.quantities, pt))
 
 
+class TileVisit(NamedTuple):
+    """A visit of the points from `begin` to before `end`, those of a tile."""
+
+    visit: Visit
+    s: Context
+    lanes: Tag
+    w: Work  # with the nodes to gather from
+    out: Work  # with the nodes to scatter to
+    begin: int
+    end: int
+
+
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
     """Visit the points of the t-th occupied tile of a block in the context `s`.
 
-    One loop serves a scheme's fused and its single stages. Points are gathered, updated and
-    scattered one after another (in lanes: a few at once), or in stretches (see `one_loop_each`).
+    One kernel serves a scheme's fused and its single stages. From the first point on that failed,
+    or left its box, a tile scatters nothing more: the run ends, or points are sorted and scatter.
     """
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
-    gathers, scatters, dt = s.gathers, s.scatters, s.dt
     grid = record(s.grids, tiling.grid[t])
     places = places_of(s.frame, points, s.now, s.then)
     w = hold(work_of(s, grid, s.nodes, block, places))
@@ -149,60 +159,90 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
     out = work_of(s, numbered, s.buffers, block, places)
     parts = (*visit.tasks, *visit.quantities, s.basis, s.transfer, s.averaging)
     lanes = lanes_with(parts, block.laws, points.mass)
-    wide = lanes_of_update(lanes, visit)
-    apart = one_loop_each(lanes, visit)
-    stretch = STRETCH if apart else WHOLE
-    like = empty_all(visit.tasks, w, zero_vector(s.kin, dt)) if apart else ()
-    room = room_for(STRETCH, flat(like)) if apart else ()
-    furthest = zero_of(wide, dt)
-    fastest = furthest
+    tile = TileVisit(visit, s, lanes, w, out, tiling.range[t, 0], tiling.range[t, 1])
+    if one_loop_each(lanes, visit):
+        furthest, fastest, wrong = _visit_in_stretches(tile)
+    else:
+        furthest, fastest, wrong = _visit_at_once(tile)
+    tiling.report[t, 0] = largest(furthest)
+    tiling.report[t, 1] = largest(fastest)
+    tiling.report[t, 2] = wrong
+
+
+def _without_gather(tile, p, moved):
+    """Return the move of a point that only scatters: infinite outside the grid."""
+    s, w = tile.s, tile.w
+    if not s.frame.moves:
+        return moved
+    return where(inside(w.grid, s.kin, position_of(w, p)), moved, real(inf, moved))
+
+
+def _visit_at_once(tile):
+    """Gather, update and scatter points one by one, or a few at once in lanes."""
+    visit, s, lanes, w, out, begin, end = tile
+    dt = s.dt
+    furthest = fastest = zero_of(lanes, dt)
     wrong = 0
-    begin, end = tiling.range[t, 0], tiling.range[t, 1]
-    for k in range((end - begin + stretch - 1) // stretch):
-        first = begin + k * stretch
-        last = min(first + stretch, end)
-        if apart and gathers:
+    for q in range(begin, end, lanes.width):
+        p = points_from(lanes, q, end)
+        ask_ahead(w, p, dt, False)
+        stencil = stencil_of(w, p)
+        moved = zero_of(lanes, dt)
+        rate = fastest
+        if s.gathers:
+            totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
+            moved, rate = updated_all(visit.tasks, PointView(w, stencil, p, dt), totals, fastest)
+        else:
+            moved = _without_gather(tile, p, moved)
+        good = (moved <= s.stride) & (rate < 1e300)  # in this form, NaN counts as failed
+        if not all_lanes(good):
+            wrong = q + 1 + first_false_lane(good)
+            continue
+        furthest = max(furthest, moved)
+        fastest = rate
+        if s.scatters and stays_in_box(visit.weights, s.room, moved):
+            scatter_point(visit, lanes, PointView(w, stencil, p, dt), out)
+    return furthest, fastest, wrong
+
+
+def _visit_in_stretches(tile):
+    """Gather, update and scatter a stretch of points in a loop each (see `one_loop_each`)."""
+    visit, s, lanes, w, out, begin, end = tile
+    dt, wide = s.dt, lanes_of_update(lanes, visit)
+    like = empty_all(visit.tasks, w, zero_vector(s.kin, dt))
+    room = room_for(STRETCH, flat(like))
+    furthest = fastest = zero_of(wide, dt)
+    wrong = 0
+    for first in range(begin, end, STRETCH):
+        last = min(first + STRETCH, end)
+        if s.gathers:
             for q in range(first, last, lanes.width):
                 p = points_from(lanes, q, last)
                 if (q - first) % wide.width == 0:
-                    ask_ahead(w, p, dt, apart)
+                    ask_ahead(w, p, dt, True)
                 totals = gathered_by(lanes, visit.tasks, w, stencil_of(w, p), position_of(w, p))
                 store(room, points_from(lanes, q - first, last - first), flat(totals))
         for q in range(first, last, wide.width):
             p = points_from(wide, q, last)
-            if not apart:
-                ask_ahead(w, p, dt, apart)
-            stencil = () if apart else stencil_of(w, p)
             moved = zero_of(wide, dt)
             rate = fastest
-            if gathers:
-                if apart:
-                    found = load(room, points_from(wide, q - first, last - first), flat(like))
-                    totals = nested_as(like, found)
-                else:
-                    totals = gathered_by(lanes, visit.tasks, w, stencil, position_of(w, p))
-                moved, rate = updated_all(
-                    visit.tasks, PointView(w, stencil, p, dt), totals, fastest
-                )
-            elif s.frame.moves:
-                moved = where(inside(grid, s.kin, position_of(w, p)), moved, real(inf, moved))
-            good = (moved <= s.stride) & (rate < 1e300)  # so written, NaN counts as wrong too
+            if s.gathers:
+                numbers = load(room, points_from(wide, q - first, last - first), flat(like))
+                totals = nested_as(like, numbers)
+                moved, rate = updated_all(visit.tasks, PointView(w, (), p, dt), totals, fastest)
+            else:
+                moved = _without_gather(tile, p, moved)
+            good = (moved <= s.stride) & (rate < 1e300)  # in this form, NaN counts as failed
             if not all_lanes(good):
                 wrong = q + 1 + first_false_lane(good)
                 continue
             furthest = max(furthest, moved)
             fastest = rate
-            if not apart and scatters and stays_in_box(visit.weights, s.room, moved):
-                scatter_point(visit, lanes, PointView(w, stencil, p, dt), out)
-        # From the first point on that has gone wrong, or does not fit, a tile gives nothing more:
-        # the run ends, or points are sorted and give all anew.
-        if apart and scatters and wrong == 0 and stays_in_box(visit.weights, s.room, furthest):
+        if s.scatters and wrong == 0 and stays_in_box(visit.weights, s.room, furthest):
             for q in range(first, last, lanes.width):
                 p = points_from(lanes, q, last)
                 scatter_point(visit, lanes, PointView(w, stencil_of(w, p), p, dt), out)
-    tiling.report[t, 0] = largest(furthest)
-    tiling.report[t, 1] = largest(fastest)
-    tiling.report[t, 2] = wrong
+    return furthest, fastest, wrong
 
 
 @by_threads

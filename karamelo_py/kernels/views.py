@@ -162,11 +162,7 @@ def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Ind
 
 
 def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
-    """Prefetch the data of the next points in 3D.
-
-    Points with moments, and stretches of points (`apart`), have more arrays than the hardware
-    prefetcher follows.
-    """
+    """Prefetch the next points in 3D, if they have more arrays than hardware prefetchers follow."""
     d, fields = w.kin.dimension, w.points.fields
     moment = len(zero_moment(w.transfer, w.kin, like))
     if d == 3 and (apart or moment):

@@ -22,11 +22,7 @@ def _is_free(held, programs, n, c):
 
 @noinline
 def rub(what, call, n, mu):
-    """Apply the wall friction of coefficient `mu` to node `n`; add the force to the totals.
-
-    The normal impulse is the change of v* by the holding hook. Of several fixes that hold the node,
-    each applies friction for the directions in which it decides.
-    """
+    """Apply wall friction to node `n`: the holding hook's change of v* is the normal impulse."""
     kin, nodes, hooks, control, dt = what.kin, what.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], what.kept
     d, held = kin.dimension, hooks.held

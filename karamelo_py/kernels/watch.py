@@ -127,10 +127,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, motion, tiling, control):
-    """Add mass and momentum of each solid (1 + d) to the totals after the published values.
-
-    Then elastic energy, and this times velocity, of all points.
-    """
+    """Add mass and momentum of solids to the totals, then elastic energy, also times velocity."""
     (ids, masses, v), firsts, sums = motion, control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
@@ -336,11 +333,7 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Store the energies before a run, if a look is due after its first step.
-
-    `level` is the fraction of the later stored and the earlier kinetic energy in the balance. With
-    `anew` the balance starts here.
-    """
+    """Store energies if a look is due; `level`: fraction of the later stored energy in balances."""
     clock = s.control.clock[0]
     clock.level = level
     if anew:

@@ -58,11 +58,7 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as of `Heate
 
 
 def at_least_round_off(weight):
-    """Return `weight`, or a tiny number if it is 0.
-
-    A point on a node has no weight at the next node, but a gradient: that node needs the
-    temperature of the point, and the flow to it must return.
-    """
+    """Return `weight`, tiny instead of 0: nodes with only a gradient need a temperature."""
     return max(weight, round_off(weight))
 
 

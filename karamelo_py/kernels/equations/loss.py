@@ -38,10 +38,7 @@ ALONE = 0.6
 
 
 class EnergyLoss(SummedField):
-    """Kinetic energy brought to a node; the dissipated part per mass; and its mass.
-
-    A fused step brings energy and mass of the next step while points take back the loss.
-    """
+    """Kinetic energy brought to a node (fused: for the next step); its loss per mass; its mass."""
 
     shape = triple
 
