@@ -16,7 +16,7 @@ from karamelo_py.kernels.equations import Task
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.equations.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.records import accumulate, accumulate_affine, row
-from karamelo_py.kernels.sweep import OldWeights, Visit, context_of, sweep_points
+from karamelo_py.kernels.sweep import Extent, OldWeights, Visit, context_of, sweep_points
 from karamelo_py.kernels.views import place_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
@@ -602,7 +602,7 @@ def _visited(*more):
         array[:] = 1 + 0.1 * rng.uniform(size=array.shape)
     tasks = (TemperatureGradient(), Warming(), *more)
     visit = Visit(tasks, (HeatContent(), HeatFlow()), OldWeights())
-    sweep_points(Serial(), visit, context_of(s, 1e-3, True, True, True), s.blocks[0])
+    sweep_points(Serial(), visit, context_of(s, Extent(1e-3, True, True, True)), s.blocks[0])
     assert (s.blocks[0].tiling.report[:, 2] == 0).all()
     return dict(arrays_of(points)), (to.sums, mean.array)
 

@@ -327,5 +327,5 @@ def test_the_way_out_of_a_surface_is_that_to_the_nearest_face():
     for place, wanted in ways.items():
         x, reach = kin.Vector(*place), 0.3
         within = surfaces.depth(surface, kin, x, reach)
-        found = surfaces.slopes(surface, kin, x, reach, within, 0.01)
+        found = surfaces.slopes(surface, kin, x, reach, (within, 0.01))
         assert np.array(found) / 0.02 == pytest.approx(np.array(wanted), abs=1e-9), place
