@@ -21,19 +21,14 @@ from karamelo_py.compiler.formula import (
 )
 from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.parser import parse_text
-from karamelo_py.script.values import Values
-
-
-class Hub:
-    def __init__(self):
-        self.values = Values()
-        self.place = None
 
 
 @pytest.fixture
 def hub():
-    hub = Hub()
+    hub = Hub(Console(quiet=True))
     Interpreter(hub)
     hub.values.set("time", 0.7)
     hub.values.set("timestep", 12)
