@@ -24,6 +24,7 @@ from karamelo_py.output.files import savefig
 from karamelo_py.output.outlines import Tool, outlines
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.output.snapshots import Snapshot, read
+from karamelo_py.output.units import LENGTHS, suited
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.hdf5 import Hdf5
 from karamelo_py.styles.dumps.lammps import Particle, ParticleGz
@@ -428,7 +429,7 @@ def test_view_outlines_the_tools_of_a_script(run_interpreted, monkeypatch, capsy
     with_tool, without = (sum(map(len, m.marks.lines.get_segments())) for m in made)
     assert with_tool > without
     shown = made[0]
-    assert shown.title.get_text() == "step 2, time 0.002 ms"
+    assert shown.title.get_text() == "t = 2 µs"
     if dimension == 2:
         assert shown.axes.get_xlabel() == "x (mm)"
         lines = shown.marks.lines.get_segments()
@@ -710,22 +711,42 @@ def test_the_bar_of_colours_has_the_ends_that_are_given(ends):
     assert picture.scale.axes.get_ylim() == ends
 
 
-def test_small_lengths_count_in_powers_of_a_thousand():
+def test_small_lengths_have_a_unit_that_suits_them():
     """20 micrometres are no 0.00002 beside a tick."""
-    options = pictures.Options("seq", "seq", lengths=" (m)")
+    options = pictures.Options("seq", "seq", lengths="m")
     domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.full(2, 2e-5))
     picture = pictures.make(domain, (3, 3), 100, options)
-    assert picture.axes.get_xlabel() == "x (1e-6 m)"
+    assert picture.axes.get_xlabel() == "x (µm)"
     assert picture.axes.yaxis.get_major_formatter()(1e-5, 0) == "10"
 
 
 @pytest.mark.parametrize("high", [7e-6, 0.026, 1.0, 3e6])
 def test_pictures_with_units_are_fit_for_print(high):
     """Units, numbers and contrast; no label lies on another, however small the scene."""
-    options = pictures.Options("seq", "von Mises stress (Pa)", lengths=" (m)")
+    options = pictures.Options("seq", "von Mises stress (Pa)", lengths="m")
     domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.array([high / 2, high]))
     picture = pictures.make(domain, (4.8, 6), 100, options)
     x = np.linspace(0, high / 2, 50)
     columns = {"id": np.arange(50), "x": x, "y": x, "z": 0 * x, "seq": 1e5 * x / high}
     picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), high / 50, "step 0, time 0")
     assert faults(picture.figure) == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "size", "shown"),
+    [("m", 0.02, "20 mm"), ("m", 0.3, "0.3 m"), ("mm", 2e-5, "20 nm"), ("in", 1e-5, "1e-05 in")],
+)
+def test_lengths_are_shown_in_the_largest_unit_that_suits(unit, size, shown):
+    factor, name = suited(unit, size, LENGTHS)
+    assert f"{size * factor:g} {name}" == shown
+
+
+def test_an_axisymmetric_picture_shows_both_sides():
+    options = pictures.Options("seq", "seq", lengths="m", mirror=True)
+    domain = SimpleNamespace(dimension=2, lo=np.zeros(2), hi=np.ones(2))
+    picture = pictures.make(domain, (3, 3), 100, options)
+    x = np.array([0.25, 0.5])
+    columns = {"id": np.arange(2), "x": x, "y": x, "z": 0 * x, "seq": np.array([1.0, 2.0])}
+    picture.show(Snapshot(0, 0.0, columns, domain.lo, domain.hi), 0.1, "t = 0 s")
+    assert picture.axes.get_xlim() == (-1, 1)
+    assert sorted(picture.marks.rows[0]) == [-0.5, -0.25, 0.25, 0.5]

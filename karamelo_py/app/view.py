@@ -32,7 +32,7 @@ from karamelo_py.script.errors import ScriptError, plural, render_message
 from karamelo_py.script.expressions import GLOBAL_SEEDS
 from karamelo_py.script.parser import parse
 from karamelo_py.script.syntax import Raw, Source
-from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, tools_of
+from karamelo_py.styles.dumps.pyplot import LEAST_PIXELS, MOST_PIXELS, look_of, title_of, tools_of
 
 DESCRIPTION = """\
 Draw pictures or a movie of dumps of points.
@@ -109,13 +109,12 @@ def run(options: argparse.Namespace) -> int:
                     drawing = Drawing(options, files, scene, snapshot)
                 look, picture = drawing.look, drawing.picture
             snapshot = drawing.chosen(snapshot)
-            unit = snapshot.units.get("time", "")
-            time = "" if np.isnan(snapshot.time) else f", time {snapshot.time:.6g} {unit}".rstrip()
+            moment = title_of(snapshot.step, snapshot.time, snapshot.units.get("time", ""))
             # In file order.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
             title = f"{look['title']}: " if look["title"] else ""
             tools = _tools(scene) if options.script and look["outlines"] else ()
-            picture.show(snapshot, picture.side, f"{title}step {snapshot.step}{time}", tools)
+            picture.show(snapshot, picture.side, f"{title}{moment}", tools)
             drawn += 1
             if movie:
                 frames.add(lambda file, picture=picture: picture.save_png(file, 1))
@@ -345,7 +344,7 @@ class Drawing:
         words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")
         label, length = labelled(column, first.units.get(column, "")), first.units.get("x", "")
         made_look = {"label": label} | look_of(column, dimension, **words)
-        made_look["lengths"] = f" ({length})" if length else ""
+        made_look["lengths"] = length
         solids = tuple(f"solid {k}" for k in range(1, max(types, default=0) + 1))
         lo, hi, span = _all(self.files, column, look, made_look, self.chosen)
         domain = SimpleNamespace(dimension=dimension, lo=lo, hi=hi)

@@ -34,6 +34,7 @@ from karamelo_py.output.outlines import (
     split,
 )
 from karamelo_py.output.snapshots import Snapshot
+from karamelo_py.output.units import LENGTHS, labelled, suited
 
 # Colour-blind safe (Okabe and Ito 2008).
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
@@ -65,6 +66,7 @@ class Options(NamedTuple):
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # unit of lengths
+    mirror: bool = False  # points are drawn on both sides of x = 0
     window: Window = ()  # x, y, z; None: the domain
     log: bool = False  # logarithmic colours; values <= 0 get the lowest
     quantile: float = 0.0  # fraction of values at each end beyond the limits
@@ -111,7 +113,7 @@ class Picture:
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
-        self.domain = _zoomed(domain, options.window)
+        self.domain = _zoomed(domain, options.window, mirror=options.mirror)
         self.options = options
         self.small = options.fontsize - 1  # tick labels
         self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
@@ -144,16 +146,21 @@ class Picture:
         """Mark ends of the colour bar with values beyond."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """Label an axis, with a power of 1000 if lengths are small or large."""
-        size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
-        if 0 < size < 1e-2 or size >= 1e5:
-            power = 3 * int(np.floor(np.log10(size) / 3))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value / 10.0**power)))
-            unit = self.options.lengths.strip(" ()")
-            name += f" (1e{power} {unit})" if unit else f" / 1e{power}"
-        else:
-            name += self.options.lengths
+        """Label an axis, in a unit that suits its numbers; without a unit, with a power of 1000."""
+        factor, name = self._lengths_as(name)
+        if factor != 1:
+            axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
         axis.set_label_text(name, fontsize=self.options.fontsize)
+
+    def _lengths_as(self, name: str) -> tuple[float, str]:
+        """Return a factor of lengths and the label of the axis `name` for it."""
+        size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
+        if self.options.lengths:
+            factor, unit = suited(self.options.lengths, size, LENGTHS)
+            return factor, labelled(name, unit)
+        power = 3 * int(np.floor(np.log10(size) / 3)) if size else 0
+        small_or_large = 0 < size < 1e-2 or size >= 1e5
+        return (10.0**-power, f"{name} / 1e{power}") if small_or_large else (1.0, name)
 
     def _add_legend(self) -> None:
         names = self.options.solids[:MOST_IN_LEGEND]
@@ -171,7 +178,13 @@ class Picture:
         """Set points, title and outlined `tools`; `side` is the size of a typical point."""
         if not self._laid_out:
             self._lay_out()
-        columns = in_window(snapshot.columns, self.options.window)
+        everything = snapshot.columns
+        if self.options.mirror:
+            everything = {
+                name: np.concatenate([-column if name == "x" else column, column])
+                for name, column in everything.items()
+            }
+        columns = in_window(everything, self.options.window)
         values = columns[self.options.column]
         if self.options.log:
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -194,7 +207,7 @@ class Picture:
         self.marks.rows = self._rows(columns["id"], x, values, side)
         if self.options.outlines:
             if not self.cuts:
-                columns = snapshot.columns
+                columns = everything
                 x = np.column_stack([columns[name] for name in "xyz"])
             kinds = columns["type"]
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
@@ -319,10 +332,12 @@ def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.nd
     return columns
 
 
-def _zoomed(domain: Any, window: Window) -> Any:
-    if not window:
+def _zoomed(domain: Any, window: Window, *, mirror: bool) -> Any:
+    if not window and not mirror:
         return domain
     lo, hi = np.array(domain.lo, float), np.array(domain.hi, float)
+    if mirror:
+        lo[0] = -hi[0] if not window or window[0][1] is None else -window[0][1]
     for k, (low, high) in zip(range(len(lo)), window, strict=False):
         lo[k] = lo[k] if low is None else low
         hi[k] = hi[k] if high is None else high
@@ -473,15 +488,17 @@ class SpacePicture(PlanePicture):
             "fontsize": self.small,
         }
         lo, hi = self.lo[axis], self.hi[axis]
+        factor, name = self._lengths_as("xyz"[axis])
         large = self.options.fontsize / 9
         ticks = MaxNLocator(max(2, round(4 / large)), steps=STEPS).tick_values(lo, hi)
         # Ticks of two edges would overlap at their common end.
         for tick in ticks[abs(ticks - 0.5 * (lo + hi)) < 0.48 * (hi - lo)]:
             at = seen[0] + along * (tick - lo) / (hi - lo)
             self.axes.plot(*np.array([at, at + 0.02 * reach * outward]).T, color="0.5", lw=0.7)
-            self.axes.annotate(_number(tick), at, xytext=tuple(6 * outward), **aligned)
+            number = _number(tick * factor)
+            self.axes.annotate(number, at, xytext=tuple(6 * outward), **aligned)
         self.axes.annotate(
-            "xyz"[axis] + self.options.lengths,
+            name,
             seen.mean(axis=0),
             xytext=tuple(28 * large * outward),
             **aligned,

@@ -104,6 +104,26 @@ class Units(NamedTuple):
         return self.of_column(name) if name in ("time", "dt") else ""
 
 
+def time_text(time: float, unit: str) -> str:
+    """Write a time with its unit, such as 80 µs."""
+    factor, unit = suited(unit, time, TIMES)
+    return f"{time * factor:.6g} {unit}".rstrip()
+
+
+def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
+    """Return a factor and the metric unit in which `size`, in `unit`, has few digits.
+
+    The unit is the largest in which the size is at least 0.1; a size of 0 stays.
+    """
+    metric = {name: si for name, si in units.items() if isclose(log10(si) % 3, 0, abs_tol=1e-9)}
+    if unit not in metric or not size or 0.1 <= size < 1e4:
+        return 1.0, unit
+    si = abs(size) * metric[unit]
+    names = sorted(metric, key=lambda name: -metric[name])
+    best = next((name for name in names if si >= 0.1 * metric[name]), names[-1])
+    return metric[unit] / metric[best], best.replace("u", "µ")
+
+
 def labelled(name: str, unit: str) -> str:
     """``name (unit)``, or name."""
     return f"{name} ({unit})" if unit else name

@@ -17,7 +17,7 @@ from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.quantity import Caption
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.snapshots import Snapshot
-from karamelo_py.output.units import labelled
+from karamelo_py.output.units import labelled, time_text
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
@@ -86,6 +86,8 @@ class PyPlot(Dump):
         Font size in points.
     pointsize
         Size of the drawn points, relative to the material points; 1.4 fills all gaps.
+    mirror
+        true: in an axisymmetric scene, draw the points on both sides of the axis.
     outlines
         true: a line around each solid, and around the regions, walls and rigid tools of fixes, such
         as contact/surface. In 3D tools are drawn by their edges and sections; hidden lines are
@@ -130,6 +132,7 @@ class PyPlot(Dump):
         dpi: Annotated[int, In(20, 2400)] = DPI,
         fontsize: Annotated[float, In(1, 100)] = 9.0,
         pointsize: Annotated[float, Positive] = 1.0,
+        mirror: bool = False,
         outlines: bool = False,
     ):  # fmt: skip
         self.formula = field if isinstance(field, ShownColumn) else None
@@ -137,6 +140,12 @@ class PyPlot(Dump):
         check_columns(columns, hub.fields.shown_names(), first=4)
         super().__init__(hub, every, file, *columns)
         self.format_of(self.file)
+        if mirror and not (hub.domain and hub.domain.axisymmetric):
+            raise ScriptError(
+                "only an axisymmetric scene has another side of its axis",
+                argument="mirror",
+                expected="axisymmetric(true), or no mirror",
+            )
         self.size = (_inches("width", width, dpi), _inches("height", height, dpi))
         self.warn_of_absent(columns, hub.fields.absent_at_points(), "points")
         self.field = self.formula.text if self.formula else field
@@ -146,7 +155,8 @@ class PyPlot(Dump):
             hub.domain.dimension if hub.domain else None,
             vmin=vmin, vmax=vmax, cmap=cmap, azimuth=azimuth, elevation=elevation, axes=axes,
             label=label, window=((xmin, xmax), (ymin, ymax), (zmin, zmax)), scale=scale,
-            quantile=quantile, fontsize=fontsize, pointsize=pointsize, outlines=outlines,
+            quantile=quantile, fontsize=fontsize, pointsize=pointsize, mirror=mirror,
+            outlines=outlines,
         )  # fmt: skip
         self.limits = self.look["limits"]
         self._picture: Any = None
@@ -192,9 +202,8 @@ class PyPlot(Dump):
         update = self.hub.update
         if self._picture is None:
             self._picture = self._make()
-        title = f"step {update.step}, time {update.time:.6g}"
-        if self.hub.output.units is not None:
-            title += f" {self.hub.output.units.time}"
+        units = self.hub.output.units
+        title = title_of(update.step, update.time, units.time if units else "")
         if self.title:
             title = f"{self.title}: {title}"
         snapshot = self.snapshot()
@@ -211,7 +220,7 @@ class PyPlot(Dump):
         options = pictures.Options(
             label,
             solids=tuple(self.hub.solids) if label == "type" else (),
-            lengths=f" ({units.length})" if units else "",
+            lengths=units.length if units else "",
             **(look | self.look),
         )
         made = pictures.make(self.hub.domain, self.size, self.dpi, options)
@@ -249,6 +258,13 @@ class PyPlot(Dump):
         if self.field is not None:
             return self.field
         return "vx" if self.hub.domain.dimension == 1 else "type"
+
+
+def title_of(step: int, time: float, unit: str) -> str:
+    """Write the time in its unit; without one, the step and the time."""
+    if unit:
+        return f"t = {time_text(time, unit)}"
+    return f"step {step}" + ("" if np.isnan(time) else f", time {time:.6g}")
 
 
 def tools_of(fixes: Iterable[Any]) -> list[Any]:
