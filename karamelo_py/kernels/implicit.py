@@ -117,16 +117,16 @@ def see(frame, at, matter, seen, part):
             for g in slope:
                 gives = gives | (g != 0)
             if gives:
-                at = count
+                slot = count
                 if isinstance(basis, AtCorners):  # several may see the same node
                     for other in range(count):
                         if seen.nodes[p, other] == node:
-                            at = other
-                seen.nodes[p, at] = node
-                seen.weights[p, at] += weight
+                            slot = other
+                seen.nodes[p, slot] = node
+                seen.weights[p, slot] += weight
                 for j, g in enumerate(slope):
-                    seen.gradients[p, at, j] += g
-                if at == count:
+                    seen.gradients[p, slot, j] += g
+                if slot == count:
                     count += 1
         seen.count[p] = count
         if not frame.moves:
