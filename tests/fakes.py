@@ -8,6 +8,7 @@ import numpy as np
 
 from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.console import Console
+from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.lattice import Lattice
 
@@ -98,7 +99,7 @@ class FakeHub:
             lo=np.where(used, -0.5, 0.0),
             hi=np.where(used, 0.5, 0.0),
             h=0.25,
-            axisymmetric=False,
+            kin=KINEMATICS[dimension](),
         )
         self.update = SimpleNamespace(step=0, time=0.0, dt=0.1, fixed_dt=0.1)
         self.values = FakeValues(Ek=1.0, Ek_s=1.0, Es_s=0.0)

@@ -15,6 +15,7 @@ from selection import parameters
 from karamelo_py.output import files, text
 from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.dumps import lammps
 from karamelo_py.styles.dumps.lammps import GridDump, GridGz, Particle, ParticleGz
@@ -421,7 +422,7 @@ def test_points_have_the_size_of_what_they_stand_for(plane):
     """Rings of an axisymmetric scene, too, whose volume is that per radian."""
     dump = PyPlot(plane, 1, "p.png", 4, 3)
     assert dump.side(dump.snapshot()) == pytest.approx(np.sqrt(0.5 / 40))
-    plane.domain.axisymmetric = True
+    plane.domain.kin = Axisymmetric()
     x = np.linspace(1e-4, 1e-2, 40)
     plane.fields.points |= {"x": x, "volume": x * 0.05**2}
     assert dump.side(dump.snapshot()) == pytest.approx(0.05)

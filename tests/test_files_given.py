@@ -14,6 +14,7 @@ from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.plot import read_log
 from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.snapshots import read
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.hdf5 import _opened_to_append
@@ -181,7 +182,7 @@ def test_dumps_of_lammps_without_positions(tmp_path, tilt, columns, says):
 def test_a_dump_begins_a_solid(tmp_path):
     """Its last snapshot: positions, velocities and volumes, these without the radius."""
     hub = SmallHub(dimension=2)
-    hub.domain.axisymmetric = True
+    hub.domain.kin = Axisymmetric()
     path = tmp_path / "d.lammpstrj"
     text = LAMMPS.format(tilt="pp pp pp", columns="id type x y vx s11 ep volume", rows="{}")
     rows = "1 1 0.1 0.2 3 0 1 0.5\n2 1 0.4 0.15 4 0 2 0.6"

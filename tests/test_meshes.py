@@ -14,6 +14,7 @@ from meshed import CUTS, grid_mesh, write
 from test_scene_script import message
 
 from karamelo_py.app.cli import main
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.lower.memory import known
 from karamelo_py.scene.meshes.by_gmsh import begin
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
@@ -130,7 +131,7 @@ def test_axisymmetric_volumes_are_those_of_rings(tmp_path):
     nodes, cells = grid_mesh("triangle", (3, 5))
     path = write(tmp_path / "m.vtu", nodes + [0.5, 0, 0], {"triangle": cells})
     hub = SmallHub(2, 0, 2, 0.25)
-    hub.domain.axisymmetric = True
+    hub.domain.kin = Axisymmetric()
     solid = MeshSolid(hub, path, hub.materials["steel"], 0.25)
     assert math.isclose(solid.volume0.sum(), 1, rel_tol=1e-14)
 

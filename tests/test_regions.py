@@ -160,12 +160,12 @@ def test_the_domain_comes_once():
 def test_axisymmetric():
     hub = SmallHub()
     commands.axisymmetric(hub, False)
-    assert not hub.domain.axisymmetric
+    assert not hub.domain.kin.hoops
     with pytest.raises(ScriptError, match="x is a radius"):
         commands.axisymmetric(hub, True)
     hub = SmallHub(2, 0, 1, 0.1)
     commands.axisymmetric(hub, True)
-    assert hub.domain.axisymmetric
+    assert hub.domain.kin.hoops
     with pytest.raises(ScriptError, match="two dimensions"):
         commands.axisymmetric(SmallHub(3, 0, 1, 0.1), True)
 

@@ -14,6 +14,7 @@ from karamelo_py.commands import domain as commands
 from karamelo_py.points.basis.cpdi.domains import R4
 from karamelo_py.points.basis.gimp import UGIMP
 from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.scene.placement import cell_pattern
 from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
@@ -395,12 +396,12 @@ def test_domains_of_points_are_boxes():
 def test_axisymmetric_volumes_are_times_the_radius():
     """Per radian, from x = 0 to 1 and y = 0 to 1: 1/2, by the midpoint rule exactly."""
     hub = SmallHub(2, 0, 1, 0.1)
-    hub.domain.axisymmetric = True
+    hub.domain.kin = Axisymmetric()
     solid = hub.solid("s", whole(hub))
     np.testing.assert_allclose(solid.volume0, 0.05**2 * solid.x0[:, 0])
     assert math.isclose(solid.mass.sum(), DENSITY / 2)
     hub = SmallHub(2, -1, 1, 0.1)
-    hub.domain.axisymmetric = True
+    hub.domain.kin = Axisymmetric()
     with pytest.raises(ScriptError, match="x is the radius") as caught:
         hub.solid("s", whole(hub))
     assert caught.value.argument == "region"

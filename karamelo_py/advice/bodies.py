@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.advice.basics import BasicFacts, Body
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import law_kind, law_traits, parameter
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.noise import drift_limits
@@ -72,7 +73,7 @@ def drift_of(facts: BasicFacts) -> Noise | None:
     bound /= limits.line if facts.d == 1 else 1
     speed = cells = 0.0
     for body in vibrating(facts):
-        velocity = body.motion.drift(facts.hub.domain.axisymmetric)
+        velocity = body.motion.drift(free_from(facts.hub.domain.kin))
         if np.linalg.norm(velocity) <= SLOW * facts.waves:
             continue
         free_speed = float(np.linalg.norm(velocity[~fixed_directions(facts, body)]))
@@ -104,7 +105,7 @@ def _thrown(facts: BasicFacts) -> bool:
 def turn_of(facts: BasicFacts) -> Noise | None:
     """Estimate the energy gain by rotation, also if tolerable."""
     turns = facts.moments or (facts.moves and facts.kept > 0.9)
-    if not (facts.scheme.traits.keeping and turns and facts.d > 1) or facts.hub.domain.axisymmetric:
+    if not (facts.scheme.traits.keeping and turns and facts.d > 1) or facts.hub.domain.kin.hoops:
         return None
     limits, dt, most = drift_limits(facts.basis), facts.simulation.dt, None
     averages = facts.scheme.traits.bears_drift
@@ -129,7 +130,7 @@ def lag_of(facts: BasicFacts) -> Lag:
     Of the angular momentum, sum m r^2, the grid lacks the part within stencils, sum m tr D.
     """
     most = Lag()
-    if facts.moves or facts.d == 1 or facts.hub.domain.axisymmetric:
+    if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:
         return most
     for body in facts.bodies:
         motion = body.motion
@@ -185,7 +186,7 @@ def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
     """
     h, low, high = lattice_at(facts, body).h, body.motion.low, body.motion.high
     box = sides(body).prod() * facts.hub.domain.thickness
-    if facts.hub.domain.axisymmetric or np.sum(body.solid.volume0) < (1 - 1e-6) * box:
+    if facts.hub.domain.kin.hoops or np.sum(body.solid.volume0) < (1 - 1e-6) * box:
         return False
     pressed = set()
     for fix, x in fixes_at(facts, body):

@@ -89,7 +89,7 @@ class SceneFacts(BasicFacts):
     @cached_property
     def turn(self) -> float:
         """Rotation, in radians, of the solid that rotates most."""
-        if self.d == 1 or self.hub.domain.axisymmetric:
+        if self.d == 1 or self.hub.domain.kin.hoops:
             return 0.0
         return max((motion.spin for motion in self.motions), default=0.0) * self.duration
 

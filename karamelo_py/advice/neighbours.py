@@ -42,7 +42,7 @@ def _one_row(solid: Solid, axis: int) -> bool:
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
     """Find a slender elastic body, one row of points, that its weight bends."""
-    if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.axisymmetric:
+    if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.kin.hoops:
         return None
     for body in facts.bodies:
         solid = body.solid

@@ -11,6 +11,7 @@ from karamelo_py.advice.basics import is_zero
 from karamelo_py.advice.facts import SceneFacts, script_text
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import parameter
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NodeGroup
@@ -123,7 +124,7 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
     """Suggest fewer dimensions for scenes that are uniform along a direction."""
     domain = hub.domain
     d = domain.dimension
-    if d == 1 or domain.axisymmetric or len(hub.lattices) > 1:
+    if d == 1 or domain.kin.hoops or len(hub.lattices) > 1:
         return
     for k in range(d):
         rest = [axis for axis in range(d) if axis != k]
@@ -240,7 +241,7 @@ def _mirrored(hub: Hub, simulation: Simulation) -> Words:
         return
     if not all(solid.region for solid in solids):
         return  # they may have velocities
-    for k in range(1 if domain.axisymmetric else 0, domain.dimension):
+    for k in range(free_from(domain.kin), domain.dimension):
         ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
         cells = (middle - domain.lo[k]) / domain.h

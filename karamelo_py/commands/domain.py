@@ -8,6 +8,7 @@ from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, style_of
 from karamelo_py.language.unknown import SHAPES, filled, in_own_words
+from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.scene.hub import Hub
@@ -138,11 +139,11 @@ def axisymmetric(hub: Hub, active: bool) -> None:
     if active and domain.thin:
         message = "the scene has plane stress, which has no stress around an axis"
         raise ScriptError(message, argument="active", expected="plane_stress(false)")
-    if hub.solids and active != domain.axisymmetric:
+    if hub.solids and active != bool(domain.kin.hoops):
         message = "the points of solids are made already"
         expected = "axisymmetric(true) before the first solid"
         raise ScriptError(message, argument="active", expected=expected, code="too-late")
-    domain.axisymmetric = active
+    domain.kin = Axisymmetric() if active else KINEMATICS[domain.dimension]()
 
 
 def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:

@@ -77,7 +77,7 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
         expected = f"dimension({dimension}, ...) before {command}(true)"
         hint = {1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)
-    if active and domain.axisymmetric:
+    if active and domain.kin.hoops:
         message = "the scene is axisymmetric, which has stress around the axis"
         raise ScriptError(message, argument="active", expected="axisymmetric(false)")
     if hub.materials and active != domain.thin:

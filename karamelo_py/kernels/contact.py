@@ -52,7 +52,7 @@ from karamelo_py.kernels.table import AtNodes, Once, each_node
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
-from karamelo_py.points.kinematics import Axisymmetric, dot, vector, zero_vector
+from karamelo_py.points.kinematics import dot, vector, zero_vector
 
 # Squared sines of angles about the mean direction out of a body:
 SCATTER = 0.003  # accuracy of the direction of a plane face
@@ -223,7 +223,7 @@ def _normal(bodies, n, other):
     if square > 0:
         scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
         total = square / (scatter * scatter) * total
-    if isinstance(kin, Axisymmetric):  # on the axis, contact acts along it
+    if kin.hoops:  # on the axis, contact acts along it
         total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
     return total, scatter
 

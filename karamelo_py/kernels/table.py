@@ -23,7 +23,6 @@ from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAg
 from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
-from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.transfers import stores_moment
 from karamelo_py.points.transfers.xpic import XPIC
 
@@ -289,7 +288,7 @@ def _hold_node(s, n):
 def hold_axis(s: Setup) -> tuple:
     """Hold the nodes on an axis of symmetry."""
     # v_r = 0 at r = 0, where N / r is unbounded; and normals of contact are along the axis.
-    return (EachNode(_hold_node, _hold_axis),) if isinstance(s.kin, Axisymmetric) else ()
+    return (EachNode(_hold_node, _hold_axis),) if s.kin.hoops else ()
 
 
 def sum_series(s: Setup) -> tuple:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
-from karamelo_py.points.kinematics import Axisymmetric, dot
+from karamelo_py.points.kinematics import dot
 
 NEW = 0.05  # weight of a step in the running mean of the load
 
@@ -24,7 +24,7 @@ class MinimizePenetration(NamedTuple):
 
 def face(kin, volume, x):
     """Area of a point as a cube: per unit thickness in 2D, per radian if axisymmetric."""
-    if isinstance(kin, Axisymmetric):
+    if kin.hoops:
         return sqrt(volume * x[0])  # r times the side of the square volume / r
     if kin.dimension == 2:
         return sqrt(volume)
@@ -32,7 +32,7 @@ def face(kin, volume, x):
 
 
 def radius(kin, volume, x):
-    if isinstance(kin, Axisymmetric):
+    if kin.hoops:
         return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
     if kin.dimension == 2:
         return 0.5 * sqrt(volume)

@@ -27,9 +27,9 @@ class BodyMotion(NamedTuple):
     def size(self) -> float:
         return float((self.high - self.low).max()) / 2
 
-    def drift(self, axisymmetric: bool) -> np.ndarray:
-        """Return the rigid velocity (d,), without a radial component."""
-        return np.array([0.0, self.velocity[1]]) if axisymmetric else self.velocity
+    def drift(self, free: int) -> np.ndarray:
+        """Return the rigid velocity (d,), along the directions from `free` on."""
+        return np.where(np.arange(len(self.velocity)) < free, 0.0, self.velocity)
 
     @property
     def turning(self) -> np.ndarray:

@@ -19,7 +19,7 @@ from karamelo_py.language.arguments import Named
 from karamelo_py.output.files import savefig, whole
 from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, tensor
+from karamelo_py.points.kinematics import tensor
 from karamelo_py.script.errors import ScriptError
 
 # Components of symmetric tensors, in the order of the point functions.
@@ -75,21 +75,6 @@ class LoadPath(Named):
         return end
 
 
-# Where the components of the velocity gradient lie in the flat tuples of each kinematics.
-_PLANE = ((0, 0), (0, 1), (1, 0), (1, 1))
-GRADIENT = {
-    Line: ((0, 0),),
-    PlaneStrain: _PLANE,
-    Axisymmetric: (*_PLANE, (2, 2)),
-    Space: tuple((i, j) for i in range(3) for j in range(3)),
-}
-# Strains that each kinematics has.
-FREE = {
-    Line: ("xx",),
-    PlaneStrain: ("xx", "yy", "xy"),
-    Axisymmetric: ("xx", "yy", "zz", "xy"),
-    Space: COMPONENTS,
-}
 SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
@@ -127,7 +112,8 @@ class Point:
 
     @property
     def free(self) -> tuple[str, ...]:
-        return FREE[type(self.kin)]
+        places = self.kin.Tensor.places
+        return tuple(c for c in COMPONENTS if ("xyz".index(c[0]), "xyz".index(c[1])) in places)
 
     @property
     def stress(self) -> np.ndarray:
@@ -227,7 +213,7 @@ class Point:
         self, state: tuple, dl: np.ndarray, dt: float, ways: Sequence[np.ndarray]
     ) -> np.ndarray:
         """Return derivatives (6, w) of the stress after `dl` by w changes (3, 3) of it."""
-        places = GRADIENT[type(self.kin)]
+        places = self.kin.Tensor.places
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
         stress = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
         rows = [slopes_of(x, len(ways)) for x in stress]
@@ -305,7 +291,7 @@ class Point:
         return min(forms, key=stored)
 
     def _flat(self, gradient: np.ndarray) -> tuple:
-        return tensor(self.kin, [float(gradient[place]) for place in GRADIENT[type(self.kin)]])
+        return tensor(self.kin, [float(gradient[place]) for place in self.kin.Tensor.places])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
         weights = np.where(np.arange(6) < 3, 1, 2)

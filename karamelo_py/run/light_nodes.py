@@ -17,7 +17,6 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.basis.product import along
-from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import (
     can,
     constrained_velocity,
@@ -75,8 +74,8 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
         ]
         return np.prod(factors, axis=0)
 
-    radius = places[:, 0] if isinstance(kin, Axisymmetric) else None
-    area = volume if radius is None else volume / radius
+    radius = places[:, 0] if kin.hoops else None
+    area = volume if radius is None else volume / radius**kin.hoops
     none = np.zeros(count)
     filled = sum((np.bincount(nodes(k), area * weight(k), count) for k in pairs), none)
     limit = LIGHT * filled.max()
@@ -110,14 +109,15 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
         u_of_points = (u / root[:, None])[at]
         gradient = np.stack([(u_of_points * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
         trace = np.trace(gradient, axis1=1, axis2=2)
-        around = 0.0 if hoop is None else (u_of_points[:, :, 0] * hoop).sum(axis=1)
-        pressure = (1 - 2 * shear) * (trace + around)
+        hoop_strain = 0.0 if hoop is None else (u_of_points[:, :, 0] * hoop).sum(axis=1)
+        pressure = (1 - 2 * shear) * (trace + kin.hoops * hoop_strain)
         stress = shear * (gradient + gradient.transpose(0, 2, 1))
         stress += pressure[:, None, None] * np.eye(kin.dimension)
         stress *= volume[near][:, None, None]
         force = sum(g[:, :, None] * stress[:, None, :, i] for i, g in enumerate(slopes))
         if hoop is not None:
-            force[:, :, 0] += hoop * (volume[near] * (pressure + 2 * shear * around))[:, None]
+            hoop_stress = kin.hoops * (pressure + 2 * shear * hoop_strain)
+            force[:, :, 0] += hoop * (volume[near] * hoop_stress)[:, None]
         columns = [np.bincount(at.ravel(), f.ravel(), len(root)) for f in np.moveaxis(force, 2, 0)]
         return np.stack(columns, axis=1) / root[:, None]
 

@@ -1,11 +1,13 @@
 """The domain: bounding box of the scene and its background grid."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import words_of
+from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -17,13 +19,13 @@ class Domain:
     `lo` and `hi` (3,) are 0 in unused directions. Without `h` the first solid sets the cell size.
     """
 
-    axisymmetric = False  # x is the radius, y the axis
     thin = False  # plane stress, or uniaxial stress in 1D
     thickness = 1.0  # in 2D; cross-section in 1D
     place: Place | None = None
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
         self.dimension = dimension
+        self.kin: Any = KINEMATICS[dimension]()
         self.lo, self.hi = np.zeros((2, 3))
         self.lo[:dimension], self.hi[:dimension] = lo, hi
         self.h: float | None = None
@@ -41,8 +43,9 @@ class Domain:
         return RELATIVE_TOLERANCE * size
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Out-of-plane factor of volumes at `x` (n, d): radius (per radian) or thickness."""
-        return x[:, 0].astype(float) if self.axisymmetric else self.thickness
+        """Factor of volumes at `x` (n, d): thickness, or length or area per angle."""
+        hoops = self.kin.hoops
+        return x[:, 0].astype(float) ** hoops if hoops else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         """(n,) bool: `x` (n, >= dimension) in the closed box."""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.scene.clipping import Pieces, clip, join
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import Lattice, chunks, positions
@@ -199,7 +200,7 @@ def fill(
     ends = domain.lo[used], domain.hi[used]
     with np.errstate(invalid="ignore"):  # open sides
         at_side = [np.abs((lo + hi) / 2 - end) <= domain.tolerance for end in ends]
-    at_side[0] |= domain.axisymmetric & (np.arange(dimension) == 0)
+    at_side[0] |= np.arange(dimension) < free_from(domain.kin)
     reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
     reaches_out |= (hi > ends[1] + domain.tolerance) & np.isfinite(hi) & ~at_side[1]
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension

@@ -121,17 +121,17 @@ class Solid(Named):
         if self.first_id + count > MAX_POINTS:
             raise ScriptError(f"the scene has more than {MAX_POINTS} points", argument="h")
         volume = np.asarray(placement.volume, float)
-        if self.domain.axisymmetric:
+        if self.domain.kin.hoops:
             radius = placement.x0[:][:, 0]
             if count and radius.min() <= 0:  # no mass on the axis
                 raise ScriptError(
-                    f"points at x = {radius.min():g}: in an axisymmetric domain x is the radius, "
-                    "and points lie at x > 0",
+                    f"points at x = {radius.min():g}: x is the radius here "
+                    f"({self.domain.kin.word}), and points lie at x > 0",
                     argument=self.source,
                     expected=f"a {self.described().split()[0]} at x >= 0",
                 )
-            volume = volume * radius
-        elif self.domain.thin:
+            volume = volume * self.domain.depth(placement.x0[:])
+        else:
             volume = volume * self.domain.thickness
         # As in `Placement`, but per radian if axisymmetric. Read-only; equal values are stored
         # once.

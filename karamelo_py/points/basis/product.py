@@ -7,7 +7,7 @@ from karamelo_py.compiler.lanes import beside, first_lane, is_one
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points.basis import affine_weight, entry, locate, reach, support
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import Axisymmetric, gradient, product, vector
+from karamelo_py.points.kinematics import gradient, product, vector
 
 
 class Along(NamedTuple):
@@ -67,7 +67,7 @@ def evenly(basis, grid, stencil):
 
 def with_hoop(kin, weight, slopes, inv_r):
     """Gradient of a weight; in axisymmetry followed by N / r, on the axis dN/dr."""
-    if isinstance(kin, Axisymmetric):
+    if kin.hoops:
         slopes = (*slopes, where(inv_r > 0, weight * inv_r, slopes[0]))
     return gradient(kin, slopes)
 
@@ -131,8 +131,7 @@ def weights_of(stencil, at):
 
 def _locate_product(basis, kin, grid, place):
     lines = tuple([along(basis, kin, grid, place, i) for i in range(kin.dimension)])
-    axis = isinstance(kin, Axisymmetric)
-    return Stencil(lines, inverse_radius(radius(basis, grid, lines[0])) if axis else 0)
+    return Stencil(lines, inverse_radius(radius(basis, grid, lines[0])) if kin.hoops else 0)
 
 
 def _support_product(basis, kin):

@@ -32,6 +32,8 @@ COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 
 class Line(NamedTuple):
     word = "1D"
+    per = ""  # what forces, masses and energies refer to
+    hoops = 0  # directions around an axis or a centre; x is the distance from it
     dimension = 1
     tensor_size = 1
     tensor_names = ("11",)
@@ -42,6 +44,8 @@ class PlaneStrain(NamedTuple):
     """2D, unit thickness, no strain out of the plane."""
 
     word = "plane-strain"
+    per = " per thickness"
+    hoops = 0
     dimension = 2
     tensor_size = 4
     tensor_names = ("11", "12", "21", "22")
@@ -56,6 +60,8 @@ class Axisymmetric(NamedTuple):
     """
 
     word = "axisymmetric"
+    per = " per radian"
+    hoops = 1
     dimension = 2
     tensor_size = 5
     tensor_names = ("11", "12", "21", "22", "33")
@@ -64,6 +70,8 @@ class Axisymmetric(NamedTuple):
 
 class Space(NamedTuple):
     word = "3D"
+    per = ""
+    hoops = 0
     dimension = 3
     tensor_size = 9
     tensor_names = ("11", "12", "13", "21", "22", "23", "31", "32", "33")
@@ -76,12 +84,12 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 def free_from(kin):
     """First direction along which a body may translate: not the radius."""
-    return 1 if isinstance(kin, Axisymmetric) else 0
+    return 1 if kin.hoops else 0
 
 
 def planar(kin):
     """The tag whose tensors are d x d matrices over the same vectors: no hoop component."""
-    return PlaneStrain() if isinstance(kin, Axisymmetric) else kin
+    return kin.plane
 
 
 def total(terms):
@@ -539,6 +547,7 @@ def _rows(one: type, whole: type) -> None:
 
 _WORDS = str.maketrans("123", "xyz")
 for _tag in TAGS:
+    _tag.plane = KINEMATICS[_tag.dimension]()
     _tag.Symmetric = _class(SymmetricTensor, _tag, _tag.symmetric_names)
     _tag.Tensor = _class(Tensor, _tag, _tag.tensor_names)
     _tag.Tensor.symmetric = _tag.Symmetric

@@ -240,7 +240,7 @@ known_failure(
 
 def _locks(law, scene):
     """Check for flow at constant volume in load steps, which linear cells cannot represent."""
-    slow = not scene.scheme.traits.inertia and not scene.hub.domain.axisymmetric
+    slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     flows = strengths.equivalent_plastic_strain.defined(type(law.strength))
     by_shear = flows and not strengths.pressure_response.defined(type(law.strength))
     return scene.locks and slow and by_shear and {"place": scene.method.place}

@@ -9,8 +9,8 @@ constant; with splines, as far as velocity is linear over their support.
 from typing import Annotated, NamedTuple
 
 from karamelo_py.points import transfers
-from karamelo_py.points.kinematics import Axisymmetric, outer
 from karamelo_py.points.kinematics import gradient as as_gradient
+from karamelo_py.points.kinematics import outer
 from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.affine import zero_planar
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
@@ -115,9 +115,9 @@ def _by_arms_mls(transfer, inverse_d):
 
 @transfers.forces_by_arms.on(MLS)
 def _forces_by_arms_mls(transfer, kin):
-    return not isinstance(kin, Axisymmetric)
+    return not kin.hoops
 
 
 @transfers.straining.on(MLS)
 def _straining_mls(transfer, kin, gradient):
-    return gradient if isinstance(kin, Axisymmetric) else ()
+    return gradient if kin.hoops else ()

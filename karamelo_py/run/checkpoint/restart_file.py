@@ -295,7 +295,7 @@ def described(hub: Hub) -> dict[str, str]:
     words = {
         "method": update.words_of_state + " thermo-mechanical" * update.thermal,
         "domain": f"{domain.dimension}, {', '.join(f'{a!r}, {b!r}' for a, b in box)}, {domain.h!r}",
-        "axisymmetric": str(domain.axisymmetric),
+        "axisymmetric": str(domain.kin.hoops > 0),
         "thickness": str(domain.thickness),
         "precision": hub.settings.precision,
         "anti_volumetric_locking": str(update.anti_locking),

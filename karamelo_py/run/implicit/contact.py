@@ -15,7 +15,6 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import TIMESTEP
 from karamelo_py.kernels.contact import Bodies, ListedPairs, list_pairs
 from karamelo_py.kernels.equations.loss import FrictionalHeat
-from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.run.implicit.equations import Equations
 
 STIFF = 1e3  # springs, relative to the stiffness of a cell of the softer body
@@ -67,9 +66,7 @@ class Contact:
     def _shares(self) -> np.ndarray:
         """Return the mass of nodes (m,), as a fraction of a node within the body."""
         equations = self.equations
-        mass = equations.mass.copy()
-        if isinstance(self.s.kin, Axisymmetric):
-            mass /= np.maximum(equations.positions[:, 0], 0.25 * self.s.grids.spacing[0])
+        mass = equations.mass / self._around(equations.positions[:, 0], self.s.grids.spacing[0])
         most = np.zeros(len(self.s.grids.first))
         np.maximum.at(most, equations.grid, mass)
         return mass / np.maximum(most[equations.grid], 1e-300)
@@ -80,9 +77,11 @@ class Contact:
         softer = np.where(both > 0, both, np.inf).min(0)
         h = self.s.grids.spacing[self.a]
         stiffness = STIFF * np.where(np.isfinite(softer), softer, 0.0) * h ** (self.d - 2)
-        if isinstance(self.s.kin, Axisymmetric):  # forces are per radian
-            stiffness *= np.maximum(self.equations.positions[self.first, 0], 0.25 * h)
-        return stiffness
+        return stiffness * self._around(self.equations.positions[self.first, 0], h)
+
+    def _around(self, x: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """Return the length or area (m,) per angle at radii `x`, for cells of `h`; or 1."""
+        return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
         """Return the pairs (c,) in contact at the end of the last step; with -1, that stuck."""

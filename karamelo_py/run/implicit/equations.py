@@ -15,7 +15,7 @@ from karamelo_py.kernels import implicit as loops
 from karamelo_py.kernels.arrays import MASS, Block, Matter, OnGrids, Setup, Tag, matter_of
 from karamelo_py.kernels.equations.fbar import FBar
 from karamelo_py.kernels.equations.heat import Conductance
-from karamelo_py.points.kinematics import Axisymmetric
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
 from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
@@ -246,7 +246,7 @@ class Equations:
 
     @cached_property
     def rigid_motions(self) -> np.ndarray:
-        return rigid_motions(self.positions, isinstance(self.s.kin, Axisymmetric))
+        return rigid_motions(self.positions, free_from(self.s.kin))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:
         """Expand a matrix (m, m) to all components (m d, m d), uncoupled."""

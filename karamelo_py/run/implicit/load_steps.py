@@ -14,7 +14,7 @@ from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
 from karamelo_py.kernels.totals import WORK, add_to, carry
 from karamelo_py.kernels.watch import look_at_end
-from karamelo_py.points.kinematics import Axisymmetric, free_from
+from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import used
 from karamelo_py.run.implicit.conduction import conduct
@@ -302,7 +302,7 @@ class LoadSteps:
         holding = [f for f in self.simulation.acting if "post_update_grid_state" in f.hooks()]
         mask, velocities = equations.prescribed(holding, equations.d)
         self._check_numbers(velocities, "a node gets a velocity that is not a number")
-        if isinstance(equations.s.kin, Axisymmetric):
+        if equations.s.kin.hoops:
             on_axis = equations.positions[:, 0] == 0
             mask[on_axis, 0], velocities[on_axis, 0] = True, 0.0
         return mask, velocities

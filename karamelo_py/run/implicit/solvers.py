@@ -154,14 +154,13 @@ def solve(
     return x
 
 
-def rigid_motions(positions: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return rigid motions (m, d, k) of nodes at `positions` (m, d); axisymmetric: along z."""
+def rigid_motions(positions: np.ndarray, free: int) -> np.ndarray:
+    """Return rigid motions (m, d, k) of nodes at `positions` (m, d), which may
+    translate along the directions from `free` on."""
     m, d = positions.shape
     x = positions - positions.mean(0)
-    motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(d)]
-    if axisymmetric:
-        motions = motions[1:]
-    elif d == 2:
+    motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(free, d)]
+    if d == 2 and not free:
         motions.append(np.stack([-x[:, 1], x[:, 0]], 1))
     elif d == 3:
         for i, j in ((0, 1), (0, 2), (1, 2)):

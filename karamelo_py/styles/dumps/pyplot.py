@@ -140,7 +140,7 @@ class PyPlot(Dump):
         check_columns(columns, hub.fields.shown_names(), first=4)
         super().__init__(hub, every, file, *columns)
         self.format_of(self.file)
-        if mirror and not (hub.domain and hub.domain.axisymmetric):
+        if mirror and not (hub.domain and hub.domain.kin.hoops):
             raise ScriptError(
                 "only an axisymmetric scene has another side of its axis",
                 argument="mirror",
@@ -248,9 +248,9 @@ class PyPlot(Dump):
     def side(self, snapshot: Snapshot) -> float:
         columns, domain = snapshot.columns, self.hub.domain
         volume = columns["volume"]
-        if domain.axisymmetric:
+        if hoops := domain.kin.hoops:
             x = columns["x"]
-            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0))  # of a ring, per radian
+            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0)) ** hoops  # of a ring
         some = volume[columns["id"] % -(-self.hub.fields.count // SAMPLE) == 0]
         return float(np.median(some)) ** (1 / domain.dimension) if len(some) else 0.0
 

@@ -156,10 +156,10 @@ class FacesOfPoints(HeatFix):
             volume, x = volumes_before(hub, ids), places_before(hub, ids)
             depth = hub.domain.depth(x)
             area += float((depth * (volume / depth) ** (1 - 1 / d)).sum())
-        per = {2: " per thickness", 3: ""}[d]
+        per = hub.domain.kin.per
         words = (
             f"fix {self.style} '{self.id}': {len(self.group)} points cover an area of {area:.4g}"
-            f"{' per radian' if hub.domain.axisymmetric else per}"
+            f"{per}"
         )
         hint = f"fix {self.on_edge} takes the area of the surface of a region"
         hub.console.say(render_message("note", words, hint=hint))

@@ -266,7 +266,7 @@ class ContactHertz(PairContact):
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, solid1, solid2)
-        if hub.domain.axisymmetric:
+        if hub.domain.kin.hoops:
             raise ScriptError(
                 "the force of Hertz is one of balls, and axisymmetric points are rings",
                 expected="fix contact/minimize_penetration, or a scene in 3D",

@@ -9,7 +9,6 @@ from karamelo_py.kernels.equations.fbar import FBar, FBarOfSoil, PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated
-from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.points.laws import can
 from karamelo_py.points.laws.strengths import fbar_fraction, initial_memory
 from karamelo_py.scene.hub import Hub
@@ -118,7 +117,7 @@ class Method:
         return nodes
 
     def kinematics(self, hub: Hub) -> Any:
-        return Axisymmetric() if hub.domain.axisymmetric else KINEMATICS[hub.domain.dimension]()
+        return hub.domain.kin
 
     def averaging(self, hub: Hub) -> NamedTuple:
         """Return the tag of averaging: `FBar` if volume changes are averaged."""
