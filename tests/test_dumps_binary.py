@@ -63,6 +63,39 @@ def test_xarray_opens_hdf5(plane):
         assert int(data.type.sel(id=40)) == 2
 
 
+def test_vtk_opens_hdf5(hub):
+    """Every state: positions, columns and vectors; a deleted point is nowhere."""
+    module = pytest.importorskip("vtkmodules.vtkIOHDF", exc_type=ImportError)
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    velocities = ["vx", "vy", "vz"][: hub.domain.dimension]
+    hub.dumps["d"] = Hdf5(hub, 5, "p.h5", *velocities, "seq")
+    hub.run(10)
+    expected = {name: hub.fields.particle(name) for name in (*"xyz", *velocities, "seq", "type")}
+    lose(hub, 3)
+    hub.run(1)
+    reader = module.vtkHDFReader()
+    reader.SetFileName(str(hub.folder / "p.vtkhdf"))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(reader.GetExecutive().TIME_STEPS())
+    assert times == pytest.approx([0, 0.5, 1, 1.1])
+    for time in times:
+        reader.UpdateTimeStep(time)
+        found, here = reader.GetOutput(), slice(37 if time > 1.05 else 40)
+        assert found.GetNumberOfVerts() == 40
+        x = vtk_to_numpy(found.GetPoints().GetData())
+        np.testing.assert_array_equal(x[here].T, [expected[a][here] for a in "xyz"])
+        assert np.isnan(x[here.stop :]).all()
+        assert np.isfinite(found.GetBounds()).all()
+        for name in ("seq", "type"):
+            array = vtk_to_numpy(found.GetPointData().GetArray(name))
+            np.testing.assert_array_equal(array[here], expected[name][here])
+        velocity = vtk_to_numpy(found.GetPointData().GetArray("velocity"))[here]
+        for k in range(3):
+            wanted = expected[velocities[k]][here] if k < len(velocities) else 0
+            np.testing.assert_array_equal(velocity[:, k], wanted)
+
+
 def test_hdf5_of_nodes(plane):
     GridHdf5(plane, 1, "g.*.h5", "mass", occupied=True).write()
     with h5py.File(plane.folder / "g.0.h5") as file:

@@ -11,6 +11,7 @@ import numpy as np
 from karamelo_py.output.fields import PIECE
 from karamelo_py.output.files import reported, whole
 from karamelo_py.output.hdf5_file import reading
+from karamelo_py.output.vtkhdf import VERSION, describe
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
@@ -53,7 +54,7 @@ class Hdf5Dump(TableDump):
 
         if k == 0 or self.one_file_per_step:
             # In memory at first: HDF5 cannot close a file that has no room on the disk.
-            with h5py.File("new", "w", driver="core", backing_store=False, libver="latest") as root:
+            with h5py.File("new", "w", driver="core", backing_store=False, libver=VERSION) as root:
                 self._prepare(root, snapshot.last)
                 root.flush()
                 image = root.id.get_file_image()
@@ -216,7 +217,7 @@ def _opened_to_append(path: Path) -> Any:
 
     access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
     access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
-    access.set_libver_bounds(h5py.h5f.LIBVER_LATEST, h5py.h5f.LIBVER_LATEST)
+    access.set_libver_bounds(h5py.h5f.LIBVER_V110, h5py.h5f.LIBVER_V110)
     if hasattr(access, "set_file_locking"):
         access.set_file_locking(False, True)
     mode = h5py.h5f.ACC_RDWR | h5py.h5f.ACC_SWMR_WRITE
@@ -227,7 +228,8 @@ class Hdf5(OfPoints, Hdf5Dump):
     """Write the material points to one compressed binary file, which h5py and xarray read.
 
     Each column is an array over time and id. Deleted points are NaN. The file is complete after
-    every snapshot.
+    every snapshot. A small file of the same name with the ending ``.vtkhdf`` refers to it: ParaView
+    opens that one, with all snapshots.
 
     Notes
     -----
@@ -248,6 +250,11 @@ class Hdf5(OfPoints, Hdf5Dump):
     --------
     dump particle, dump grid/hdf5
     """
+
+    def write(self) -> None:
+        super().write()
+        if self.path().suffix != ".vtkhdf":
+            describe(self.path(), self.columns, self.hub.domain.dimension)
 
 
 class GridHdf5(OfNodes, Hdf5Dump):
