@@ -182,6 +182,7 @@ ELASTIC = {
     "f": "saint-venant-kirchhoff, 2, 50, 40",
     "g": "orthotropic, 2, 100, 50, 50, 0.2, 0.2, 0.3, 40, 40, 20, 30",
     "h": "transverse, 2, 100, 0.3, 50, 0.1, 30, 30, 90",
+    "i": "viscoelastic, a, 0.3, 0.01, 0.2, 0.1",
 }
 
 

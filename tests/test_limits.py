@@ -16,7 +16,7 @@ STYLES = {
     "rigid bodies": [("fix", "rigid_body"), ("fix", "rigid")],
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],
-    "viscoelasticity": [("command", "viscosity"), ("material", "visco"), ("strength", "norton")],
+    "creep": [("strength", "norton"), ("strength", "perzyna"), ("material", "mullins")],
     "explosives": [("eos", "jwl"), ("strength", "johnson-holmquist"), ("eos", "p-alpha")],
     "UMAT": [("material", "umat")],
     "cracks": [("method", "dfg"), ("fix", "crack")],

@@ -1,0 +1,194 @@
+"""Material viscoelastic: closed forms of linear viscoelasticity (Christensen 1982; Ferry 1980)."""
+
+import re
+from math import exp, pi
+
+import numpy as np
+import pytest
+from tensors import every_kinematics, flat, rotation
+
+from karamelo_py.language.arguments import Named
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import Space, tensor
+from karamelo_py.points.laws.hencky import Hencky
+from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.viscoelastic import Viscoelastic
+
+SPACE, G = Space(), 1e6 / 2.8
+TERMS = ((0.3, 0.01), (0.2, 1.0))
+RUBBER = """\
+material(rubber, neo-hookean, 1000, 1e6, 0.4)
+material(damper, viscoelastic, rubber, 0.3, 0.01, 0.2, 1)
+"""
+
+
+class Elastic(Named):
+    def __init__(self, law):
+        self.whole = law
+
+
+def damper(kind=NeoHookean):
+    return Viscoelastic.given(Elastic(kind.given(1000, 1e6, 0.4)), *sum(TERMS, ()))
+
+
+def relaxation(t):
+    return 1 - sum(g * (1 - exp(-t / tau)) for g, tau in TERMS)
+
+
+def sheared(law, state, gamma, dt):
+    return laws.advance(law, SPACE, state, tensor(SPACE, (0, gamma, *[0] * 7)), dt)
+
+
+def stress(law, state):
+    return np.array(laws.cauchy_stress(law, SPACE, state))
+
+
+def table(run, script):
+    return np.genfromtxt(run(script).folder / "element_r.txt", names=True)
+
+
+def test_stress_relaxes_by_the_prony_series(run_interpreted):
+    path = "load_path(pull, 1, exy=5e-4, duration=1e-9)\nload_path(hold, 7, duration=2.1)\n"
+    t = table(run_interpreted, RUBBER + path + "element(r, damper, pull, hold)")
+    exact = [1e-3 * G * relaxation(time) for time in t["time"][1:] - 1e-9]
+    assert np.allclose(t["sxy"][1:], exact, rtol=1e-6)
+    # What is stored in the branches falls as their stress squared.
+    kept = [0.5 + sum(g * exp(-2 * time / tau) for g, tau in TERMS) for time in t["time"][1:]]
+    assert np.allclose(t["stored"][1:], 0.5e-6 * G * np.array(kept), rtol=1e-5)
+    assert np.allclose(t["stored"] + t["dissipated"], t["work"], rtol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [NeoHookean, LinearElastic, Hencky])
+def test_storage_and_loss_moduli(kind):
+    """G' = G (1 - sum g / (1 + (w tau)^2)), G'' = G sum g w tau / (1 + (w tau)^2)."""
+    law, w, n, size = damper(kind), 30.0, 60, 1e-6
+    state, dt, found, lost = laws.initial_state(law, SPACE, 1.0), 2 * pi / 30 / 60, [], []
+    for k in range(4 * n):
+        state = sheared(law, state, size * (np.sin(w * (k + 1) * dt) - np.sin(w * k * dt)), dt)
+        found.append(stress(law, state)[3])
+        lost.append(laws.dissipated_energy(law, SPACE, state))
+    t = dt * (1 + np.arange(4 * n))
+    late = slice(2 * n, None)  # the slow branch still decays, as a slow exponential
+    waves = np.array([np.sin(w * t), np.cos(w * t), np.exp(-t), 1 + 0 * t]).T[late]
+    at = np.linalg.lstsq(waves, np.array(found)[late], rcond=None)[0] / size
+    x = [(g, w * tau) for g, tau in TERMS]
+    assert at[0] == pytest.approx(G * (1 - sum(g / (1 + y * y) for g, y in x)), rel=1e-3)
+    loss = G * sum(g * y / (1 + y * y) for g, y in x)
+    assert at[1] == pytest.approx(loss, rel=1e-3)
+    assert lost[-1] - lost[-1 - n] == pytest.approx(pi * size**2 * loss, rel=1e-3)
+
+
+def test_shear_creeps_under_constant_stress(run_interpreted):
+    """gamma = s/G (1/(1-g) - g/(1-g) exp(-(1-g) t/tau))."""
+    script = """
+        material(rubber, neo-hookean, 1000, 1e6, 0.4)
+        material(damper, viscoelastic, rubber, 0.4, 2)
+        load_path(pull, 1, sxy=1, duration=1e-9)
+        load_path(hold, 40, sxy=1, duration=5)
+        element(r, damper, pull, hold)
+    """
+    t = table(run_interpreted, script)
+    exact = (1 - 0.4 * np.exp(-0.6 * t["time"][1:] / 2)) / 0.6 / G
+    assert np.allclose(2 * t["exy"][1:], exact, rtol=1e-4)
+
+
+@pytest.mark.parametrize("x", [1e-6, 0.009, 0.011, 0.5, 1e4])
+def test_the_tangent_of_a_step_is_the_mean_modulus_over_it(x):
+    """G (1 - g (1 - (1 - exp(-x))/x)) for a step of x relaxation times."""
+    law = Viscoelastic.given(Elastic(NeoHookean.given(1000, 1e6, 0.4)), 0.4, 2.0)
+    found = stress(law, sheared(law, laws.initial_state(law, SPACE, 1.0), 1e-6, 2 * x))[3]
+    assert found == pytest.approx(1e-6 * G * (1 + 0.4 * (-np.expm1(-x) / x - 1)), rel=1e-9)
+
+
+@every_kinematics
+@pytest.mark.parametrize("kind", [NeoHookean, LinearElastic, Hencky])
+def test_no_relaxation_is_the_elastic_law_and_full_relaxation_half_its_deviator(kin, kind):
+    law, elastic = damper(kind), kind.given(1000, 1e6, 0.4)
+    dl = flat(kin, np.random.default_rng(3).normal(0, 0.05, (3, 3)))
+    soft = hard = laws.initial_state(law, kin, 1.0)
+    plain = laws.initial_state(elastic, kin, 1.0)
+    for _ in range(3):
+        hard, soft = (laws.advance(law, kin, s, dl, dt) for s, dt in ((hard, 1e-12), (soft, 1e9)))
+        plain = laws.advance(elastic, kin, plain, dl, 1.0)
+    exact = laws.kirchhoff_stress(elastic, kin, plain)
+    assert np.allclose(laws.kirchhoff_stress(law, kin, hard), exact, rtol=1e-6, atol=1e-3)
+    mean = sum(exact[:3]) / 3 * np.array([1, 1, 1, *[0] * (len(exact) - 3)])
+    half = mean + 0.5 * (np.array(exact) - mean)
+    assert np.allclose(laws.kirchhoff_stress(law, kin, soft), half, rtol=1e-6, atol=1e-3)
+    assert laws.wave_speed_squared(law, kin, hard) >= laws.wave_speed_squared(elastic, kin, plain)
+
+
+@pytest.mark.parametrize("kind", [NeoHookean, Hencky])
+def test_stress_rotates_with_the_body_and_a_turn_takes_no_energy(kind):
+    law, Q = damper(kind), rotation(np.array([0.4, -0.9, 0.6]))
+    state = laws.initial_state(law, SPACE, 1.0)
+    for _ in range(4):
+        state = sheared(law, state, 0.2, 0.01)
+    turned = laws.advance(law, SPACE, state, flat(SPACE, Q - np.eye(3)), 1e-12)
+
+    def full(state):
+        a = laws.cauchy_stress(law, SPACE, state).at()
+        return np.array([[a[i, j] for j in range(3)] for i in range(3)])
+
+    assert np.allclose(full(turned), Q @ full(state) @ Q.T, rtol=1e-9, atol=1e-3)
+    before, after = (laws.energy_density(law, SPACE, s) for s in (state, turned))
+    assert after == pytest.approx(before, rel=1e-9)
+
+
+BAR = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(1, 0, 1, 1/8)
+    region(all, block, 0, 1)
+    material(rubber, neo-hookean, 1000, 1e6, 0.4)
+    material(damper, viscoelastic, rubber, 0.3, 0.005)
+    solid(bar, region, all, 1, damper, 1/8, 0)
+    group(bar, particles, region, all, solid, bar)
+    fix(v, initial_velocity_particles, bar, 0.01*cos(PI*x))
+    compute(Ek, kinetic_energy, bar)
+    compute(Es, strain_energy, bar)
+    compute(Ed, dissipated_energy, bar)
+    log_modify(custom, Ek, Es, Ed)
+    log(10)
+    dt_factor(0.3)
+    run_time(0.06)
+"""
+
+
+def test_a_bar_rings_down(run_interpreted):
+    """The complex root of rho s^2 = -M(s) pi^2, M = K + 4/3 G(s), gives frequency and decay."""
+    said = run_interpreted(BAR)
+    log = said.log
+    K, g, tau = 1e6 / 0.6, 0.3, 0.005
+    m, gone = K + 4 / 3 * G, 4 / 3 * G * g
+    # rho s^2 (1 + s tau) + pi^2 (m (1 + s tau) - gone) = 0
+    roots = np.roots([1000 * tau, 1000, pi**2 * m * tau, pi**2 * (m - gone)])
+    s = roots[np.argmax(roots.imag)]
+    total = log["Ek"] + log["Es"]
+    assert total[-1] / total[0] == pytest.approx(exp(2 * s.real * 0.06), rel=0.03)
+    drift = float(re.search(r"energy +(\S+) %", said.out)[1])
+    assert abs(drift) < 0.3 and log["Ed"][-1] > 0.2 * total[0]
+
+
+def test_relaxation_below_the_step_is_reported(run_interpreted):
+    said = run_interpreted(BAR.replace("0.3, 0.005", "0.3, 1e-7").replace("0.06)", "1e-3)"))
+    assert "relaxation time below the time step" in said.err
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("rubber", "pairs of g and tau"),
+        ("rubber, 0.3", "pairs of g and tau"),
+        ("rubber, 1.3, 1", "cannot relax"),
+        ("rubber, 0.3, 0", "impossible"),
+        ("rubber, 0.6, 1, 0.4, 2", "nothing would remain"),
+        ("wood, 0.3, 1", "no isotropic elastic solid"),
+        ("damper, 0.3, 1", "no isotropic elastic solid"),
+        ("nothing, 0.3, 1", "unknown material"),
+    ],
+)
+def test_constants_that_no_body_has(run_interpreted, line, says):
+    wood = "material(wood, orthotropic, 1, 9, 1, 1, 0.3, 0.3, 0.4, 1, 1, 1)\n"
+    said = run_interpreted(f"{RUBBER}{wood}material(m, viscoelastic, {line})\n", status=1).err
+    assert says in said and "Traceback" not in said
