@@ -27,6 +27,8 @@ SCENE = """
     material(rubber, neo-hookean, 1, 1, 0.3)
     material(air, eos-strength, air, none)
     material(metal, eos-strength, metal, none)
+    strength(soft, plastic, 0.4, 0.001)
+    material(plate, eos-strength, metal, soft)
     solid(left, region, left, {ppc}, {law}, 1, 0)
     solid(right, region, right, {ppc}, {law}, 1, 0)
     group(left, particles, region, left, all)
@@ -144,6 +146,7 @@ STRONG = GAS | SMOOTH | {"more": PRESSED.format(50)}
 USAVG = {"more": STRONG["more"] + "\n    scheme(usavg)"}
 SOIL = {"law": "soil", "method": "ulmpm, FLIP, linear, 1"}
 GRAINS = WATER | {"law": "grains", "method": "ulmpm, FLIP, quadratic-spline, 0.99", "steps": 1}
+METAL = {"law": "plate", "method": "tlmpm, FLIP, linear, 1", "v": "-1, 0"}
 AVERAGED = {"more": "anti_volumetric_locking(true)"}
 
 
@@ -194,6 +197,10 @@ AVERAGED = {"more": "anti_volumetric_locking(true)"}
         ("locking", SOIL | SMOOTH, False),
         ("locking", SOIL | AVERAGED, False),
         ("locking", SOIL | {"more": "scheme(newmark)"}, True),
+        ("locking", METAL, True),
+        ("locking", METAL | {"v": "-0.01, 0"}, False),
+        ("locking", METAL | {"method": "ulmpm, FLIP, linear, 1"}, False),
+        ("locking", METAL | AVERAGED, False),
     ],
 )
 def test_what_the_default_cannot_do(run_interpreted, name, words, told):
