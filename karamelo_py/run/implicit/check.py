@@ -2,6 +2,7 @@
 
 import importlib.util
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import declared
@@ -10,11 +11,14 @@ from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity, initial_state
+from karamelo_py.points.laws.strengths.frictional import little_dilatancy
+from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.styles.methods.base import takes_average
 
 # Hooks of fixes in implicit steps; hooks of plug-ins may be called more than once per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
@@ -54,6 +58,14 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         law = solid.material.law
         if can(law, constrained_velocity):
             continue
+        if update.anti_locking and _loses_strength(law):
+            yield (
+                f"lets '{solid.id}' lose strength: its yield surface takes no averaged pressure "
+                "(F-bar), and the passive pressure of sand was 1.8 instead of 3",
+                "anti_volumetric_locking(false), a dilatancy of a third of the friction, or "
+                f"{_EXPLICIT}",
+                solid.place,
+            )
         try:
             bears = _bears_shear(law, kin)
         except NoSlope as function:
@@ -165,3 +177,10 @@ def check(hub: Hub) -> None:
             place=update.scheme_place,
             hint="set_dt(...): with twenty steps per vibration the period is right within 1 %",
         )
+
+
+def _loses_strength(law: NamedTuple) -> bool:
+    """Return True if F-bar lets a law yield too early in load steps."""
+    if not takes_average(law):
+        return False
+    return isinstance(law.strength, MuI) or little_dilatancy(law.strength) > 0

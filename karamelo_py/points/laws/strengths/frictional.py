@@ -142,15 +142,6 @@ def frictional(strength: type) -> None:
         cure="psi={psi:.2g} (0.333), or Poisson's ratio {most:.2f} or less",
     )
     warn(
-        "F-bar in load steps",
-        when=_averages_in_load_steps,
-        reason="in load steps with F-bar, soil of little dilatancy loses strength: "
-        "the active and passive pressures of sand with a friction of 30 degrees were 0.40 and 1.8 "
-        "instead of 1/3 and 3 (0.57 and no equilibrium with splines)",
-        cure="anti_volumetric_locking(false) (0.333 and 3.04), or psi={psi:.2g} with a linear "
-        "basis",
-    )
-    warn(
         "F-bar with splines",
         when=_averages_splines,
         reason="in dilating soil the basis {scene.basis_name} needs no F-bar, which makes limit "
@@ -170,7 +161,7 @@ def _locks(strength, scene):
     return scene.locks and not scene.even and {"place": scene.method.place}
 
 
-def _little_dilatancy(strength):
+def little_dilatancy(strength):
     """The sine of friction in plane strain, or 0 if there is enough dilatancy."""
     f, d = sines_after(strength, 0.0)
     return f if d < ENOUGH * f * (1 - 1e-9) else 0.0
@@ -181,7 +172,7 @@ def _vibrates(strength, scene):
 
     Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
-    f = _little_dilatancy(strength)
+    f = little_dilatancy(strength)
     averaged = scene.hub.update.anti_locking
     alone = f < STEEP or strength.cohesion > 0
     if not f or scene.simulation.implicit or scene.d == 1 or (alone and not averaged):
@@ -197,17 +188,11 @@ def _vibrates(strength, scene):
     return None
 
 
-def _averages_in_load_steps(strength, scene):
-    f = _little_dilatancy(strength)
-    averaged = scene.hub.update.anti_locking and scene.simulation.implicit
-    return {"psi": _angle(f)} if f and averaged else None
-
-
 def _averages_splines(strength, scene):
     f, _ = sines_after(strength, 0.0)
     smooth = not (scene.hats or scene.simulation.implicit)
     averaged = scene.hub.update.anti_locking and smooth
-    return averaged and f > 0 and not _little_dilatancy(strength)
+    return averaged and f > 0 and not little_dilatancy(strength)
 
 
 def _angle(f):
