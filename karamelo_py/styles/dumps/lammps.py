@@ -3,13 +3,16 @@
 import gzip
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from karamelo_py.language.signature import OutputFile
 from karamelo_py.output.files import continued, whole
+from karamelo_py.output.rhythm import Every
 from karamelo_py.output.text import rows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
@@ -20,6 +23,7 @@ PIECE = 1 << 20  # bytes
 # For the binary format (LAMMPS manual, dump, second revision).
 MAGIC = b"DUMPCUSTOM"
 ENDIAN, REVISION = 1, 2
+ELEMENT = "element"  # the column with the names of types
 # Style of the box sides: shrink-wrapped, with a minimum extent.
 SHRUNK, AT_LEAST = 2, 3
 
@@ -47,6 +51,7 @@ class LammpsDump(TableDump):
     _end = 0
     _length = 0
     _encoder: Any = None
+    named = False  # with ELEMENT
     # Makes the encoder of a new file, and opens the text of a file.
     encoder: Any = Plain
     opened: Any = staticmethod(partial(open, mode="rb"))
@@ -100,11 +105,18 @@ class LammpsDump(TableDump):
             str(self.extent()[0]),
             "ITEM: BOX BOUNDS sm sm sm",
             *(f"{lo:.10g} {hi:.10g}" for lo, hi in box(self.hub)),
-            "ITEM: ATOMS " + " ".join(["id", "type", *self.columns]),
+            "ITEM: ATOMS " + " ".join(["id", "type", *self.columns, *[ELEMENT] * self.named]),
         ]
         yield ("\n".join(lines) + "\n").encode("ascii")
+        names = list(self.hub.solids)
         for ids, types, columns in self.tables():
-            yield from rows([ids, types, *columns])
+            if not self.named:
+                yield from rows([ids, types, *columns])
+                continue
+            for begin, end in pairwise([0, *np.flatnonzero(np.diff(types)) + 1, len(types)]):
+                name = b" %s\n" % names[types[begin] - 1].encode() if end > begin else b""
+                for text in rows([column[begin:end] for column in (ids, types, *columns)]):
+                    yield text.replace(b"\n", name)
 
 
 def box(hub: Hub) -> list[tuple[float, float]]:
@@ -163,12 +175,23 @@ class Particle(OfPoints, LammpsDump):
 
     Each row begins with the point's number (``id``, constant during the run) and the number of its
     solid (``type``, from 1). Positions are always written. The header contains the step and, as
-    ``ITEM: TIME``, the time.
+    ``ITEM: TIME``, the time. The column ``element`` has the names of the solids, which OVITO shows
+    as particle types.
 
     Example
     -------
     dump(d1, all, particle, 100, dump_p.*.LAMMPS, x, y, z, vx, vy, vz, s11, s22, s12)
+    dump(d2, all, particle, 100, named.*.LAMMPS, seq, element)
     """
+
+    def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
+        super().__init__(hub, every, file, *columns)
+        self.named = ELEMENT in self.columns
+        self.columns = tuple(name for name in self.columns if name != ELEMENT)
+
+    @staticmethod
+    def names(hub: Hub) -> Sequence[str]:
+        return [*OfPoints.names(hub), ELEMENT]
 
 
 class GridDump(OfNodes, LammpsDump):
@@ -230,6 +253,8 @@ class ParticleBin(BinaryRows, Particle):
     --------
     dump particle, dump particle/gz
     """
+
+    names = staticmethod(OfPoints.names)
 
 
 class GridBin(BinaryRows, GridDump):
