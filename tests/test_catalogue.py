@@ -175,3 +175,17 @@ def test_a_broken_plug_in_is_listed_as_such(capsys, tmp_path, monkeypatch):
     finally:
         monkeypatch.undo()
         registry.forget()
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [("periodic", "boundary(reflect)"), ("pore pressure", "cam-clay"), ("umat", "class in Python")],
+)
+def test_help_says_what_is_missing(capsys, asked, said):
+    assert main(["help", asked]) == 0
+    assert said in capsys.readouterr().out
+
+
+def test_help_takes_commands_of_other_programs(capsys):
+    assert main(["help", "unfix"]) == 1
+    assert "delete_fix(ID)" in capsys.readouterr().err

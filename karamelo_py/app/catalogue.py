@@ -11,7 +11,7 @@ from karamelo_py.language import registry, rules
 from karamelo_py.language.help import Help, describe
 from karamelo_py.language.signature import Parameter
 from karamelo_py.output.console import Console
-from karamelo_py.script.errors import ScriptError, codes, meant, table
+from karamelo_py.script.errors import ScriptError, codes, instead, meant, table
 
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
@@ -113,6 +113,9 @@ def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
         page.rows([(f"{family} {style}", family, style) for family, style in related])
     if arguments or related or failures:
         return 0
+    if absent := next((text for word, text in table()["missing"].items() if word in name), None):
+        _Page().paragraph(f"{name}: {absent}. The page 'What it cannot do' has more.")
+        return 0
     if len(words) > 1 and meant(words[0], families()):
         raise _unknown("family", words[0], families())
     names = {n for f in families() for n in registry.names(f)}
@@ -150,7 +153,10 @@ def _unknown(noun: str, name: str, names: Iterable[str]) -> ScriptError:
     return ScriptError(
         f"unknown {noun} '{name}'",
         expected="one of " + ", ".join(names) if noun == "family" else HELP_USAGE,
-        hint=next(meanings, None) or meant(name, names) or "karamelo-py styles lists them all",
+        hint=next(meanings, None)
+        or next(filter(None, (instead(family, name) for family in families())), None)
+        or meant(name, names)
+        or "karamelo-py styles lists them all",
     )
 
 
