@@ -92,8 +92,9 @@ class ULMPMContacts(Method):
     surface of a thinner one appears higher by up to a quarter of a cell.
 
     Walls of one cell contain liquids and granular materials, also in corners, inclined, and as they
-    move: in 1e5 steps the points of water and sand stay within a tenth of a cell of the surface.
-    Within 100 steps after a contact at a node, they may leave a wall there but not approach it.
+    move. In 1e5 steps the centres of points of water and sand reached at most 4 % of a cell into
+    walls at rest, and 26 % into moving walls. Within 100 steps after a contact at a node, they may
+    leave a wall there but not approach it.
 
     Both solids at a node have one normal, so their impulses are opposite and momentum is conserved.
     It comes from the sums of m grad N of both, averaged over the neighbouring nodes with the
