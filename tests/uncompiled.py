@@ -18,6 +18,8 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
+MOST_PLACES = 1000  # whose stencils are kept
+
 # Up to Python 3.11 a cached property is of one thread at a time: processes as threads meet in some.
 functools.RLock = contextlib.nullcontext
 
@@ -88,37 +90,90 @@ def trouble_emulator() -> None:
     Emulator.allocate, Emulator.launch = with_rubbish, shuffled
 
 
-def remembered(entry: Callable) -> Callable:
-    """Keep what is found of the nodes of the last stencil: each task and quantity asks for it.
+def remembered(locate: Callable, entry: Callable) -> tuple[Callable, Callable]:
+    """Keep the stencils of places, and their nodes: each visit of a step asks for the same.
 
-    Numbers of nodes are those of a grid, or of a box of it. Ranks are threads that take turns.
+    Numbers of nodes depend on the grid, which may be a box of it.
     """
-    last: tuple = None, None, {}
+    stencils: dict[tuple, tuple] = {}
+    nodes: dict[tuple, dict] = {}
 
-    def found(basis, kin, grid, stencil, k):
-        nonlocal last
-        mine = last
-        if mine[0] is not stencil or mine[1] is not grid:
-            mine = last = stencil, grid, {}
-        known = mine[2]
-        if k not in known:
-            known[k] = entry(basis, kin, grid, stencil, k)
-        return known[k]
+    def located(basis, kin, grid, place):
+        number = place[0].__class__
+        if number.__module__ != "numpy":  # it may carry slopes
+            return locate(basis, kin, grid, place)
+        key = number, id(basis), id(kin), grid, place
+        found = stencils.get(key)
+        if found is None:
+            if len(stencils) > MOST_PLACES:
+                stencils.clear()
+                nodes.clear()
+            stencil = locate(basis, kin, grid, place)
+            # With these two and the stencil alive, nothing else has their identities.
+            found = stencils[key] = stencil, basis, kin
+            nodes[id(stencil)] = {}
+        return found[0]
 
-    return found
+    def found_entry(basis, kin, grid, stencil, k):
+        known = nodes.get(id(stencil))
+        if known is None:
+            return entry(basis, kin, grid, stencil, k)
+        key = k, grid.first, grid.step_x, grid.step_y
+        found = known.get(key)
+        if found is None:
+            found = known[key] = entry(basis, kin, grid, stencil, k)
+        return found
+
+    return located, found_entry
+
+
+def quick_records() -> None:
+    """Read and set fields of NumPy's records by C alone: a twentieth of what steps take."""
+    import numpy as np
+
+    void, read, put = np.void, np.record.__getattribute__, np.record.__setattr__
+
+    def field(one: np.record, name: str):
+        try:
+            found = void.__getitem__(one, name)
+        except ValueError:  # no field of that name
+            return read(one, name)
+        return read(one, name) if isinstance(found, void) else found
+
+    def put_field(one: np.record, name: str, value) -> None:
+        try:
+            void.__setitem__(one, name, value)
+        except ValueError:
+            put(one, name, value)
+
+    np.record.__getattribute__, np.record.__setattr__ = field, put_field
+
+
+def chosen_at_once(function, *arguments):
+    """A point function called as plain Python, as `PointFunction` does it, but for one class."""
+    if function.tags == 1:
+        chosen = function._nearest.get((arguments[0].__class__,))
+        if chosen is not None:
+            return chosen(*arguments)
+    return function._plain(*arguments)
 
 
 def main() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
     import karamelo_py
+    from karamelo_py.compiler.trace.functions import PointFunction
     from karamelo_py.points.basis import product
 
-    # Before the bases are there, which register it: a tenth of what steps take.
-    product._entry_product = remembered(product._entry_product)
+    # Before the bases are there, which register them: a tenth of what steps take.
+    product._locate_product, product._entry_product = remembered(
+        product._locate_product, product._entry_product
+    )
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
+    PointFunction.__call__ = chosen_at_once
+    quick_records()
     cli._parser = functools.cache(cli._parser)  # a third of what a tiny scene takes
     gc.freeze()  # scenes make many objects, among which alone cycles have to be looked for
     trouble_emulator()

@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.compiler.tuples import flat, record
 from karamelo_py.kernels.arrays import Nodes, Number, Points, Setup, Tag
 from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
-from karamelo_py.kernels.hooks import CompiledHook, results
+from karamelo_py.kernels.hooks import CompiledHook, Member, results
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.views import place_at, state_at
 from karamelo_py.language.faults import as_script_error, fault, place_of
@@ -76,7 +76,7 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
             np.errstate(all="ignore"),
         ):
             try:
-                result = results(sample.tag, sample, law, state, p, values, 1.0)
+                result = results(sample.tag, sample, Member(p, law, state, values, 1.0))
             except ArithmeticError:  # caused by the sample numbers
                 continue
         expected = len(hook.writes) + hook.publishes
