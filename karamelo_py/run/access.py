@@ -1,4 +1,4 @@
-"""Nodes of a simulation by number: all of them, or a limited number at a time."""
+"""Nodes of a simulation by number: all, or a limited number at a time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class NodesByNumber:
         self.points, self.simulation = points, points.simulation
 
     def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeTable]:
-        """Yield all nodes in pieces, with the sums over points for the columns `names`."""
+        """Yield all nodes in pieces, with `names` summed over points."""
         simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
         simulation.show_on_nodes()
         s = simulation.setup
@@ -58,7 +58,7 @@ class NodesByNumber:
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
     def mass_of(self, group: NodeGroup) -> np.ndarray:
-        """Return the nodal mass of a group and its first moments (4,); rounded once."""
+        """Return the nodal mass of a group and its first moments: (4,), rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
         nodes = np.intersect1d(self.with_mass(), hub.groups[group.id].members, assume_unique=True)

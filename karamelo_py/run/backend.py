@@ -1,4 +1,4 @@
-"""The interface of whatever takes the steps: processor, card, ranks, Newton's method."""
+"""The interface of what takes the steps: CPU, GPU, MPI rank, Newton's method."""
 
 from __future__ import annotations
 
@@ -17,17 +17,15 @@ from karamelo_py.scene.modify import Fix
 
 
 class NodeAccess(Protocol):
-    """Nodes by number (`run.access.NodesByNumber`)."""
-
     def counted(self) -> np.ndarray: ...
     def with_mass(self) -> np.ndarray: ...
 
 
 class Backend(Protocol):
-    """A scene that is stepped: `Simulation`, or a subclass for a card or an implicit scheme.
+    """A scene that can be stepped: `Simulation`, or a subclass for a GPU or an implicit scheme.
 
-    The loop calls `begin` or `go_on`, `compile`, `advance`, and `snapshot` and `restore` to return
-    to a state; it does not ask which class takes the steps.
+    The loop calls `begin` or `go_on`, `compile`, `advance`; `snapshot` and `restore` return to a
+    state.
     """
 
     hub: Hub
@@ -39,18 +37,18 @@ class Backend(Protocol):
     hooks: Hooks | NoHooks
     present: np.ndarray  # (N,) bool by id, False for deleted points
     begun: set[Fix]  # fixes of the first step that have acted
-    mode: Tag  # one thread, or several
+    mode: Tag
     threads: int
     count: int  # of points
     points: Fields
-    mapped: bool  # nodes show a state of this simulation
-    moved_in_step: bool  # a step continues with other arrays after its first stage
+    mapped: bool  # nodes show the present state
+    moved_in_step: bool  # a step replaces the arrays after its first stage
     implicit: bool
-    states_every: int  # steps between two states that a run may return to
+    states_every: int  # steps between states to return to
     repeats_steps: bool  # to return to a state
     remedy: str  # changes that may prevent a failed step
-    notes_temperatures: bool  # steps note the range of temperatures
-    flags: tuple[bool, ...]  # facts about the state besides its arrays, for restart files
+    notes_temperatures: bool
+    flags: tuple[bool, ...]  # state besides the arrays, for restart files
 
     @property
     def nodes(self) -> NodeAccess: ...
@@ -87,7 +85,7 @@ class Backend(Protocol):
 
 
 class WholeDomain:
-    """The part of a scene on the only process: all of it. `mpi.subdomain` has one of several."""
+    """The whole scene, on a single process (`mpi.subdomain`: one of several)."""
 
     parted = False
 
@@ -95,21 +93,20 @@ class WholeDomain:
         self.simulation = simulation
 
     def migrate(self, s: Setup) -> Setup:
-        """Hand over the points that have left the own tiles; they must be sorted afterwards."""
+        """Hand over the points that left the own tiles; sort afterwards."""
         return s
 
     def share_memory(self) -> None:
-        """Send the memory of contact and the kept fields of the own nodes to all processes."""
+        """Send contact memory and kept fields of the own nodes to all processes."""
 
     def share_kept(self) -> None:
         """Send the kept fields of the own nodes to all processes."""
 
     def counted(self) -> np.ndarray:
-        """Return the numbers of the nodes in use here that no other process counts."""
+        """Return the used nodes that no other process counts."""
         return numbers(self.simulation.setup.spans)
 
     def act(self, function: Callable[[Setup], None], s: Setup) -> None:
-        """Call a function on the arrays of the whole scene."""
         function(s)
 
     def begin(self, hooks: Hooks | NoHooks, *, from_python: bool) -> None:
@@ -119,9 +116,9 @@ class WholeDomain:
         """Finish the last steps."""
 
     def state(self) -> dict[str, np.ndarray]:
-        """Return further arrays of a state, besides points and nodes."""
+        """Return arrays of a state besides points and nodes."""
         return {}
 
     def own_part(self, state: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the part of a state in a file that belongs to this process."""
+        """Select this process's part of a saved state."""
         return state

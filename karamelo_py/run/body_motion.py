@@ -17,10 +17,10 @@ class BodyMotion(NamedTuple):
     centre: np.ndarray  # (d,) of mass
     velocity: np.ndarray  # (d,) of the centre
     spread: np.ndarray  # (d, d) sum m X X, with X from the centre
-    shear: np.ndarray  # (d, d) sum m X V, with X and V relative to the centre
-    low: np.ndarray  # (d,) least and largest coordinates of points
+    shear: np.ndarray  # (d, d) sum m X V, relative to the centre
+    low: np.ndarray  # (d,) bounding box of the points
     high: np.ndarray
-    slow: np.ndarray  # (d,) least and largest velocities
+    slow: np.ndarray  # (d,) range of velocities
     fast: np.ndarray
 
     @property
@@ -28,7 +28,7 @@ class BodyMotion(NamedTuple):
         return float((self.high - self.low).max()) / 2
 
     def drift(self, free: int) -> np.ndarray:
-        """Return the rigid velocity (d,), along the directions from `free` on."""
+        """Return the rigid velocity (d,) along the directions from `free` on."""
         return np.where(np.arange(len(self.velocity)) < free, 0.0, self.velocity)
 
     @property
@@ -47,7 +47,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance from the rotation axis, of an ellipsoid in the bounding box."""
+        """Largest distance from the rotation axis, for an ellipsoid in the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)
@@ -61,7 +61,7 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: Backend) -> list[BodyMotion]:
-    """Measure the motion of all solids with points, over all processes; sums are exact."""
+    """Measure all solids with points, over all processes; sums are exact."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
     ends = np.full((count, 4 * d), -np.inf)
@@ -87,7 +87,7 @@ def motions(simulation: Backend) -> list[BodyMotion]:
 
 
 def _pieces(simulation: Backend, d: int) -> Iterator[tuple]:
-    """Yield solid number, masses (n,), positions and velocities (d, n), block by block."""
+    """Yield solid number, masses (n,), positions and velocities (d, n) per block."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
     for block, rows in simulation.points.rows_of(None):
         points = block.points

@@ -1,4 +1,4 @@
-"""Boxes of nodes, ranges of node numbers, and buffers for the contributions of points."""
+"""Boxes of nodes, spans of node numbers, and buffers for the contributions of points."""
 
 from typing import NamedTuple
 
@@ -14,27 +14,27 @@ SPAN = 256  # maximum nodes of a span
 
 
 class Boxes(NamedTuple):
-    """Boxes of the nodes that b tiles of points reach."""
+    """Boxes of nodes that b tiles of points reach."""
 
-    order: np.ndarray  # (b,) in which they are summed
+    order: np.ndarray  # (b,) order of summation
     grid: np.ndarray  # (b,)
     lo: np.ndarray  # (b, d) first nodes
     hi: np.ndarray  # (b, d) last nodes
-    rows: np.ndarray  # (b, r, 2) see `Tiling.rows`
+    rows: np.ndarray  # (b, r, 2) as `Tiling.rows`
 
 
 class Reached(NamedTuple):
-    """Pairs of a box and a tile of nodes that it reaches."""
+    """Pairs of a box and a tile of nodes that it overlaps."""
 
-    box: np.ndarray  # (k,) which box
-    tile: np.ndarray  # (k,) number of the tile of nodes
-    begin: np.ndarray  # (k, d) first nodes of the box in the tile
+    box: np.ndarray  # (k,) box
+    tile: np.ndarray  # (k,) tile of nodes
+    begin: np.ndarray  # (k, d) first nodes of the overlap
     end: np.ndarray  # (k, d) last nodes
-    size: np.ndarray  # (k,) number of these nodes
+    size: np.ndarray  # (k,) nodes in it
 
 
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first nodes of the rows of boxes (see `Buffers`), and the ends of the rows."""
+    """Return the first nodes and ends of the rows of boxes (see `Buffers`)."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
     rows = boxes[row]
     begin = rows[:, 0] + left // rows[:, 3] * rows[:, 5] + left % rows[:, 3] * rows[:, 6]
@@ -42,7 +42,7 @@ def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def joined_spans(boxes: np.ndarray) -> np.ndarray:
-    """Merge adjoining rows (k, 2) of boxes of nodes (see `Buffers`) into spans."""
+    """Merge adjoining rows (k, 2) of boxes (see `Buffers`) into spans."""
     begin, end = rows_of(boxes)
     order = np.argsort(begin, kind="stable")
     begin, end = begin[order], np.maximum.accumulate(end[order])
@@ -54,7 +54,7 @@ def joined_spans(boxes: np.ndarray) -> np.ndarray:
 
 
 def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
-    """Make `Setup.ranges` from rows (k, 2) of `count` owners; adjoining rows are merged."""
+    """Make `Setup.ranges` from rows (k, 2) of `count` owners, merging adjoining rows."""
     order = np.lexsort((rows[:, 0], owner))
     rows, owner = rows[order], owner[order]
     apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
@@ -66,19 +66,19 @@ def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndar
 
 
 def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Reduce rows from each start to the next to their minimum and maximum."""
+    """Return minima and maxima of the rows from each start to the next."""
     if not len(starts):
         return begin, end
     return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
 
 
 def used(spans: np.ndarray) -> np.ndarray:
-    """Return the rows in use of an array of spans, whose first row is their count."""
+    """Return the used rows of spans, whose first row is their count."""
     return spans[: 1 + spans[0, 0]]
 
 
 def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the parts of spans (k, 2) outside `others`; neither overlap."""
+    """Return the parts of disjoint spans (k, 2) outside disjoint `others`."""
     edges = np.concatenate([spans.T.ravel(), others.T.ravel()])
     steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
     order = np.argsort(edges, kind="stable")
@@ -88,35 +88,33 @@ def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def numbers(spans: np.ndarray) -> np.ndarray:
-    """Return the node numbers in spans, whose first row is their count."""
+    """Return the node numbers in spans (first row: count)."""
     return between(*used(spans)[1:].T)
 
 
 def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Return all integers in the ranges [begin, end)."""
     of, left = ragged(end - begin)
     return begin[of] + left
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the list, and the index in it, of each item of k lists of these lengths."""
+    """Return list number and index in the list of each item of k lists."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
 
 def numbered(shapes: np.ndarray) -> np.ndarray:
-    """Return the first numbers of items in boxes of shapes (k, d), and the end: (k + 1,)."""
+    """Return the first item numbers of boxes of shapes (k, d), and the end: (k + 1,)."""
     return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
 
 
 def steps_of(shapes: np.ndarray) -> np.ndarray:
-    """Return the strides (k, d) of boxes of shapes (k, d)."""
     after = np.concatenate([shapes[:, 1:], np.ones((len(shapes), 1), np.int64)], axis=1)
     return np.cumprod(after[:, ::-1], axis=1)[:, ::-1]
 
 
 def unique(numbers: np.ndarray) -> np.ndarray:
-    """As ``np.unique``, but without its import of numpy.ma (0.03 s)."""
+    """``np.unique`` without importing numpy.ma (0.03 s)."""
     return np.unique(numbers, return_counts=True)[0]
 
 
@@ -129,24 +127,23 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, kinds: int) -> list[np.ndarray]:
-    """Return the arrays that points scatter to, of some `kinds` (`sums.arrays_given`)."""
+    """Return the arrays that `kinds` of sums scatter to (`sums.arrays_given`)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (kinds & 1) + [velocity] * (kinds >> 1 & 1) + rest * (kinds >> 2 & 1)
 
 
 def summed(nodes: Nodes) -> list[np.ndarray]:
-    """Return the arrays that points scatter to."""
     declared = [one.array for one in nodes.fields if isinstance(one, SummedField)]
     return [nodes.sums, nodes.velocity, *declared]
 
 
 def beyond(contact: Tag) -> int:
-    """Return the number of cells beyond the nodes of points whose sums contact reads."""
+    """Return how many cells further contact reads sums."""
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 
 def room_of(rows: int, array: np.ndarray) -> np.ndarray:
-    """Return `rows` zero rows of the width and type of an array; with none it can grow."""
+    """Return zeros (rows, ...) as wide as `array`; with no rows it can grow."""
     width, kind = array.shape[1], array.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 
@@ -158,7 +155,7 @@ def give_up(array: np.ndarray) -> None:
 
 
 def grow(array: np.ndarray, rows: int) -> None:
-    """Resize an array in place to at least `rows` rows, since setups hold it."""
+    """Resize in place, since setups hold the array."""
     if len(array) < rows:
         forget_array(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -1,6 +1,6 @@
 """One material point under prescribed strains and stresses (commands load_path, element).
 
-The point functions of the law run in plain Python: nothing is compiled.
+Runs the point functions of the law in plain Python, without compilation.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.kinematics import tensor
 from karamelo_py.script.errors import ScriptError
 
-# Components of symmetric tensors, in the order of the point functions.
+# Tensor components in the order of the point functions.
 COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 NORMAL = COMPONENTS[:3]
 
@@ -31,12 +31,12 @@ NORMAL = COMPONENTS[:3]
 class LoadPath(Named):
     """Targets at the end of a load path; other strains do not change."""
 
-    increments: int  # number of equal ones
+    increments: int
     duration: float
-    strain: Mapping[str, float]  # targets by component
+    strain: Mapping[str, float]  # by component
     stress: Mapping[str, float]
-    shear: Sequence[str] = ()  # components of `strain` that are simple shear, not pure
-    volumetric: float | None = None  # sum of normal strains, reached by those that are not named
+    shear: Sequence[str] = ()  # components in simple instead of pure shear
+    volumetric: float | None = None  # sum of normal strains, shared by those without a target
     turn: float = 0.0  # angle about z
 
     catalogue = "load_paths"
@@ -78,10 +78,10 @@ class LoadPath(Named):
 SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
-HALVINGS = 8  # of a diverging Newton step
-DIVISIONS = 8  # of an increment that does not converge, into halves
-TOLERANCE = 1e-10  # of the stress, or of what an increment would change in an elastic material
-ROUNDING = 1e-13  # unresolved stress, over the modulus
+HALVINGS = 8
+DIVISIONS = 8  # of an increment that does not converge
+TOLERANCE = 1e-10  # of the stress, or of its change if elastic
+ROUNDING = 1e-13  # unresolved stress over modulus
 
 
 class Unreachable(Exception):
@@ -89,10 +89,10 @@ class Unreachable(Exception):
 
 
 class Loading(NamedTuple):
-    strain: np.ndarray  # (6,) change of strain, 0 where the stress is prescribed
+    strain: np.ndarray  # (6,) strain change; 0 where the stress is prescribed
     turn: float
-    shear: tuple[int, ...]  # components in simple shear
-    prescribed: np.ndarray  # indices of the components whose stress is prescribed
+    shear: tuple[int, ...]
+    prescribed: np.ndarray  # components with prescribed stress
     begin: np.ndarray  # their stress
     end: np.ndarray
 
@@ -105,10 +105,10 @@ class Point:
     def __init__(self, law: NamedTuple, kin: NamedTuple):
         self.law, self.kin = law, kin
         self.state = laws.initial_state(law, kin, 1.0)
-        self.strain = np.zeros(6)  # sum of the strain increments, symmetric parts of dt grad v
+        self.strain = np.zeros(6)  # sum of symmetric parts of dt grad v
         self.time = 0.0
-        self.work = 0.0  # of the stress, per reference volume
-        self.last: tuple = (self.state, np.zeros((3, 3)), 1.0)  # increment, and the state before
+        self.work = 0.0  # per reference volume
+        self.last: tuple = (self.state, np.zeros((3, 3)), 1.0)  # state before, increment, dt
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -141,14 +141,14 @@ class Point:
                 rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
             except Unreachable as error:
                 raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
-            # Not a sum of increments, so that tables have round numbers.
+            # Not a sum of increments: tables get round numbers.
             self.time = begun + b * path.duration
             observe()
 
     def _go(
         self, motion: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
     ) -> np.ndarray:
-        """Go from fraction `a` of a path to fraction `b`, in halves if an increment fails."""
+        """Go from fraction `a` of a path to `b`; halve increments that fail."""
         try:
             solution = self._solve(motion, (b - a) * duration, a, b, rate)
         except Unreachable:
@@ -162,13 +162,12 @@ class Point:
     def _solve(
         self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
     ) -> np.ndarray:
-        """Solve an increment for the strains whose stress is prescribed."""
+        """Solve an increment for the strains with prescribed stress."""
         prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)
 
         def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
-            """Return the state and its stress; None if there is none."""
             increment[prescribed] = unknown
             dl = self._strained(increment, motion.shear) + rigid
             try:
@@ -200,10 +199,9 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """Return the tangent (n, m) of the last increment.
+        """Return the tangent (n, m) of the last increment: d(Cauchy stress) / d(free strains).
 
-        Derivatives of the n components of Cauchy stress by the m free strains; shears are
-        engineering shear strains.
+        Shears are engineering shear strains.
         """
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
@@ -246,7 +244,7 @@ class Point:
             tangent = slopes(unknown)
             if not np.isfinite(tangent).all():
                 break
-            # Least squares: a component without stiffness does not move.
+            # Least squares: components without stiffness do not move.
             step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
             for halving in range(HALVINGS):
                 trial = unknown + step / 2**halving
@@ -268,16 +266,16 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """Return dt grad v (3, 3) of a rotation about z, in the form that is rigid for the law.
+        """Return dt grad v (3, 3) of a rotation about z that the law sees as rigid.
 
-        To first order that is a skew tensor. To second order a law takes its strain from the
-        symmetric part, its volume from det F, or all from F, and the three disagree.
+        First order: skew. To second order laws differ: strain from the symmetric part, volume from
+        det F, or all from F.
         """
         if angle == 0:
             return np.zeros((3, 3))
         skew = np.zeros((3, 3))
         skew[1, 0], skew[0, 1] = angle, -angle
-        # (1 + a) ((1 + a)^2 + angle^2) = 1 in the first form with a volume that stays
+        # (1 + a) ((1 + a)^2 + angle^2) = 1 preserves the volume in the first form
         roots = np.roots([1, 0, angle**2, -1])
         same_volume = float(roots[np.argmin(np.abs(roots - 1))].real) - 1
         exact = np.sin(angle) / angle * skew + (np.cos(angle) - 1) * np.diag([1, 1, 0])
@@ -305,11 +303,11 @@ class Point:
             self.strain[self.kin.dimension : 3] = np.log(across)
 
 
-WIDTH = 17  # ten digits, sign, exponent and a blank
+WIDTH = 17  # ten digits, sign, exponent, blank
 
 
 def shown(point: Point) -> dict[str, float]:
-    """Return the output columns of a point; q is the von Mises stress, sqrt(3/2 s:s)."""
+    """Return the output columns; q is the von Mises stress, sqrt(3/2 s:s)."""
     law, kin, state, stress = point.law, point.kin, point.state, point.stress
     names = COMPONENTS[: len(kin.symmetric_names)]
     xx, yy, zz, *shear = stress
@@ -335,7 +333,7 @@ class Response:
         self.observe()
 
     def observe(self) -> None:
-        # A zero is added so that none is negative.
+        # Adding zero removes negative zeros.
         self.rows.append([float(value) + 0.0 for value in shown(self.point).values()])
 
     def last(self) -> dict[str, float]:
@@ -367,7 +365,7 @@ class Response:
         right.set_ylabel("von Mises stress q")
         for axes in (left, right):
             tidy(axes)
-            # Room for labels such as 0.0025 side by side, and powers of ten for longer ones.
+            # Room for labels such as 0.0025; powers of ten for longer ones.
             axes.locator_params(axis="x", nbins=6)
             axes.ticklabel_format(scilimits=(-3, 4))
             if axes.get_legend_handles_labels()[0]:

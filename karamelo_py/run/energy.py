@@ -1,4 +1,4 @@
-"""The energy balance of a run: whether it is watched, has grown, and what is lost."""
+"""The energy balance of a run: whether it is tracked, its growth, its losses."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ from karamelo_py.run.backend import Backend
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.scene.hub import Hub
 
-TOLD = 2  # consecutive windows of growth, after which a run warns
+TOLD = 2  # consecutive windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
-    """Name the source of work that is not tracked; empty if energy can be watched.
+    """Name the source of work that is not tracked; empty if there is none.
 
-    The loops sum the work of compiled hooks on nodes and points. Fixes in Python declare by
-    `Fix.conserves` that they do no other work.
+    Loops sum the work of compiled hooks. Python fixes declare by `Fix.conserves` that they do no
+    other work.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -57,19 +57,19 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 class EnergyWatch:
-    """Watches the balance of energy and the range of temperatures of a simulation.
+    """Monitors the energy balance and the range of temperatures.
 
     Besides the kernels, only this class writes them to the clock.
     """
 
     def __init__(self, simulation: Backend):
         self.simulation, self.clock = simulation, simulation.control.clock[0]
-        self.followed = False  # the clock knows the balance up to the present state
-        self.told_of_growth = False  # a warning was given since the balance is followed
+        self.followed = False  # the balance is up to date
+        self.told_of_growth = False  # since tracking began
         self.told_of_loss = False
 
     def begin(self, *, set_anew: bool) -> None:
-        """Begin to watch, or continue unless fields were `set_anew` since the last step."""
+        """Begin, or continue unless fields were `set_anew` since the last step."""
         simulation, clock = self.simulation, self.clock
         update = simulation.hub.update
         clock.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)
@@ -78,7 +78,7 @@ class EnergyWatch:
         if anew:
             self.told_of_growth = self.told_of_loss = False
         if clock.watch_energy:
-            # Velocities belong to half a step earlier, stresses to the fraction strained before.
+            # Velocities are half a step old, stresses by the fraction strained before.
             self._begin_to_look(0.25 + 0.5 * update.scheme.traits.strained_before, anew)
         known = simulation.notes_temperatures and not unknown_heat(simulation.hub)
         clock.watch_heat = int(update.thermal and known)
@@ -115,7 +115,7 @@ class EnergyWatch:
         return float((ends[:d] + ends[d:]).max())
 
     def energy(self) -> float:
-        """Sum kinetic, stored and dissipated energy minus the work; NaN if it is not watched."""
+        """Sum kinetic, stored and dissipated energy minus work; NaN if not tracked."""
         simulation, clock = self.simulation, self.simulation.control.clock
         if not simulation.in_tiles() or not clock[0].watch_energy:
             return np.nan
@@ -136,36 +136,36 @@ class EnergyWatch:
         return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
     def share_lost(self) -> float:
-        """Fraction of the largest energy so far lost since the first step; negative: a gain."""
+        """Fraction of the largest energy lost since the first step; negative: a gain."""
         clock = self.clock
         mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
         return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
 
     def grown_little(self) -> bool:
-        """Return True if the present state is good, judged by its energy and its last step."""
+        """Return True if energy and last step show no fault in the present state."""
         clock = self.clock
         swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
         if swings or self.has_grown():
             return False
         if not clock.watch_energy:
             return True
-        # The last look, too: noise that grows by half in a hundred steps is already in the state.
+        # Include the last window: noise that grows by half in 100 steps is in the state.
         before = clock.first_mean if clock.looks >= FEW else clock.first_balance
         return bool(keeps(before, clock.balance, unit_of(clock)))
 
     def growth_since(self, before: float) -> float:
-        """Return the energy growth relative to `before`; NaN if energy is not watched."""
+        """Return energy growth relative to `before`; NaN if not tracked."""
         unit = max(abs(before), float(self.clock.energy_floor), 1e-300)
         return growth(before, self.energy(), unit)
 
     def change(self) -> float | None:
         if not self.clock.watch_energy or self.clock.looks <= FEW:
             return None
-        # Since the first balance, not `first_few`, which `forget_growth` changes.
+        # From the first balance, not `first_few`, which `forget_growth` changes.
         return -100 * self.share_lost()
 
     def forget_growth(self) -> None:
-        """Measure growth from the present state: a warning has been given."""
+        """Measure growth from the present state, after a warning."""
         clock = self.clock
         clock.first_few = clock.first_mean = clock.largest_mean
         clock.windows, clock.grown = 0, 0.0

@@ -1,4 +1,4 @@
-"""Steps of a scene on a GPU: device memory, and the launches of a step."""
+"""Steps of a scene on a GPU: device memory and kernel launches."""
 
 from __future__ import annotations
 
@@ -28,16 +28,15 @@ from karamelo_py.points.basis import support
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 
-POLL = 64  # steps between two reads of `fate`
-REGISTERS = {4: 200, 8: 130}  # words that the thread of a cell sums, by the size of numbers
-FAR = 1.0  # cells that points move before they are reordered in memory
+POLL = 64  # steps between reads of `fate`
+REGISTERS = {4: 200, 8: 130}  # words summed by a cell's thread, by size of a number
+FAR = 1.0  # cells that points move before they are reordered
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # of launches
 Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
 NO_HOOKS: Hooks = arrays.NoHooks(), ()
 
 
 def arrays_in(thing: Any) -> Iterator[np.ndarray]:
-    """Yield the arrays in nested tuples."""
     if isinstance(thing, np.ndarray):
         yield thing
     elif isinstance(thing, tuple):
@@ -46,7 +45,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 
 
 def there(s: arrays.Setup) -> arrays.Setup:
-    """Return the setup without tiles and their buffers, which no card needs."""
+    """Return the setup without tiles and buffers, which a GPU does not use."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, own = s.buffers._replace(nodes=s.nodes), s.heat
     if isinstance(own, heat.Conducting):
@@ -55,7 +54,7 @@ def there(s: arrays.Setup) -> arrays.Setup:
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
-    """View an array of points (..., n) as integers (rows, n) of the same size."""
+    """View point arrays (..., n) as integers (rows, n) of the same size."""
     rows = int(np.prod(image.shape[:-1], dtype=int))
     step = image.strides[-2] if image.ndim > 1 else 0
     whole = {4: np.int32, 8: np.int64}[image.itemsize]
@@ -66,10 +65,10 @@ def _no_formula(*_): ...
 
 
 class StepsOnCard:
-    """The steps of a lowered scene on a card.
+    """Steps of a lowered scene on a GPU.
 
-    `program` is the scheme's class and the class of its visits; `hooks` are the compiled hooks and
-    their functions, in the order of their table.
+    `program`: classes of the scheme and its visits; `hooks`: compiled hooks and functions, in table
+    order.
     """
 
     def __init__(
@@ -100,10 +99,10 @@ class StepsOnCard:
         self.order = list(self._order())
         parts = (self.begin, self.step, self.last_step, self.before, self.behind, self.order)
         self._do = dict(zip(PARTS, map(card.together, parts), strict=True))
-        self.ordered = -np.inf  # cells that points had moved when they were reordered
+        self.ordered = -np.inf  # path of the points at the last reordering, in cells
 
     def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
-        """List the launches of a step, and of the last of several steps."""
+        """Return the launches of a step, and of the last of several."""
         begin, end = self._clear(*self._slots()), [self.launch(gpu.finish_step, 1, self.s)]
         own = self._launches(rows)
         last = [launch for launch in own if launch not in self._ahead]
@@ -124,7 +123,7 @@ class StepsOnCard:
         return stage
 
     def _cells(self, block: Any) -> gpu.CellLists:
-        """Make the lists of a block's points by cell, and room for the largest sums and loads."""
+        """Make the lists of points by cell, and room for the largest sums and loads."""
         nodes, new, points = self.nodes, self.images.new, block.points.mass.size * self.corners
         boxes = min(nodes, points) + 1
         self.levels = [-(-nodes // gpu.CHUNK)]
@@ -156,16 +155,16 @@ class StepsOnCard:
     def launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
-        """Launch ``function(i, fate, *arguments)`` by `count` threads, while steps continue."""
+        """Launch ``function(i, fate, *arguments)`` in `count` threads while steps continue."""
         function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
     def of_points(self, function: Callable, block: Any, *rest: Any, **more: Any) -> KernelLaunch:
-        """Launch ``function(i, fate, s, block, *rest)`` by a thread for each point."""
+        """Launch ``function(i, fate, s, block, *rest)`` per point."""
         return self.launch(function, block.points.mass.size, self.s, block, *rest, **more)
 
     def _launches(self, rows: list) -> list[KernelLaunch]:
-        self._acted: set[int] = set()  # stages of hooks so far
+        self._acted: set[int] = set()  # hook stages so far
         return [one for row in rows for one in take.find((type(row), Card))(row, self)]
 
     def _plain(self, rows: Iterable) -> Iterator[Any]:
@@ -188,7 +187,7 @@ class StepsOnCard:
         if not row.gathers:
             for block, cells in pairs:
                 yield self.of_points(visit.load_point, block, cells)
-        # Points in reference places are listed once, before the first step if there is a launch.
+        # Reference positions are listed once, before the first step if it has a launch.
         if visit.lists and (s.frame.moves or not self.begin):
             for block, cells in pairs:
                 yield self.of_points(visit.count, block, cells)
@@ -205,7 +204,7 @@ class StepsOnCard:
                 yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
-        """Sort the points of a block by cell (counting sort with prefix sums by chunks)."""
+        """Sort a block's points by cell (counting sort, prefix sums by chunks)."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self.launch(gpu.sum_counts, levels[0], cells)
@@ -229,7 +228,7 @@ class StepsOnCard:
             yield self.launch(gpu.order_cell, cells.cell.size, cells, come_from)
             tables = [as_rows(self.images.of(array)) for _, array in arrays.arrays_of(block.points)]
             room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in tables)
-            if room.nbytes < most:  # the sums of cells are free meanwhile
+            if room.nbytes < most:  # cell sums are free meanwhile
                 room = self.images.new((-(-most // 8),), np.int64)
             for rows in tables:
                 own = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
@@ -239,7 +238,7 @@ class StepsOnCard:
     # --- hooks of fixes
 
     def _called(self, h: int) -> dict:
-        """Map what is called by address to the functions of a hook."""
+        """Map callees by address to the functions of a hook."""
         own = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
         return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
 
@@ -247,7 +246,7 @@ class StepsOnCard:
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
-        """Count published values that a thread copies: for formulas one step earlier."""
+        """Count published values copied per thread: for formulas, one step old."""
         if not (self.table[h].uses_before and self._has_formulas(h)):
             return 0
         return 1 + max(self._slots_read(), default=0)
@@ -258,7 +257,6 @@ class StepsOnCard:
     def hooks_on_nodes(
         self, stage: int, target: int, of_heat: bool = False
     ) -> Iterator[KernelLaunch]:
-        """Yield the launches of hooks on nodes at a stage."""
         s = heat.at_its_nodes(self.s) if of_heat else self.s
         own = [h for h, row in enumerate(self.table) if row.stage == stage]
         yield from self._clear_again(stage, own)
@@ -292,7 +290,6 @@ class StepsOnCard:
         return self.launch(function, count, s, about, *tag, called=called)
 
     def hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
-        """Yield the launches of hooks on points at a stage."""
         own = [h for h, row in enumerate(self.table) if row.stage == stage]
         heats = stage == arrays.SUPPLY_HEAT
         points_of = heat.heated if heats else moving_points
@@ -328,7 +325,7 @@ class StepsOnCard:
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
     def _clear_again(self, stage: int, own: list[int]) -> Iterator[KernelLaunch]:
-        """Clear the totals of hooks whose stage is repeated in a step: the last time counts."""
+        """Clear totals of hooks whose stage repeats within a step: the last time counts."""
         if stage in self._acted:
             for h in own:
                 if self.table[h].slot >= 0:
@@ -346,7 +343,7 @@ class StepsOnCard:
         ]
 
     def collect(self, first: int, end: int) -> list[KernelLaunch]:
-        """Sum rows of the totals over their copies."""
+        """Sum totals over their copies."""
         sums = self.s.control.totals
         size = (end - first) * sums.shape[1]
         return [self.launch(fixes.collect_total, size, self.copies, sums, first)] if size else []
@@ -361,14 +358,14 @@ class StepsOnCard:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish the totals of a hook after it, if formulas read any hook's."""
+        """Publish a hook's totals right after it, if formulas read hooks."""
         slots = range(*self._slots())
         if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []
         return [*self.collect(*self._rows_of(h)), self._publish_some((h, h + 1), True)]
 
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
-        """List the launches of a look at the energy: before, and a step later."""
+        """Return the launches that measure energy: before a step, and a step later."""
         s, sums = self.s, self.s.control.totals
         copies, solids = self.copies, (len(s.control.values), len(sums))
         found = [*self._clear(0, WORK), *self._clear(*solids)]
@@ -387,20 +384,19 @@ class StepsOnCard:
     # --- steps
 
     def send(self) -> None:
-        """Copy the state of the scene to the card."""
-        self.use[:] = 2  # nodes may have values of any step
-        # Failed steps have left terms in the copies of the totals.
+        self.use[:] = 2  # nodes may hold values of any step
+        # Failed steps leave terms in the copies of the totals.
         self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 
     def fetch(self) -> None:
-        """Copy it back, but for nodes; clock and values are up to date already."""
+        """Copy the state back except nodes; clock and values are current."""
         here = arrays_in(self.s._replace(control=()))
         nodes = set(map(id, self._of_nodes()))
         self.images.fetch([array for array in here if id(array) not in nodes])
 
     def fetch_nodes(self) -> None:
-        """Copy back the nodal output, which no step needs."""
+        """Copy back the nodal output, which steps do not need."""
         self.images.fetch(self._of_nodes())
 
     def _of_nodes(self) -> list[np.ndarray]:
@@ -413,7 +409,7 @@ class StepsOnCard:
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
-        """Take up to `count` steps; DONE, or why they ended."""
+        """Take up to `count` steps; return DONE or why they ended."""
         control = self.s.control
         exchanged = [self.fate, control.clock, control.values, control.totals]
         self.fate[: gpu.DRIFT] = 0
@@ -439,14 +435,14 @@ class StepsOnCard:
         return int(status) - 1 if status > 0 else DONE
 
     def _order_if_due(self) -> None:
-        """Order points in memory, once some have gone far since that was done last."""
+        """Reorder points in memory once some have moved far."""
         gone = self.fate[gpu.DRIFT]
         if gone - self.ordered > FAR:
             self.ordered = gone
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Time each launch of a step after the last one: the medians of a few steps."""
+        """Return the median time of each launch of a step, over a few steps after the last."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]

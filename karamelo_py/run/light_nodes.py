@@ -1,9 +1,9 @@
-"""The stable step of bodies in the total frame, limited by nodes with little mass.
+"""The stable step of total-frame bodies, limited by nodes with little mass.
 
-Nodes at an edge that hardly any material reaches may be stiffer, for their mass, than those within
-a body. FLIP averages their motion away; transfers with moments or velocity gradients do not, since
-their points follow any linear field. The step is stable below 2 / w, where w^2 is the largest
-eigenvalue of M^-1 K with lumped masses. In the total frame it is known at set-up.
+Edge nodes with little material may be stiffer per mass than inner nodes. FLIP averages their motion
+away; transfers with moments or velocity gradients do not, since their points follow any linear
+field. Stable below 2 / w, where w^2 is the largest eigenvalue of M^-1 K with lumped masses: known
+at set-up in the total frame.
 """
 
 from collections.abc import Callable
@@ -29,9 +29,9 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
-LIGHT = 0.9  # fraction of an inner node's mass, below which nodes count as light
+LIGHT = 0.9  # fraction of an inner node's mass
 MANY = 100_000  # target number of point-node pairs
-STEPS = 24  # of the iteration: within 1 % of the highest frequency
+STEPS = 24  # iterations: within 1 % of the highest frequency
 
 
 class _Line(NamedTuple):
@@ -41,9 +41,9 @@ class _Line(NamedTuple):
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
-    """Return the stable step over h/c that the nodes of all solids allow; inf if unknown.
+    """Return the stable step over h/c allowed by the nodes of all solids; inf if unknown.
 
-    Rounded down to four digits: sums in another order give the same step.
+    Rounded down to four digits: independent of the order of sums.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf
@@ -54,7 +54,7 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
 
 
 def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
-    """Return 2 / w (c/h) of the light nodes of one solid."""
+    """Return 2 / w (c/h) of one solid's light nodes."""
     method, volume = hub.update.method, solid.volume0
     kin = method.kinematics(hub)
     places = method.places(kin, solid, float)
@@ -81,7 +81,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     limit = LIGHT * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
-        for _ in range(2):  # their points, and the points of those points' nodes
+        for _ in range(2):  # their points, then the points of those points' nodes
             near = np.any([seen[nodes(k)] for k in pairs], axis=0)
             seen = np.zeros(count, bool)
             for k in pairs:
@@ -91,7 +91,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
         limit *= 0.7
     if not near.any():
         return inf
-    mass = filled  # of all points, not only of those near
+    mass = filled  # of all points, not only near ones
     if radius is not None:
         mass = sum((np.bincount(nodes(k), volume * weight(k), count) for k in pairs), none)
     number = np.cumsum(seen) - 1
@@ -138,7 +138,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Tag, kin: Tag) -> float:
-    """Return the shear modulus over the P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
+    """Return shear over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)

@@ -1,4 +1,4 @@
-"""Events of a run, and the base of what listens to them."""
+"""Events of a run, and the base class of its listeners."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ from karamelo_py.script.errors import Place
 
 
 class Trouble(NamedTuple):
-    """A failure of a run: message, fix, code for programs, likely cause, line of the script."""
+    """A failure: message, fix, code for programs, likely cause, line of the script."""
 
     message: str
     fix: str
@@ -17,12 +17,11 @@ class Trouble(NamedTuple):
 
 
 def when(simulation: Any, later: int = 0) -> str:
-    """Format the step (or `later` steps on) and the time."""
+    """Format time and step (`later` steps on)."""
     return f"step {simulation.step + later}, t = {simulation.time:.6g}"
 
 
 def where(x: Iterable[float]) -> str:
-    """Format a position."""
     return "(" + ", ".join(f"{value:.6g}" for value in x) + ")"
 
 
@@ -30,19 +29,19 @@ class Listener:
     """Receives the events of a run; subclasses override what they need."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
-        """The first step is known, and nothing is compiled yet; `resumed` from a file."""
+        """The first step is chosen, nothing compiled yet; `resumed` from a file."""
 
     def ready(self, simulation: Any, *, resumed: bool) -> None:
-        """All is compiled: the first step comes next."""
+        """Compilation is done."""
 
     def stepped(self, simulation: Any) -> None:
-        """Some steps were taken, all of them good."""
+        """Some steps succeeded."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
-        """Explain a `status`, DONE for an energy gain; a step `too_large` from the start."""
+        """Explain `status` (DONE: energy gain); `too_large`: the step, from the start."""
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
-        """The run is over; it began at `first_step` and took `wall` seconds."""
+        """The run is over: from `first_step`, in `wall` seconds."""
 
     def signalled(self, number: int) -> None:
         """A signal arrived: the run ends after the present steps."""

@@ -1,4 +1,4 @@
-"""One run: steps in chunks, outputs when they are due, and events for listeners."""
+"""One run: steps in chunks, outputs when due, events for listeners."""
 
 import signal
 import time
@@ -24,15 +24,15 @@ PATIENCE = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
-    """The run was ended by a signal, such as Ctrl-C; its outputs are complete."""
+    """A signal such as Ctrl-C ended the run; outputs are complete."""
 
 
 @dataclass(eq=False)
 class RunLoop:
     """Runs a scene for a number of steps, to a time, or by a condition.
 
-    It ends when the condition holds (`until`) or fails. With `halve`, it returns to the last good
-    state and halves the step after a failure.
+    It ends when the condition holds (`until`) or fails. With `halve`, a failure returns to the last
+    good state and halves the step.
     """
 
     hub: Hub
@@ -43,8 +43,8 @@ class RunLoop:
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
-    signal = 0  # received by this process
-    interrupted = 0  # the signal that all processes end with
+    signal = 0  # to this process
+    interrupted = 0  # signal that ends all processes
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)
@@ -94,7 +94,7 @@ class RunLoop:
                         # Before the final state, which a longer run would not have.
                         hub.output.write_last()
                     hub.output.end()
-                self._agree(simulation)  # a signal may have come meanwhile: no further run begins
+                self._agree(simulation)  # a signal may have come: start no further run
             except BaseException as error:
                 hub.console.end_run()
                 hub.output.abort()
@@ -139,12 +139,12 @@ class RunLoop:
         while self._goes_on(simulation):
             rollback.before()
             step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
-            kept = (step // most + 1) * most  # where a state may be kept
+            kept = (step // most + 1) * most  # where a state may be stored
             end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             end = min([end, *((step // every + 1) * every for every in rhythms)])
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step, between)
-            self._agree(simulation)  # outputs show steps that succeeded on all processes
+            self._agree(simulation)  # outputs show steps that succeeded everywhere
             if not rollback.after(status):
                 length = 1
                 continue
@@ -166,7 +166,7 @@ class RunLoop:
             self._agree(simulation)
             return not self.interrupted
         if simulation.step == self.first_step:
-            # A forgotten or reversed comparison ends a run at once.
+            # A forgotten or reversed comparison would end the run at once.
             holds = "holds" if self.until else "does not hold"
             self.hub.warn(
                 f"the condition {holds} before the first step of this run: it takes none",
@@ -180,7 +180,7 @@ class RunLoop:
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
 
     def _steps_left(self, simulation: Simulation) -> bool:
-        # A limit load ends a run, too: it moves the end to the time that was reached.
+        # A limit load also ends a run, at the time reached.
         end_time = simulation.control.clock[0].end_time
         return simulation.step < self.last_step and simulation.time < end_time
 
@@ -213,10 +213,10 @@ class RunLoop:
         console.progress(simulation.step, simulation.time, fraction, within)
 
     def _note(self, number: int, _: FrameType | None = None) -> None:
-        """End the run after the present chunk; a second signal ends it at once."""
+        """End after the present chunk; a second signal ends at once."""
         if self.signal:
             raise KeyboardInterrupt
         self.signal = number
         self.tell(lambda to: to.signalled(number))
-        if signal.Signals(number).name == "SIGHUP":  # not on all systems
+        if signal.Signals(number).name == "SIGHUP":
             self.hub.console.leave()

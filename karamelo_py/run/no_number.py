@@ -1,4 +1,4 @@
-"""NaN and infinite values of a run, and the formula of a fix that gives them."""
+"""NaN and infinite values of a run, and the fix formula they come from."""
 
 from collections.abc import Iterator
 
@@ -41,7 +41,7 @@ def _first_bad(simulation: Backend) -> tuple | None:
 def _places(
     simulation: Backend, group: ParticleGroup | NodeGroup, formula: Expression
 ) -> Iterator[tuple]:
-    """Yield numbers, positions (n, d) and initial ones at which a fix evaluates a formula."""
+    """Yield numbers, positions (n, d) and initial positions where a fix evaluates a formula."""
     if not formula.names.intersection(POINT_SEEDS):
         yield np.zeros(1, np.int64), np.empty((1, 0)), None
     elif isinstance(group, NodeGroup):
@@ -56,7 +56,7 @@ def _places(
 
 
 def no_number(simulation: Backend, message: str, hint: str) -> Trouble:
-    """Make the trouble for a NaN, naming the first fix whose formula is not finite."""
+    """Describe a NaN, naming the first fix whose formula is not finite."""
     hub = simulation.hub
     candidates = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not candidates:
@@ -76,7 +76,7 @@ def no_number(simulation: Backend, message: str, hint: str) -> Trouble:
 
 
 def refuse_endless_speeds(simulation: Backend) -> None:
-    """Refuse velocities that are not finite, naming the formula."""
+    """Refuse initial velocities that are not finite, naming the formula."""
     if not np.isfinite(simulation.fastest()):
         message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
         hint = "look for a formula that gives NaN or infinity, such as a division by zero"

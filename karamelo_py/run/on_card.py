@@ -1,4 +1,4 @@
-"""Simulation on a GPU: arrays are sent when changed, and fetched on access."""
+"""Simulation on a GPU: arrays are sent when changed, fetched on access."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ def alike(hooks: Tag, others: Tag) -> bool:
 
 
 class SimulationOnCard(Simulation):
-    """Takes the steps of a scene on a GPU; everything else runs on the processor.
+    """Takes the steps on a GPU; everything else runs on the CPU.
 
-    `setup` fetches the arrays if steps were taken. Changes on the processor call `changed` or
-    `sort`, and arrays are sent again before the next steps. Points are then in the order of the
-    GPU, and tiles are out of date: users of tiles sort first.
+    `setup` fetches the arrays after steps. Changes on the CPU call `changed` or `sort`, so arrays
+    are sent again. Fetched points are in GPU order and tiles out of date: users of tiles sort
+    first.
     """
 
     states_every = 1000  # states must be fetched
     notes_temperatures = False
     _steps: StepsOnCard | None = None
     _known: Sequence = ()  # arrays and hooks of these steps
-    _ahead = False  # the arrays here lack steps on the card
-    _nodes_ahead = False  # the nodes here lack them
-    _sent = False  # the card has the present arrays
+    _ahead = False  # arrays here lack steps
+    _nodes_ahead = False  # nodes here lack steps
+    _sent = False  # the GPU has the present arrays
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         check_room_there(hub)
@@ -55,7 +55,6 @@ class SimulationOnCard(Simulation):
 
     @property
     def setup(self) -> Setup:
-        """Arrays after the last step."""
         self._fetch()
         return self._setup
 
@@ -99,7 +98,7 @@ class SimulationOnCard(Simulation):
         self._sent = False
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
-        self._ahead = self._nodes_ahead = False  # the state of the card is obsolete
+        self._ahead = self._nodes_ahead = False  # the GPU state is obsolete
         super().restore(snapshot)
 
     def sort_if_due(self) -> None:
@@ -125,7 +124,7 @@ class SimulationOnCard(Simulation):
         if not self.hub.checking:
             self.refuse()
         super()._make_ready()
-        if self._setup.contact:  # made ready for the fixes of this run
+        if self._setup.contact:  # prepared for the fixes of this run
             self._sent = False
 
     def compile(self) -> None:
@@ -134,7 +133,7 @@ class SimulationOnCard(Simulation):
     def launches(self) -> StepsOnCard:
         steps, hooks, functions = self._steps, self.hooks, self.fixes.lasting.functions
         if steps is not None and functions == steps.functions and alike(hooks, steps.hooks):
-            hooks = steps.hooks  # of a run before
+            hooks = steps.hooks  # of an earlier run
         key = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
         if steps is None or key != self._known:
             self._fetch()
@@ -168,7 +167,7 @@ class SimulationOnCard(Simulation):
         return status
 
     def _report(self, number: int) -> None:
-        """Write the failed point into the reports of tiles, as processors do."""
+        """Report the failed point in the tiles, as the CPU does."""
         for block in self.setup.blocks:
             report = block.tiling.report
             report[:, 2] = 0

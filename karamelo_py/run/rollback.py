@@ -1,4 +1,4 @@
-"""Return of a run to its last good state: to halve the step, or to end."""
+"""Return to the last good state of a run: to halve the step, or to end."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -16,23 +16,23 @@ from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-HALVINGS = 5  # at most, in a run
+HALVINGS = 5  # per run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
-RETURNS = 2  # at most, to one state before an energy gain: two halvings without effect are enough
+RETURNS = 2  # returns per state before an energy gain: two halvings without effect are enough
 LAST_GOOD = "last_good.*.h5"
 FAR = 100  # maximum steps repeated for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
-    """A run has failed on all processes, and its last good state is written."""
+    """A run failed on all processes; its last good state is written."""
 
 
 class OthersWait(Exception):
-    """This process cannot write a file, while other processes continue to send data for it."""
+    """This process cannot write a file while others still send data for it."""
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
-    """Decide what follows a `status`, or `grown` energy, after `returns` to the last good state."""
+    """Decide what follows `status` or `grown` energy, after `returns` to the last good state."""
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -46,7 +46,7 @@ class RollBack:
     def begin(self, simulation: Simulation, first_step: int, ruined: bool, looks: bool) -> None:
         """Begin with the present state, or the state of a file, which may be `ruined`.
 
-        `looks`: a condition may read values of parts between any two steps.
+        `looks`: a condition may read parts' values between any two steps.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.steps.too_large
@@ -58,11 +58,11 @@ class RollBack:
             self._keep()
 
     def before(self) -> None:
-        """Store the present state if it is due and good; else note the memory of parts."""
+        """Store the present state if due and good; else note the memory of parts."""
         if self.point.step == self.begun_at and self.simulation.steps.too_large:
             return  # only the first state is good, and its rows are not rewound
         step = self.simulation.step
-        # The schedule must not depend on the speed of steps: runs return to these states.
+        # Runs return to these states, so the schedule must not depend on speed.
         often = step % self.simulation.states_every == 0 or step == self.first_step + 1
         often |= not self.simulation.repeats_steps
         if often and step != self.point.step and self.simulation.energy_watch.grown_little():
@@ -71,7 +71,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Judge steps that ended with `status`; return False if the run has gone back."""
+        """Judge steps that ended with `status`; return False if the run went back."""
         simulation, point = self.simulation, self.point
         if status == STOPPED and boundary.delete_leaving(self.hub, simulation, point.arrays):
             self._keep()
@@ -100,7 +100,7 @@ class RollBack:
     def _halve_step(self, status: int) -> None:
         simulation, point = self.simulation, self.point
         trouble = self._explained(status)
-        # Later rows of log and dumps are removed.
+        # Removes later rows of log and dumps.
         point.return_to(simulation, cut=True)
         while point.halvings < HALVINGS:
             point.halvings += 1
@@ -125,7 +125,7 @@ class RollBack:
         )
 
     def _points_only_leave(self) -> bool:
-        """Return True if points leave without an energy gain: no smaller step prevents this."""
+        """Return True if points leave without an energy gain: smaller steps do not help."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         watch = simulation.energy_watch
         if not (moves and len(simulation.leaving()) and watch.grown_little()):
@@ -140,11 +140,10 @@ class RollBack:
         return kept
 
     def _stop(self, status: int) -> NoReturn:
-        """Return to the last good state, write it, and raise the error for the user.
+        """Return to the last good state, write it, and raise the user's error.
 
-        If energy has grown, that is the last state before the growth; log and dumps end with the
-        last state without a fault. If the step was too large from the start, only the initial state
-        is good.
+        After an energy gain: the last state before it; log and dumps end with the last faultless
+        state. If the step was too large from the start, only the initial state is good.
         """
         too_large = self.too_large and self.simulation.steps.too_large
         trouble = self._explained(status, too_large)
@@ -159,7 +158,7 @@ class RollBack:
         raise error
 
     def _keep_start(self, status: int, _: str) -> str:
-        """Write the initial state of the run, end the outputs; return how to resume."""
+        """Write the initial state, end the outputs; return how to resume."""
         simulation, good = self.simulation, self.point
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)
@@ -173,7 +172,7 @@ class RollBack:
         return self._resume(path)
 
     def _resume(self, path: Path | None, remark: str = "") -> str:
-        """Return the command that resumes from a file; a shell takes the remark for a comment."""
+        """Return the command that resumes; to a shell, the remark is a comment."""
         if path is None:
             return ""
         names = self.hub.record.script, os.path.relpath(path), os.path.relpath(self.hub.folder)
@@ -192,13 +191,13 @@ class RollBack:
         else:
             good.return_to(simulation)
             if status not in (GAINED, HEATED, STOPPED):
-                # Nodal values depend on the number of steps per call: here always the same.
+                # Nodal values depend on the number of steps per call: always the same here.
                 good.again(simulation.advance, step)
         if status not in (GAINED, HEATED) and step > simulation.step:
             before = watch.energy()
             good.again(simulation.advance, step)
             if path is None and watch.growth_since(before) > WITHIN:
-                # The watch averages over a hundred steps, and is late.
+                # The monitor averages over 100 steps, so it is late.
                 grown, path = True, self._write_before_growth(step)
                 good.again(simulation.advance, step)
         path = path or self._write_last_good()
@@ -231,7 +230,7 @@ class RollBack:
             return None
         with self._as_warnings():
             path = restart_file.write(hub, Path(LAST_GOOD), within=True)
-            # The files of restart(...) would hold the same state again.
+            # restart(...) would write the same state again.
             for item in hub.output.last:
                 item.last_step = hub.update.step
             return path

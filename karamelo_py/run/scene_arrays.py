@@ -35,7 +35,7 @@ from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 
-TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by points that are deleted
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by deleted points
 
 
 def scene_key(hub: Hub) -> tuple:
@@ -65,7 +65,7 @@ def scene_key(hub: Hub) -> tuple:
 
 
 class SceneArrays:
-    """Arrays and threads of a scene, or of the part of one process."""
+    """Arrays and threads of a scene, or of one process's subdomain."""
 
     def __init__(self, hub: Hub, previous: SceneArrays | None = None):
         self.hub = hub
@@ -77,7 +77,7 @@ class SceneArrays:
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
         check_room(hub, copied=previous is None and bool(hub.in_run))
-        # Processes begin with equal ranges of the ids: sorting distributes them by tiles.
+        # Processes begin with equal ranges of ids; sorting distributes points by tiles.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
             state = previous.state() if previous else None
@@ -85,7 +85,7 @@ class SceneArrays:
         except MemoryError as error:
             raise no_room(hub, error) from None
         try_parts(hub, self.setup)
-        self.present = np.ones(self.count, np.bool_)  # by id, False for points that were deleted
+        self.present = np.ones(self.count, np.bool_)  # by id, False for deleted points
         if state is not None:
             self.present[: state.count] = state.present
         self.threads = self.tiles.threads = thread_count(hub, self.count)
@@ -96,7 +96,7 @@ class SceneArrays:
         self.control = self.setup.control
         self.version = 0  # grows when fields change without a step
         self.rollback: RollbackPoint | None = None  # of the last run
-        self.mapped = False  # whether the nodes show a state of this simulation
+        self.mapped = False  # the nodes show the present state
 
     def fits(self, hub: Hub) -> bool:
         return self.key == scene_key(hub)
@@ -146,7 +146,7 @@ class SceneArrays:
         )
 
     def leaving(self) -> np.ndarray:
-        """Return the ids (ascending) of points whose new positions are outside."""
+        """Return the ids (ascending) of points outside the domain."""
         s, then = self.setup, 1 - self.now
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
         outside = []
@@ -164,7 +164,7 @@ class SceneArrays:
         return np.sort(np.concatenate(self.comm.allgather(np.concatenate(outside))))
 
     def taken_along(self, ids: np.ndarray) -> tuple[float, float, float]:
-        """Count the energy of points as work; return mass, kinetic and stored energy."""
+        """Book the energy of points as work; return their mass, kinetic and stored energy."""
         group = ParticleGroup(self.hub)
         group.take([ids])
         mass, kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG)
@@ -197,21 +197,21 @@ class SceneArrays:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort the points by tile, after handing over those in tiles of other processes."""
+        """Sort the points by tile, after handing over those in other processes' tiles."""
         self.setup = self.domain.migrate(self.setup)
         self.tiles.sort(self.setup)
 
     def sort_if_due(self) -> None:
-        """Sort the points if one may have left the reach of its tile, or none is sorted."""
+        """Sort the points if one may have left its tile's reach, or none is sorted."""
         clock = self.control.clock[0]
         if clock.drift > clock.drift_limit:
             self.sort()
 
     def bring(self) -> None:
-        """Make sure that the whole state is here, and points in the order of their tiles."""
+        """Bring the whole state here, with points in the order of their tiles."""
 
     def show_on_nodes(self) -> None:
-        """Map the present state to the nodes if no step has done so."""
+        """Map the present state to the nodes unless a step has done so."""
         if self.mapped:
             return
         self.sort_if_due()
@@ -227,7 +227,7 @@ class SceneArrays:
         self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copy every array that a step changes, and the published values; see `copied`."""
+        """Copy all arrays that a step changes, and the published values; see `copied`."""
         self.domain.share_kept()
         return checkpoint.copied(self, before or {})
 

@@ -23,26 +23,26 @@ from karamelo_py.scene.views import set_columns
 
 
 class Simulation(SceneArrays):
-    """Takes the steps of a scene, or of the part of one process, on the processor.
+    """Steps a scene, or one process's subdomain, on the CPU.
 
-    Subclasses override how steps are taken: on a card (`run.on_card`), or by Newton's method
+    Subclasses override how: on a GPU (`run.on_card`), or by Newton's method
     (`run.implicit.load_steps`).
     """
 
-    states_every = 100  # steps between two states that a run may return to
+    states_every = 100  # steps between states to return to
     remedy = "a smaller time step (set_dt, dt_factor)"
     repeats_steps = True  # to return to a state; load steps take too long
     implicit = False
-    failure = ""  # why load steps found no equilibrium
+    failure = ""  # why a load step found no equilibrium
     notes_temperatures = True
     between: Callable[[str], bool] | None = None
-    _first: ActingFixes | None = None  # of the next step, if some fixes act only in it
-    _called: Tag = None  # hooks in Python that compiled steps call
+    _first: ActingFixes | None = None  # of the next step, if some act only in it
+    _called: Tag = None  # Python hooks that compiled steps call
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
         self.steps, self.energy_watch = StepSize(self), EnergyWatch(self)
-        # Fixes of the first step that have acted: not again when the scene is lowered again.
+        # Fixes of the first step act once, even if the scene is lowered again.
         self.begun: set[Fix] = set(previous.begun) if previous else set()
         self.visits: Staged | Fused = Fused()
         self.hooks: Hooks | NoHooks = NoHooks()
@@ -55,12 +55,12 @@ class Simulation(SceneArrays):
 
     @cached_property
     def light_nodes(self) -> float:
-        """Stable step over h/c that the nodes of thin and round solids allow."""
+        """Stable step over h/c allowed by the nodes of thin and round solids."""
         return stable_share(self.hub, self.setup.grids)
 
     @property
     def flags(self) -> tuple[bool, ...]:
-        """Facts about the state besides its arrays, for restart files."""
+        """State besides the arrays, for restart files."""
         watch = self.energy_watch
         reported = watch.told_of_growth, watch.told_of_loss
         return self.steps.measured, self.mapped, watch.followed, *reported
@@ -73,7 +73,7 @@ class Simulation(SceneArrays):
 
     @property
     def moves(self) -> bool:
-        """True if there is inertia; without it the energy is not watched."""
+        """True with inertia; without it, energy is not tracked."""
         return self.hub.update.scheme.traits.inertia
 
     def begin(self, end_time: float) -> None:
@@ -92,31 +92,31 @@ class Simulation(SceneArrays):
         self.steps.measured = self.energy_watch.followed = False
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
-        """Return the largest velocity component, relative to a common velocity."""
+        """Return the largest velocity component relative to a common velocity."""
         velocities = (block.points.v for block in self.setup.blocks)
-        # No copy of them: there may be millions.
+        # No copy: there may be millions of points.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
         largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([largest], float))[0])
 
     def in_tiles(self) -> bool:
-        """Return True if all points are in the ranges of their tiles: were sorted."""
+        """Return True if all points have been sorted by tile."""
         unsorted = 0
         for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
             unsorted += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
         return not self.comm.allreduce(np.array([unsorted]))[0]
 
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
-        """Delete points (ascending ids); the ids of the others stay. Return their mass and energy.
+        """Delete points (ascending ids), without renumbering; return their mass and energy.
 
-        The energy balance counts their energy as work of the run.
+        The energy balance books their energy as work.
         """
         mass, kinetic, stored = self.taken_along(ids)
         self.energy_watch.without(stored)
         followed = self.energy_watch.followed
         self.drop(ids)
         self.energy_watch.followed = followed
-        # The rate of the last step stays: the same whether or not a run begins here.
+        # Retain the rate of the last step: the same whether or not a run begins here.
         self.steps.measured = True
         return mass, kinetic + stored
 
@@ -128,7 +128,7 @@ class Simulation(SceneArrays):
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
         """Take up to `count` steps, to the end time at most; return DONE, or why it stopped.
 
-        Load steps call `between` with words about their progress; if it returns True, they end.
+        Load steps call `between` with a progress message and end if it returns True.
         """
         self.between = between
         self.control.clock[0].wrong = 0  # from earlier steps that were not undone
@@ -161,8 +161,8 @@ class Simulation(SceneArrays):
             return status
         self.begun |= set(self._first.fixes) & set(self.fixes.new)
         self._first = None
-        self.clear_forces()  # later steps may have no hook that does it
-        return SORT  # not finished, unless all steps are done
+        self.clear_forces()  # later steps may have no hook for it
+        return SORT  # unfinished, unless all steps are done
 
     def _take(self, hooks: Tag, count: int) -> int:
         """Take compiled steps, row by row if Python acts between the rows."""
@@ -198,7 +198,7 @@ class Simulation(SceneArrays):
         names = {name for fix in lasting.fixes for name in fix.hooks()}
         self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
-            # Nothing precedes this hook in a step: the output shows its state from the start.
+            # No hook precedes it in a step, so output shows its state from the start.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
         self._first = self.fixes.first

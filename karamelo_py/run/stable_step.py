@@ -28,13 +28,13 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import USUAL
 
-BOXES = 6.0  # weight of a common drift in the steps of boxes
-LONE = 0.9  # of the stable step of a lone point: an expanded point is stiffer
-DAMPED = 0.5  # minimum, with one point per cell, if a PIC fraction damps
+BOXES = 6.0  # weight of a common drift in steps with boxes
+LONE = 0.9  # fraction of an isolated point's stable step: expanded points are stiffer
+DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
 
 
 def one_a_cell(solid: Solid) -> bool:
-    """Return True if a solid has one point per cell and direction, not two or more."""
+    """Return True if a solid has one point per cell and direction."""
     return 2 * np.max(solid.half_size) > 0.75 * solid.h
 
 
@@ -43,10 +43,10 @@ def sparse(hub: Hub) -> bool:
 
 
 def keeping_share(hub: Hub) -> float:
-    """Return the largest fraction of the stable step with which a drifting body conserves energy.
+    """Return the largest fraction of the stable step that conserves a drifting body's energy.
 
     With FLIP and similar transfers, gradient jumps add energy to points that cross cells, about as
-    the third power of the step. The fractions are from docs/energy.md: at most 10 % in 50 periods.
+    the third power of the step. Fractions from docs/energy.md: at most 10 % in 50 periods.
     """
     update = hub.update
     alpha = flip_coefficient(update.transfer)
@@ -86,10 +86,10 @@ def _flows(law: Tag) -> bool:
 def lone_point(hub: Hub) -> float:
     """Return the stable step over h/c of an isolated point that stores a moment.
 
-    The stored velocity gradient L responds to its pressure by dL/dt = -p / (rho D): an oscillator
-    of the frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c; if gradients are stored,
-    sums of |grad N|^2 / N replace 1 / D. Points of flowing materials can become isolated; points of
-    a gas then store no moments (`kernels.equations.loss.in_company`).
+    Its pressure drives the stored velocity gradient L by dL/dt = -p / (rho D): an oscillator of
+    frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c. If gradients are stored, sums of
+    |grad N|^2 / N replace 1 / D. Flowing material can isolate points; gas points then store no
+    moments (`kernels.equations.loss.in_company`).
     """
     update = hub.update
     keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
@@ -102,11 +102,11 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """Return True if a drifting body is as stable, and conserves energy, as one at rest.
+    """Return True if a drifting body is as stable and conservative as one at rest.
 
     With cubic splines hardly any energy depends on the position in the cells; usavg adds none with
-    smooth basis functions (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks
-    fracture sooner with these steps.
+    smooth bases (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks fracture
+    sooner with these steps.
     """
     basis, scheme = hub.update.method.basis.traits, hub.update.scheme
     laws = _deforming(hub)
@@ -123,8 +123,8 @@ def bears_drift(hub: Hub) -> bool:
 def own_weight_of_drift(hub: Hub) -> float:
     """Return the weight of the common velocity in the default step.
 
-    1 in the standard rule h/(c + |v|). Drifting boxes (ugimp, cpgimp), two and more per cell, gain
-    more energy at higher speed: at edges of shaken bars and blocks at 0.05 to 0.5 of the wave
+    1 in the standard rule h/(c + |v|). Drifting boxes (ugimp, cpgimp), two or more per cell, gain
+    more energy at higher speed: at edges of shaken bars and blocks, at 0.05 to 0.5 of the wave
     speed.
     """
     if bears_drift(hub):
@@ -148,7 +148,7 @@ def common_velocity(simulation: Backend, weight: float) -> np.ndarray:
 def courant_number(hub: Hub, *, longer: bool) -> float:
     """Return the stable step over h/c; `longer` for points that stay in their cells.
 
-    In the total frame, nodes of thin and round bodies reduce it for points with moments.
+    In the total frame, nodes of thin and round bodies limit points with moments.
     """
     update = hub.update
     other = update.scheme.traits.implicit or update.method.frame.moves
@@ -161,7 +161,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
     scheme, method = hub.update.scheme, hub.update.method
     two, one = scheme.traits.courant
     if min(two, one) < 1:
-        # Nodes between the corners of cells raise the highest frequency.
+        # Nodes between cell corners raise the highest frequency.
         nodes = 0.7 if method.basis.traits.nodes_per_cell > 1 else 1
         return (one if sparse(hub) else two) * nodes
     if not method.frame.moves:
@@ -180,10 +180,10 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     `still`: no point has moved as far as `STILL`.
     """
     method, share = hub.update.method, keeping_share(hub)
-    # Transfers of moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic ones.
+    # Moment transfers are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
     if still:
-        # A lone point with a linear basis is stable up to 0.8 h/c in 3D.
+        # An isolated point with a linear basis is stable up to 0.8 h/c in 3D.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
     courant = courant_number(hub, longer=still or bears_drift(hub))
     return min(courant, lone_point(hub)), share
@@ -194,7 +194,7 @@ def fastest_wave(simulation: Backend) -> float:
 
 
 def elastic_speed(simulation: Backend, solid: Solid) -> tuple[float, bool]:
-    """Return the wave speed of an undeformed solid without viscosity, and if it is viscous."""
+    """Return an undeformed solid's wave speed without viscosity, and if it is viscous."""
     law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
     if not isinstance(parameter(law, "viscosity", Absent()), Absent):
         law, viscous = law._replace(viscosity=Absent()), True

@@ -1,4 +1,4 @@
-"""The size of the steps of a run: chosen once by a policy, followed by the clock of the kernels."""
+"""The step size: a policy chosen once per run, applied by the clock of the kernels."""
 
 from __future__ import annotations
 
@@ -34,28 +34,27 @@ FAR = 1e9  # cells, further than points ever move
 
 
 class StepPolicy(NamedTuple):
-    """Choice of the steps of a run, made once at its beginning."""
+    """Choice of the steps of a run, made at its beginning."""
 
-    still: tuple[float, float]  # stable step over h/c, and the fraction of it, at rest
-    moving: tuple[float, float]  # the same once points have moved
+    still: tuple[float, float]  # stable step over h/c, fraction of it: at rest
+    moving: tuple[float, float]  # once points have moved
     weight: float  # of the common velocity in the default step
-    fixed_dt: float  # 0: the step follows the fastest point; implicit steps are 1 by default
-    heat_factor: float  # fraction of the limit of conduction
+    fixed_dt: float  # 0: follows the fastest point; implicit steps: 1 by default
+    heat_factor: float  # fraction of the conduction limit
 
     @classmethod
     def of(cls, hub: Hub) -> StepPolicy:
-        """Return the choice by scheme, basis, points and the script."""
         update = hub.update
         fixed, heat = update.fixed_dt or float(update.scheme.traits.implicit), update.dt_factor
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
             return cls(still, moving, own_weight_of_drift(hub), fixed, USUAL)
-        # Steps requested by a script are fractions of h/(c + |v|), at rest as after.
+        # A script's steps are fractions of h/(c + |v|), also at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
         return cls(asked, asked, 1.0, fixed, heat or USUAL)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
-        """Return fields of the clock after a `path` of the points, in cells."""
+        """Return clock fields after a `path` of the points, in cells."""
         (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
@@ -68,7 +67,7 @@ class StepPolicy(NamedTuple):
 
 
 def set_up(control: Control, hub: Hub, transfer: Tag, last: dict[str, float]) -> None:
-    """Set the clock of new arrays, which continues after the `last` steps."""
+    """Set the clock of new arrays, continuing after the `last` steps."""
     clock = control.clock[0]
     for name, value in last.items():
         clock[name] = value
@@ -79,7 +78,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: dict[str, float]) ->
 
 
 class StepSize:
-    """Chooses the steps of a simulation; the only Python code that writes them to its clock."""
+    """Chooses the steps; the only Python code that writes them to the clock."""
 
     policy: StepPolicy
 
@@ -96,7 +95,7 @@ class StepSize:
         self._choose()
 
     def begun(self) -> None:
-        """Choose the first step again: initial values may have changed the fastest point."""
+        """Choose the first step again, as initial values may change the fastest point."""
         simulation, clock = self.simulation, self.clock
         in_hundred_steps = 100 * simulation.fastest() * clock.courant * clock.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * clock.rate:
@@ -109,7 +108,7 @@ class StepSize:
                 "cannot choose a time step: all material is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
-        # A body at rest without waves has no first limit for comparison.
+        # A body at rest without waves has no first limit to compare with.
         if (
             clock.first_limit == 0
             and np.isfinite(self.limit)
@@ -146,7 +145,7 @@ class StepSize:
 
     @contextmanager
     def altered(self, **fields: float) -> Iterator[None]:
-        """Give fields of the clock other values within the block."""
+        """Set fields of the clock within the block."""
         before = {name: float(self.clock[name]) for name in fields}
         for name, value in fields.items():
             self.clock[name] = value
@@ -168,7 +167,7 @@ class StepSize:
 
     def _choose(self) -> None:
         if not self.measured:
-            # Otherwise the last step has measured: a run in pieces has the steps of a whole one.
+            # Else the last step has measured: runs in pieces take the steps of a whole run.
             simulation, clock = self.simulation, self.clock
             clock.common[:] = common_velocity(simulation, float(clock.weight))
             self._measure()
@@ -194,7 +193,6 @@ class StepSize:
 
     @property
     def limit(self) -> float:
-        """Stable step of the present state."""
         return float(self.clock.limit)
 
     @property
@@ -210,11 +208,11 @@ class StepSize:
 
     @property
     def too_large(self) -> bool:
-        """True if the step was above the stability limit from the start of the run."""
+        """True if the step exceeded the stability limit from the start of the run."""
         return not self.clock.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:
-        """Watch the limit, unless the step exceeds it from the start, as the user wants."""
+        """Watch the limit, unless the user's step exceeds it from the start."""
         self.clock.watch_limit = int(not self.above_limit() and not self.simulation.implicit)
         self.clock.over_limit = 0
 
@@ -222,10 +220,10 @@ class StepSize:
     def ruling_limit(self) -> str:
         """Name of the present limit of the step.
 
-        ``set_dt`` and ``end`` (of the run) are not stability limits. ``conduction`` is the limit of
-        heat, ``viscosity`` of waves slowed by viscosity, ``speed`` of points faster than waves,
-        ``light_nodes`` of usl and of :mod:`karamelo_py.run.light_nodes`, ``lone_points`` of points
-        with moments, and ``waves`` of the rest.
+        ``set_dt`` and ``end`` (of the run) are no stability limits. ``conduction``: heat;
+        ``viscosity``: waves slowed by viscosity; ``speed``: points faster than waves;
+        ``light_nodes``: usl and :mod:`karamelo_py.run.light_nodes`; ``lone_points``: points with
+        moments; ``waves``: the rest.
         """
         simulation, clock, dt = self.simulation, self.clock, self.control.values[DT]
         if clock.fixed_dt > 0:

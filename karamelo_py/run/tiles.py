@@ -1,4 +1,4 @@
-"""Grids cut into tiles: the points of each, the nodes they reach, and the nodes in use."""
+"""Grids cut into tiles: their points, the nodes these reach, the nodes in use."""
 
 from collections.abc import Sequence
 from math import inf
@@ -18,37 +18,37 @@ from karamelo_py.points.kinematics import planar
 from karamelo_py.run import boxes as grid_boxes
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
-# By dimension: cells of a tile of points per direction, and nodes of a tile of nodes. Small boxes
-# fit in caches, large ones have fewer nodes in common with others.
+# By dimension: cells per direction of a tile of points, and nodes of a tile of nodes. Small boxes
+# fit in caches, large ones have fewer common nodes.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # times, along the rows of nodes in 3D, if cells have one point: otherwise boxes have
 #             more nodes than points, and many tiles have few points
-SHARES = 64  # parts of the points of a block, nearly equal, divided among threads
-# Limit over the nodes: boxes with fewer rows are allocated at once, aligned with cache lines;
-# untouched pages cost no memory. Larger ones grow.
+SHARES = 64  # nearly equal parts of a block's points, divided among threads
+# Times the nodes: boxes with fewer rows are allocated at once, aligned with cache lines (untouched
+# pages cost no memory). Larger ones grow.
 AT_ONCE = 8
-DIRECT_UP_TO = 2000  # points; clearing and summing boxes costs more than threads save
+DIRECT_UP_TO = 2000  # points; below, clearing and summing boxes costs more than threads save
 PART = 2000  # points per part when threads sort
-DRIFT = 1.0  # cells that points may move at most before they are sorted again
-# By dimension, the minimum: smaller boxes, and more neighbouring points with the same nodes; in 2D
-# the gain is less than the cost of sorting.
+DRIFT = 1.0  # maximum cells that points move between sorts
+# Minimum by dimension: smaller boxes, and more neighbouring points with the same nodes; in 2D
+# sorting costs more than this gains.
 LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
-STEPS = 32  # desired between two sorts, if points may move further for that
-# The same if points scatter directly to the nodes: it only brings more nodes into use.
+STEPS = 32  # desired steps between sorts, if points may move further for it
+# If points scatter directly to the nodes: this only brings more nodes into use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts the points of a setup by tile, and finds the nodes that each tile may reach."""
+    """Sorts a setup's points by tile, and finds the nodes that each tile may reach."""
 
-    threads = 1  # for sums at nodes and for sorting
+    threads = 1  # for sums at nodes and sorting
     mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Tag, points: int, sparse: bool):
-        self.direct = points <= DIRECT_UP_TO  # points scatter directly to the nodes, by tile
+        self.direct = points <= DIRECT_UP_TO  # scatter directly to the nodes, by tile
         self.dimension = d = lattices[0].dimension
-        # Cells of a tile of points, nodes of a tile of nodes, by direction.
+        # By direction: cells of a tile of points, nodes of a tile of nodes.
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
         self.long = sparse and d == 3
         if self.long:
@@ -56,10 +56,10 @@ class Tiles:
             self.node_size[:] = 1, 1, self.size[-1]
         self.per_cell = basis.traits.nodes_per_cell
         self.least_nodes = basis.traits.least_nodes
-        self.beyond = basis.traits.cells // 2  # nodes seen beyond the nodes of a cell
-        self.sorts = self.sets = 0  # number of sorts; sets of buffers
-        self.rows = 0  # of the buffers, for the boxes of all tiles
-        self.occupied = 0  # tiles that hold points
+        self.beyond = basis.traits.cells // 2  # nodes of the stencil beyond a cell's
+        self.sorts = self.sets = 0  # numbers of sorts, and of buffer sets
+        self.rows = 0  # of the buffers, for all boxes
+        self.occupied = 0  # tiles with points
         # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
@@ -67,8 +67,7 @@ class Tiles:
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # Points without a domain reach at most two cells beyond their tile; contact
-        # adds one.
+        # Points without a domain reach at most two cells beyond their tile; contact adds one.
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)
@@ -76,11 +75,11 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # The reach of points is known for each row of a box if rows of nodes are tiles: in the
-        # boxes around a bar that has spread at one end, they reach little at the other.
+        # If rows of nodes are tiles, reach is stored per row of a box: around a bar that spreads at
+        # one end, points reach little at the other.
         by_rows = self.long and not shaped and not self.direct
-        self._most_in_box = int(rows) if by_rows else 0  # rows of a box, at most
-        self.count = int(self.first[-1])  # of tiles, of all grids
+        self._most_in_box = int(rows) if by_rows else 0  # maximum rows of a box
+        self.count = int(self.first[-1])  # tiles of all grids
         self._cut = sorting.TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = grid_boxes.steps_of(tiles)
@@ -123,7 +122,7 @@ class Tiles:
                     array[: self.rows] = 0
 
     def unsort(self, control: kernel_arrays.Control, *, limit: float | None = None) -> None:
-        """Have the points sorted before the next step; `limit` replaces the drift limit."""
+        """Sort the points before the next step; `limit` replaces the drift limit."""
         clock = control.clock[0]
         clock.drift = np.inf
         if limit is not None:
@@ -132,7 +131,7 @@ class Tiles:
     def sort(self, s: kernel_arrays.Setup) -> None:
         """Sort all points by tile, find the nodes in use, and zero the sums at all others.
 
-        Nodes in use are zeroed in the next step, and boxes are zero between two steps.
+        The next step zeroes used nodes; boxes are zero between steps.
         """
         before = grid_boxes.used(s.spans)[1:].copy()
         clock = s.control.clock[0]
@@ -173,7 +172,7 @@ class Tiles:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Several parts per thread: tiles differ in size, and a core may be busy. With few points,
+        # Several parts per thread, as tiles differ in size and a core may be busy. With few points,
         # or fewer than tiles, one thread is done before several have started.
         n, mode = x.shape[1], self.mode
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
@@ -228,7 +227,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
-        """As `_parts_to_sum`, for few points: one set, a part for each span."""
+        """As `_parts_to_sum`, for few points: one set, one part per span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -242,8 +241,8 @@ class Tiles:
     def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
         """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
 
-        Nodes are in the order of the sets of points that see most of them: the contributions of a
-        thread are in its caches, and fetching them from another thread's takes longer than the sum.
+        Nodes follow the sets of points that reach most of them: a thread finds its contributions in
+        its caches; fetching them from another thread's takes longer than the sum.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
@@ -279,8 +278,8 @@ class Tiles:
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
         """Return the first of the tiles of nodes (n,) in the same set as each.
 
-        Memory access with gaps of some thousand bytes takes twice as long. So one thread has one
-        set, and long tiles join tiles in the same rows of nodes.
+        Access with gaps of some thousand bytes takes twice as long: one thread has one set, and
+        long tiles join tiles in the same rows of nodes.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -290,7 +289,7 @@ class Tiles:
         return tile - (tile - first) % along
 
     def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
-        """Return the set of each own tile, of the points of its block."""
+        """Return the set of each own tile, of its block's points."""
         sets = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count
@@ -360,7 +359,7 @@ class Tiles:
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
         """Return `Buffers.parts` of the nodes (k, d) from `begin` to `end` of the grids.
 
-        Their rows in boxes are `first` + sum of `steps` (k, d) times indices.
+        Their rows in boxes: `first` + sum of `steps` (k, d) times indices.
         """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
@@ -385,8 +384,8 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
     `parts` (n, 10) are the used nodes of each tile (see `Buffers`). A set gets the tiles whose
-    middle, counted in nodes, lies in its equal part of all nodes. Neighbours with the same number
-    in `beside` (n,) get the set of the first of them.
+    middle, counted in nodes, lies in its equal part. Neighbours with equal `beside` (n,) get the
+    first one's set.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -402,11 +401,10 @@ def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Return where nearly equal sets of tiles with these point ranges (T, 2) begin: (size,)."""
+    """Return where nearly equal sets of tiles with point ranges (T, 2) begin: (size,)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:
-        # Where the sum of the points is nearest to equal parts.
         parts = np.arange(1, shares) * ranges[:, 1].max(initial=0) / shares
         out[1:shares] = np.searchsorted(ranges.sum(axis=1) / 2, parts)
     return out

@@ -19,7 +19,7 @@ def _clocks() -> np.ndarray:
 
 
 class Timings:
-    """Seconds of a run: (2,) elapsed time, and processor time of all threads."""
+    """Seconds of a run: (2,) elapsed, and CPU time of all threads."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -45,7 +45,7 @@ class Timings:
             yield
 
     def on_start(self, _: str) -> None:
-        """A kernel is compiled here, or this process waits for another that does."""
+        """A kernel is compiled here, or by another process that this one waits for."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

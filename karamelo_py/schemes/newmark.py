@@ -75,8 +75,8 @@ class Newmark(NamedTuple):
 
     @property
     def alphas(self) -> tuple[float, float]:
-        """Fractions of the beginning of a step in its accelerations and its forces."""
-        # With a radius of 1 both are 1/2: balance at the end follows from balance at the start.
+        """Fractions of the old accelerations and of the old forces in a step."""
+        # At radius 1 both are 1/2: balance at the end follows from balance at the start.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 
     @property

@@ -7,7 +7,7 @@ from karamelo_py.kernels.equations.strain import StrainOfLoadStep
 from karamelo_py.language.signature import Constraint, NonNegative, Positive
 from karamelo_py.schemes.traits import SchemeTraits
 
-# What acts on the nodes in a step, by present stress; who holds them; and how points follow.
+# Stages: loads on nodes from the present stress, constraints, motion of the points.
 BEGIN = (
     table.AtPoints(arrays.INITIAL_INTEGRATE, 0),
     table.SUMS,
@@ -22,11 +22,11 @@ CLOSE = (
     table.Gather(StrainOfLoadStep()),
     table.AtPoints(arrays.FINAL_INTEGRATE, 1),
 )
-# Of the last step: corrections, the remaining fraction of forces, and parts it was done in.
+# Of the last step: corrections, residual fraction of forces, substeps.
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# Above that a first correction is taken as it is, and a step is no equilibrium; below is rounding.
+# Above, the first correction would pass without equilibrium; below is rounding.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
 
