@@ -1,4 +1,4 @@
-"""Facts of a scene that need no judgement: its parts and motions."""
+"""Facts of a scene that need no judgement: parts and motions."""
 
 from functools import cached_property
 from math import isfinite
@@ -25,7 +25,7 @@ class Body(NamedTuple):
 
 
 class BasicFacts:
-    """Parts and motions of a scene before a run of `duration` (300 steps if it is infinite)."""
+    """Parts and motions of a scene before a run of `duration` (300 steps if infinite)."""
 
     def __init__(self, hub: Hub, simulation: Simulation, duration: float):
         self.hub, self.simulation = hub, simulation

@@ -14,15 +14,15 @@ from karamelo_py.language.unknown import size_of_cells, words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.expressions import Expression
 
-# Karamelo's value for infinity; scripts that write it mean INF.
+# Karamelo's infinity; scripts mean INF by it.
 _HUGE = 1e20
 
 
 class Forms:
     """The forms of an argument list, by dimension.
 
-    `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are those of each
-    supported dimension. Some arguments are one of a few `words`; INF and EDGE mean the `open_ends`
+    `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are listed by
+    supported dimension. Some arguments take one of a few `words`; INF and EDGE mean the `open_ends`
     (-inf for a lower end, inf for an upper end).
     """
 
@@ -81,7 +81,7 @@ class Forms:
         )
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
-        """Format the call with the words of the script, and names for missing ones."""
+        """Format the call with the script's words, and names for missing ones."""
         names = self.names[dimension]
         words = [argument.text for argument in arguments][: len(names)]
         line = re.sub(r"\[.*?\]", "", self.pattern)
@@ -137,7 +137,7 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
-    """Return `value`; refuse NaN and infinity (NaN is accepted in a rehearsal)."""
+    """Return `value`; refuse infinity, and NaN except in a rehearsal."""
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
     message = f"{name} must be a finite number, not {value}"

@@ -41,14 +41,13 @@ def wrong_count(
 
 
 def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
-    """Write the hint for an argument too many."""
     words = {word: f"{p.name}={word}" for p in expected if p.keyword for word in p.kind.words}
     word = text if text in words else nearest(text, words)
     return words.get(word or "") or table()["surplus"].get(name)
 
 
 def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list[Parameter]:
-    """List parameters that were left out, by words that fit only further back."""
+    """List omitted parameters, found by words that fit only further back."""
     missing, rest = [], list(arguments)
     for slot in slots:
         words = () if slot.shown == slot.name else slot.kind.words
@@ -60,7 +59,7 @@ def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
-    """List what is missing, but no ID directly after another missing word."""
+    """Name the missing parameters, without an ID after another missing word."""
     words = {p.shown for p in slots if p.shown != p.name}
     return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
@@ -68,7 +67,7 @@ def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str
 def _filled(
     slots: Sequence[Parameter], arguments: Sequence[Argument], missing: Sequence[Parameter]
 ) -> tuple[Argument, str | None]:
-    """Find the argument instead of the first missing one; fill words into all arguments."""
+    """Find the argument at the first missing one's position; fill words into all arguments."""
     rest, before = iter(arguments), next(k for k, slot in enumerate(slots) if slot in missing)
     words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
     if True in words:
@@ -95,7 +94,7 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
 def swapped(
     hub: Scene, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
 ) -> str | None:
-    """Write the hint for two arguments that fit in each other's place."""
+    """Write the hint for two arguments that fit in each other's position."""
 
     def fits(parameter: Parameter, argument: Argument) -> bool:
         kind = parameter.kind
@@ -144,7 +143,7 @@ def misfit(
 def guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
 ) -> Place | None:
-    """Find the place of the argument that an error names, or of the word at fault."""
+    """Find the place of the argument or word that an error names."""
     if isinstance(error.argument, int) and error.argument < len(arguments):
         plain = [argument for argument in arguments if argument.keyword() is None]
         return (arguments if error.argument >= 0 else plain)[error.argument].place

@@ -1,4 +1,4 @@
-"""Convert exceptions in styles and plug-ins to errors of the script that uses them."""
+"""Convert exceptions in styles and plug-ins to script errors."""
 
 import inspect
 import linecache
@@ -15,7 +15,6 @@ from karamelo_py.script.errors import FAILURES, Place, Quit, ScriptError
 
 TRACEBACK = "; --debug shows the traceback"
 
-# These have other messages.
 KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 
@@ -35,7 +34,7 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
 
 
 def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:
-    """Make the error of a script that uses a faulty style (``fix drag``), with its package."""
+    """Make the error for a faulty style (``fix drag``), naming its package."""
     family, _, style = name.rpartition(" ")
     family = family or "command"
     package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
@@ -46,7 +45,7 @@ def fault(name: str, message: str, place: Place | None, more: str = "") -> Scrip
 
 
 def cause_of(error: BaseException) -> str:
-    """Describe an exception in one line, with the user's line if it cannot be compiled."""
+    """Describe an exception in one line, with the user's line if it does not compile."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -57,7 +56,7 @@ def cause_of(error: BaseException) -> str:
 
 
 def _others() -> tuple[str, ...]:
-    """List the folders of this program, Python's library and installed packages."""
+    """List folders of this program, the Python library and installed packages."""
     libraries = map(sysconfig.get_path, ("stdlib", "purelib", "platlib"))
     return (str(Path(__file__).parents[1]), *libraries)
 

@@ -1,7 +1,7 @@
 """Find further, independent mistakes of a script after the first.
 
-What a wrong statement would have defined is recorded. Statements that use it are skipped, and what
-they would define is recorded in turn. Names of commands and styles are checked even there.
+What a wrong statement would have defined is recorded. Statements that use it are skipped, and their
+own definitions recorded in turn; their command and style names are still checked.
 """
 
 import re
@@ -16,14 +16,13 @@ from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
-MOST_OF_TEXT = 200  # a script of another program is wrong in every line
-# Nearly everything depends on these.
+MOST_OF_TEXT = 200  # every line of another program's script is wrong
 _BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "include", "quit"})
-# Runs depend on what these define; other definitions matter only where named.
+# Runs depend on these; other definitions matter only where named.
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
-# Points have further columns by these.
+# These add columns to points.
 _COLUMNS = _SCENE | {"plane_stress", "uniaxial_stress", "scheme", "fix"}
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
 _PLAIN = {"group", "plot", "load_path", "element"}  # without a style
@@ -37,7 +36,7 @@ class Dependents:
 
     def __init__(self) -> None:
         self.names: set[str] = set()
-        # Kinds of parts that may be missing under an unknown name, and that were not deleted.
+        # Kinds that an unknown name may have, and that were not deleted.
         self.kinds: set[str] = set()
         self.undeleted: set[str] = set()
         self.lacks_columns = False
@@ -65,7 +64,7 @@ class Dependents:
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:
-        """Guess the command that is meant; else record what it may have defined."""
+        """Guess the intended command; else record what it may have defined."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
@@ -78,7 +77,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Tell if a statement uses a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
+        """Return True for use of a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -89,7 +88,7 @@ class Dependents:
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     """Find mistakes after the statement that failed with the error `first`, in order.
 
-    The hub of the interpreter is used for trials and must not be used afterwards.
+    The interpreter's hub is used for trials; do not use it afterwards.
     """
     errors = first.others
     seen = {error.message: error for error in (first, *errors)}
@@ -98,8 +97,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
     def follows(error: ScriptError) -> bool:
         if error.code == "unknown-ID":
-            # The second of two equal IDs was meant to be another; and other programs name things
-            # differently.
+            # The second of two equal IDs was a slip, and other programs use other names.
             twice = {other.kind for other in seen.values() if other.code == "already-used"}
             return error.kind in twice | dependents.kinds
         if error.code == "already-used":
@@ -107,7 +105,6 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
         return error.code == "unknown-column" and not error.alike and dependents.lacks_columns
 
     def tell(error: ScriptError) -> None:
-        # An unknown name may appear in many lines.
         for one in (error, *error.others):
             if one.message not in seen and not follows(one):
                 errors.append(one)
@@ -156,8 +153,8 @@ def misnamed(
 ) -> list[ScriptError]:
     """Find wrong names of commands and styles in statements.
 
-    Karamelo's forms material(ID, eos, strength) and solid(ID, box, region, ...) without a style are
-    valid, even if the definition of a `wanting` name failed.
+    Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
+    are valid even if the definition of a `wanting` name failed.
     """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}

@@ -25,12 +25,12 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Make the help from the signature and docstring of a command or style, and of its bases."""
+    """Make the help from signature and docstring of a command or style, and of its bases."""
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     noun = name.removeprefix("delete_").replace("_", " ")
     descriptions = {"ID": f"Name of the {noun}.", "arguments": "See the page of the style."}
-    # Descriptions in a base class hold for derived styles.
+    # Derived styles inherit descriptions.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
         init = owner.__init__.__doc__ if "__init__" in vars(owner) else None
         for doc in (init, owner.__doc__):
@@ -46,7 +46,7 @@ def describe(target: Callable, name: str) -> Help:
 
 
 def sections_of(doc: str) -> tuple[str, dict[str, str]]:
-    """Split a docstring into its head, and sections by title."""
+    """Split a docstring into its head and sections by title."""
     pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", inspect.cleandoc(doc), flags=re.MULTILINE)
     titles = [title.replace("Examples", "Example") for title in pieces[1::2]]
     texts = (text.strip("\n") for text in pieces[2::2])
@@ -54,7 +54,7 @@ def sections_of(doc: str) -> tuple[str, dict[str, str]]:
 
 
 def _descriptions(section: str) -> dict[str, str]:
-    """Read descriptions by name, from a section in NumPy's form."""
+    """Read descriptions by name from a NumPy section."""
     descriptions: dict[str, str] = {}
     for block in re.split(r"\n(?=\S)", section):
         head, _, text = block.partition("\n")

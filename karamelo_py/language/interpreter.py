@@ -41,7 +41,7 @@ def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
 
 
 class Interpreter:
-    """Executes a script on a hub, whose ``interpreter`` and ``place`` it sets."""
+    """Executes a script on a hub; sets its ``interpreter`` and ``place``."""
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
@@ -50,12 +50,12 @@ class Interpreter:
         self.files: list[Path] = []  # files read
         self.files_ahead: list[Path] = []  # files read by a rehearsal
         self.frames: list[_Frame] = []
-        self.by_statement = False  # `next_statement` leads into included scripts
+        self.by_statement = False  # `next_statement` enters included scripts
         self.statement: syntax.Statement | None = None  # last one started
         self.record = Record()  # executed statements, for restart files
-        # Until the script has reached the state of an earlier run.
+        # Until the script reaches the state of an earlier run.
         self.replay: Replay | None = None
-        # Variables of the command line, which override assignments.
+        # Variables of the command line; they override assignments.
         self.presets = Presets(self, presets or {})
 
     # -- execution --------------------------------------------------------------------------------
@@ -103,7 +103,7 @@ class Interpreter:
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
-        """Execute everything after the present statement on another hub, with copies of variables.
+        """Execute the rest of the script on another hub, with copied variables.
 
         This finds mistakes late in a script before a long run.
         """
@@ -133,7 +133,7 @@ class Interpreter:
 
     @property
     def folders(self) -> list[Path]:
-        """Folders of input files: of the output, current, of the script."""
+        """Folders of input files: output, current, script's."""
         return [self.hub.folder, Path(), self.folder]
 
     def _run(self, text: str, name: str, path: Path | None = None) -> None:
@@ -160,7 +160,7 @@ class Interpreter:
             self.frames.clear()
             self.hub.answered = True
         except ScriptError as error:
-            # At a run, the rest of the script has been rehearsed.
+            # At a run, the rest has been rehearsed.
             if not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
@@ -182,7 +182,7 @@ class Interpreter:
             try:
                 self.execute(frame.statements[frame.next - 1])
             except Pause:
-                # In the script of the run; scripts that include it are at their next line.
+                # The script of the run repeats its line; those that include it do not.
                 if frame is self.frames[-1]:
                     frame.next -= 1
                 raise
@@ -198,7 +198,7 @@ class Interpreter:
         return None
 
     def execute(self, statement: syntax.Statement) -> None:
-        """Execute one statement; errors get its place, and the scripts that include it."""
+        """Execute one statement; errors get its place and the including scripts."""
         self.statement = statement
         self.hub.place = statement.place
         depth = len(self.frames)
@@ -241,7 +241,6 @@ class Interpreter:
             raise replay.other_script("there a run stood here", statement.place)
 
     def _including(self, depth: int) -> list[Place]:
-        """List the include statements of the first `depth` scripts, nearest first."""
         frames = self.frames[:depth]
         return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
 
@@ -313,7 +312,6 @@ class Interpreter:
         return evaluation.evaluate(node, raw, self)
 
     def knows(self, name: str) -> bool:
-        """Tell if a name has a meaning in an expression."""
         return (
             name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values
         )
@@ -333,7 +331,7 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """Tell if a name has any meaning, as a call or in later lines."""
+        """Return True if a name has any meaning, as a call or in later lines."""
         meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             meaningful
@@ -348,7 +346,7 @@ class Interpreter:
         if not registry.knows("command", name) or self.hides(name):
             raise unknown.unknown_call(self, name, place, statement=False)
         target = registry.find("command", name)
-        # A command without a value must not be executed here, least of all a run.
+        # A command without a value must not run here, least of all a run.
         if inspect.get_annotations(target).get("return", "") in (None, "None"):
             raise unknown.no_value(name, place)
         arguments = [

@@ -19,12 +19,12 @@ from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
 
-# Beyond this, floats cannot represent every integer.
+# Above, floats skip integers.
 _LARGEST_INTEGER = 2**53
 
 
 def _rounding(value: float) -> float:
-    """Return the tolerance for a result such as 0.3/0.1 to be an integer."""
+    """Tolerance for results such as 0.3/0.1 to count as integers."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
 
 
@@ -33,8 +33,6 @@ def _rounding(value: float) -> float:
 
 @dataclass(frozen=True)
 class Constraint:
-    """A condition on a number: its `text`, and the test `holds`."""
-
     text: str
     holds: Callable[[float], bool]
 
@@ -67,7 +65,7 @@ class InputFile:
     """Annotation: a file to read, in the current folder or the script's folder."""
 
     script_kind = "the name of a file"
-    # Supported endings in lower case; None: any.
+    # Lower-case endings; None: any.
     endings: Container[str] | None = None
 
     @classmethod
@@ -114,7 +112,7 @@ class OutputFile:
                 place=argument.place,
                 hint="the environment variable PYTHONUTF8=1, or another name",
             ) from None
-        # A run makes the folder of -out, which `check` may find missing.
+        # A run makes the folder of -out; `check` may not find it.
         made = hub.checking and path.parent == hub.folder
         if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
@@ -152,7 +150,7 @@ class Unfit(Exception):
 class Kind:
     """Description and conversion of an argument.
 
-    With `words`, only these fit; `family` is the family of styles that it names.
+    With `words`, only these fit; `family` is the family of the styles it names.
     """
 
     text: str
@@ -226,7 +224,7 @@ def _to_text(hub: Scene, argument: Argument) -> str:
 
 @dataclass(frozen=True)
 class StyleOf:
-    """Annotation of a style name; a style takes precedence over a variable of its name."""
+    """Annotation of a style name; takes precedence over a variable of that name."""
 
     family: str
     script_kind = "a word"
@@ -335,7 +333,7 @@ def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
 def _union(kinds: list[Kind]) -> Kind:
     nullable = any(kind.nullable for kind in kinds)
     words = tuple(word for kind in kinds for word in kind.words)
-    # Words first: a literal word takes precedence over a variable of that name.
+    # Words first: they take precedence over variables of that name.
     tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
     def convert(hub: Scene, argument: Argument) -> Any:
@@ -354,7 +352,7 @@ def _union(kinds: list[Kind]) -> Kind:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a command or style, as a script sees it."""
+    """A parameter of a command or style, as scripts see it."""
 
     name: str
     kind: Kind

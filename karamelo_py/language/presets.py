@@ -1,4 +1,4 @@
-"""Variables from the command line, which override assignments of a script."""
+"""Variables of the command line, which override assignments of a script."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -22,12 +22,12 @@ class Presets(dict[str, str]):
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
         self._script = script
-        # Those that may have to be numbers, and mistakes attributed to them.
+        # Those that may have to be numbers, and mistakes blamed on them.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
-        # Presets that each variable depends on, by its name.
+        # Presets on which each variable depends.
         self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in texts}
-        if isinstance(texts, Presets):  # of a script that this one copies
+        if isinstance(texts, Presets):  # of the script that this one copies
             vars(self).update(vars(texts), _script=script, _made_of=dict(texts._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
@@ -58,11 +58,11 @@ class Presets(dict[str, str]):
     def stand_for(self, statement: Assignment) -> None:
         """Replace an assignment of the script; a text does not replace a number."""
         name, variables = statement.name, self._script.variables
-        # A word may have become an expression of variables.
+        # A word may now be an expression of variables.
         if isinstance(variables.get(name), str):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
-            # A method may take a text for a number; the mistake is reported where it is used.
+            # A method may take a text for a number; its user reports the mistake.
             in_script = None
             with suppress(ScriptError):
                 in_script = self._script.evaluate(statement.node, statement.right)
@@ -92,7 +92,7 @@ class Presets(dict[str, str]):
                 error.hint = f"{text}, and the script has a number, as in -var {name} {number}"
 
     def refuse_unused(self, statements: list[Statement]) -> None:
-        """Refuse a variable of the command line that nothing reads or assigns."""
+        """Refuse a command-line variable that nothing reads or assigns."""
         scripts = list(self._scripts(statements, self._script.folder)) if self else [None]
         if None in scripts:
             return
@@ -110,7 +110,7 @@ class Presets(dict[str, str]):
     def _scripts(
         self, statements: list[Statement], folder: Path, outer: tuple[Path, ...] = ()
     ) -> Iterator[list[Statement] | None]:
-        """Yield the statements of a script and of all included ones; None for an unknown one."""
+        """Yield the statements of a script and its includes; None for an unknown include."""
         yield statements
         for statement in statements:
             if not (isinstance(statement, CommandCall) and statement.name == "include"):

@@ -5,9 +5,8 @@ A package offers a style with a line in its pyproject.toml, for example::
     [project.entry-points."karamelo_py.fix"]
     gravity = "my_package:Gravity"
 
-A script names a class of a module next to it, or of an installed one, as ``module.Class``.
-
-Nothing is imported before it is used.
+A script names a class of a module next to it, or of an installed one, as ``module.Class``. Nothing
+is imported before use.
 """
 
 import re
@@ -67,13 +66,13 @@ def names(family: str) -> list[str]:
 
 
 def knows(family: str, name: str) -> bool:
-    """Tell if `family` has a style of this name, perhaps a broken one."""
+    """Return True if `family` has a style of this name, perhaps a broken one."""
     return name in _families().get(family, {}) or _of_module(family, name) is not None
 
 
 @contextmanager
 def modules_of(*folders: Path) -> Iterator[None]:
-    """Import modules of these folders before all others, within the context."""
+    """Import modules of these folders before all others within the context."""
     paths = [str(folder.absolute()) for folder in folders]
     sys.path[:0] = paths
     try:
@@ -84,7 +83,6 @@ def modules_of(*folders: Path) -> Iterator[None]:
 
 
 def _of_module(family: str, name: str) -> EntryPoint | None:
-    """Return the entry point of ``module.Class``, if the module can be found."""
     dotted = _CLASS.fullmatch(name)
     if not dotted or not forget_other(dotted[1]):
         return None
@@ -93,7 +91,7 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Forget a module of this name that a script in another folder has imported.
+    """Forget a module of this name imported by a script in another folder.
 
     Returns whether there is a module of this name.
     """
@@ -104,7 +102,7 @@ def forget_other(module: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """Return the style name of a class; for classes with several, its attribute ``style``."""
+    """Return the style name of a class (attribute ``style`` if it has several)."""
     target = f"{style.__module__}:{style.__qualname__}"
     for name, entries in _families().get(family, {}).items():
         if any(entry.value == target for entry in entries):
@@ -113,7 +111,6 @@ def name_of(family: str, style: type) -> str:
 
 
 def origin(family: str, name: str) -> str:
-    """Return the package of a style, with its version."""
     return " and ".join(_origin(entry) for entry in _entries(family, name))
 
 
@@ -151,7 +148,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """As `find`, for a statement whose first argument is an ID, not the style."""
+    """Like `find`, for a statement whose first argument is an ID, not the style."""
     if not knows(family, name) and knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")

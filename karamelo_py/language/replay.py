@@ -1,4 +1,4 @@
-"""Repeat a script up to the place where an earlier run stopped."""
+"""Repeat a script up to the state at which an earlier run stopped."""
 
 import re
 from collections.abc import Iterable
@@ -13,7 +13,7 @@ _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
 def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
-    """Return a statement without blanks, comments, line ends, and keywords in `without`."""
+    """Return a statement without blanks, comments, line ends and the keywords `without`."""
     text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
     for word in without:
         text = re.sub(rf",{word}=[^,()]*", "", text)
@@ -22,7 +22,7 @@ def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
 
 @dataclass
 class Record:
-    """The statements executed so far, without those that only control output (``may_differ``).
+    """The statements executed so far, except those that only control output (``may_differ``).
 
     `values` has the results of value(...) by statement number.
     """
@@ -34,7 +34,6 @@ class Record:
         self.values.setdefault(len(self.statements) - 1, []).append(value)
 
     def forget_from(self, number: int) -> None:
-        """Remove the statements from `number` on, and their values."""
         del self.statements[number:]
         self.values = {k: numbers for k, numbers in self.values.items() if k < number}
 
@@ -61,7 +60,7 @@ class Replay:
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]
-        # An unfinished run may become longer or shorter.
+        # An unfinished run may change its length.
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
                 raise self._was_over(before, place)
@@ -70,7 +69,7 @@ class Replay:
             raise error
 
     def _was_over(self, run: str, place: Place | None) -> ScriptError:
-        """Make the error for a changed length of a run that was over."""
+        """Make the error for a changed length of a finished run."""
         behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
         return ScriptError(
             f"{self.file} was written when this run was over, by {run}",

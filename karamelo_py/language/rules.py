@@ -1,7 +1,7 @@
-"""Rules: what a part of a scene knows of itself, told before a run, by `check`, or of a gain.
+"""Rules that parts of a scene declare: known failures, needless costs, causes of energy gain.
 
-A part is a basis, a transfer, a scheme, a method, a field, a law or one of its parts, a fix. Its
-rules are declared next to it, also in plug-ins::
+A part is a basis, transfer, scheme, method, field, law or part of a law, or a fix. Rules are
+declared next to it, also in plug-ins::
 
     known_failure(
         PIC,
@@ -11,13 +11,12 @@ rules are declared next to it, also in plug-ins::
         cure="APIC or FLIP instead of PIC",
     )
 
-`when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`).
-It returns whether the rule speaks, or the numbers for its words, by name, or a list of these, one
-for each time that it speaks. Between braces words have these numbers and what ``part``, ``scene``
-and ``owner`` have, such as ``{scene.turn:.2g}``; the owner of a law, or of one of its parts, is the
-material. Two names mean more: ``place``, the place in the script that is marked (else the place of
-the fix, the material or the method), and ``share``, of noise, its size relative to the tolerable
-amount.
+`when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
+returns whether the rule applies, or the numbers for its words by name, or a list of these, one per
+message. Braces in words take these numbers and attributes of ``part``, ``scene`` and ``owner``,
+such as ``{scene.turn:.2g}``; the owner of a law or its parts is the material. Two names are
+special: ``place``, the marked place in the script (default: of the fix, material or method), and
+``share``, the size of noise over the tolerable amount.
 """
 
 import re
@@ -29,7 +28,7 @@ When = Callable[[Any, Any], Any]
 
 
 class Advice(NamedTuple):
-    """Words of a rule on a scene: what is wrong, costs or feeds energy, and what to write."""
+    """A rule's words about a scene: what is wrong, costly or adds energy, and what to write."""
 
     name: str
     reason: str
@@ -39,12 +38,12 @@ class Advice(NamedTuple):
 
     @property
     def code(self) -> str:
-        """The name in kebab case, without the names of the script."""
+        """The name in kebab case, without names of the script."""
         return code_of(self.name)
 
 
 def code_of(name: str) -> str:
-    """Write a known failure as a code: ``shocks of material 'm'`` is shocks-of-material."""
+    """Convert a known failure to a code: ``shocks of material 'm'`` is shocks-of-material."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)  # names of the script
     return "-".join(re.findall(r"\w+", words.lower()))
 
@@ -55,9 +54,9 @@ _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 def known_failure(
     part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare a known failure of a part, by a name; it is reported once.
+    """Declare a known failure of a part by a name; it is reported once.
 
-    With a `cause`, it is noise: reported if its share is above 1, and as the cause of a gain.
+    With a `cause`, it is noise: reported if its share exceeds 1, and as the cause of a gain.
     """
     _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
     if cause:
@@ -73,17 +72,17 @@ def known_failures() -> Iterator[tuple[type, str, str, str]]:
 
 
 def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
-    """Declare what a part costs without need, told by `check`."""
+    """Declare a needless cost of a part, for `check`."""
     _rules.setdefault(("suggestion", part), []).append((when, "", cost, instead))
 
 
 def gain(part: type, *, when: When, cause: str, cure: str) -> None:
-    """Declare a likely cause of a spurious energy gain by a part, and its fix."""
+    """Declare a part as likely cause of a spurious energy gain, with its fix."""
     _rules.setdefault(("gain", part), []).append((when, "", cause, cure))
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    """Yield what the rules of one kind say of a part (or of a field, which is a class)."""
+    """Yield what rules of one kind say of a part (or of a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
             result = when(part, scene)

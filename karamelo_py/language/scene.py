@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 
 class Scene(Protocol):
-    """The hub, as seen by the parts it is made of (:mod:`karamelo_py.scene.hub`)."""
+    """The hub as its parts see it (:mod:`karamelo_py.scene.hub`)."""
 
     console: Any
     settings: Any

@@ -1,15 +1,15 @@
 """Signatures define syntax: they convert script arguments to a Python call, and give help.
 
-Commands are functions and styles are classes. The first parameter is the hub; the annotations of
-the others define the arguments::
+Commands are functions and styles are classes. The first parameter is the hub; annotations of the
+others define the arguments::
 
     class Gravity(Fix):
         def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
 
 Supported annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile,
-OutputFile, Argument (left to the callee), classes with a classmethod
-``from_script(cls, hub, argument)``, and unions of these, with None for the word NULL. Annotated
-adds constraints. ``*args`` take any number; keyword-only parameters are given as ``name=value``.
+OutputFile, Argument (left to the callee), classes with a classmethod ``from_script(cls, hub,
+argument)``, and unions of these, with None for the word NULL. Annotated adds constraints. ``*args``
+take any number; keyword-only parameters are written ``name=value``.
 """
 
 import inspect
@@ -50,7 +50,7 @@ __all__ = [
 def parameters(target: Callable) -> list[Parameter]:
     """List the parameters of a command or style, without the hub.
 
-    Raises TypeError if the signature is not supported, a fault of its author.
+    Raises TypeError for an unsupported signature, a fault of its author.
     """
     record = is_record(target)
     try:
@@ -68,9 +68,9 @@ def parameters(target: Callable) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """Tell if a style is a NamedTuple, a tag that needs no hub.
+    """Return True if a style is a NamedTuple, a tag that needs no hub.
 
-    Its fields, or the parameters of its classmethod ``given``, are its arguments. A method
+    Its arguments are its fields, or the parameters of its classmethod ``given``. A method
     ``checked`` returns a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
@@ -94,7 +94,7 @@ def call(
     """Call a command or make a style with script arguments; store their values in `converted`.
 
     `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a place, for anything wrong
-    in the arguments or in the target.
+    in the arguments or the target.
     """
     try:
         expected = parameters(target)
@@ -146,7 +146,7 @@ def style_of(
     *,
     values: dict | None = None,
 ) -> Any:
-    """Make a style of a family, with the `ID` in the script; store arguments in `values`."""
+    """Make the style `ID` of a family; store arguments in `values`."""
     with in_new_words(family, ID, style, arguments):
         target = registry.called(family, ID, style)
         return call(target, hub, arguments, f"{family} {style}", values)
@@ -155,9 +155,7 @@ def style_of(
 def remade(
     hub: Scene, family: str, style: str, values: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
-    """Make a law again from its `values`, changed by ``name=value`` arguments; return it and its
-    values.
-    """
+    """Remake a law from its `values`, changed by ``name=value`` arguments; return both."""
     target, name = registry.find(family, style), f"{family} {style}"
     expected = {p.name: p for p in parameters(target)}
     bound: dict[str, list[Argument]] = {}
@@ -199,7 +197,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """Call a command or make a style with values; report faults as its author's."""
+    """Call a command or make a style with values; faults are reported as its author's."""
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
             return target(hub, *values, **named)
@@ -219,12 +217,12 @@ def _bind(
     name: str,
     bound: dict[str, list[Argument]],
 ) -> None:
-    """Add to `bound` the arguments of each parameter, by position or by name."""
+    """Add the arguments of each parameter to `bound`, by position or name."""
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
     positional: list[Argument] = []
-    # Raw arguments are passed to a style, which knows the names.
+    # Styles know the names of raw arguments.
     passed_on = variadic is not None and is_raw(variadic.kind)
     for argument in arguments:
         word, value = argument.keyword() or ("", argument)
@@ -259,7 +257,7 @@ def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | 
 
 
 def _joined(expected: list[Parameter]) -> str:
-    """Format ``a, b[, c[, d]][, e=...]``: arguments as written."""
+    """Format ``a, b[, c[, d]][, e=...]``."""
     text, open_brackets = "", 0
     for parameter in expected:
         comma = ", " if text else ""
@@ -275,7 +273,7 @@ def _joined(expected: list[Parameter]) -> str:
     return text + "]" * open_brackets
 
 
-# Commands that name styles of families without a command.
+# Families without a command: the one that names their styles.
 _HOMES = {"transfer": "method", "basis": "method"}
 
 
@@ -300,7 +298,7 @@ def syntax(target: Callable, name: str) -> str:
 
 
 def variants_of(style: Any) -> Mapping[str, Any]:
-    """Return the words that choose another class, or style by name, instead of a style."""
+    """Return the words that choose another class, or style by name."""
     return getattr(style, "variants", {})
 
 
@@ -313,7 +311,7 @@ def documented(target: Callable) -> list[Parameter]:
     variants = variants_of(target)
     if not variants:
         return parameters(target)
-    # For a method it selects the shape of domains, which must have one.
+    # For a method, it selects the required shape of domains.
     needed = not is_record(target)
     kind = kind_of(Literal[tuple(variants)])
     variant = Parameter("variant", kind, optional=not needed, default=default_variant(target))

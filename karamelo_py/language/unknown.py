@@ -1,4 +1,4 @@
-"""Unknown names, and names that cannot be used: errors with suggestions."""
+"""Unknown or unusable names: errors with suggestions."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -98,7 +98,7 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
 
 
 def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None]:
-    """Guess the meaning of a name: a hint, and the known name if there is one."""
+    """Guess the meaning of a name: a hint, and the known name if any."""
     statement, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
         alone = isinstance(statement, Assignment) and statement.right.code.strip() == name
@@ -162,13 +162,12 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
 
 
 def line_below(script: Any, kind: str, ID: str) -> int | None:
-    """Find the later line that defines a part of this kind and ID."""
+    """Find the later line that defines this kind and ID."""
     lines = (line for _, made, name, line in _ahead(script) if (made, name) == (kind, ID))
     return next(lines, None)
 
 
 def _needs(script: Any, name: str, other: str) -> bool:
-    """Tell if the later variable `name` depends on `other`."""
     set_there = [s for s, kind, *_ in _ahead(script) if not kind]
     below = {s.name: set(re.findall(r"\w+", s.right.code)) for s in reversed(set_there)}
     reached: set[str] = set()
@@ -222,7 +221,7 @@ def check_name(name: str) -> None:
 
 
 def check_ID(kind: str, ID: str) -> None:
-    """Refuse an ID whose values could not be used in formulas."""
+    """Refuse an ID whose values formulas could not name."""
     if ID.isidentifier() and ID not in ("and", "or", "not"):
         return
     better = re.sub(r"\W", "_", ID)
@@ -239,13 +238,13 @@ def listed(names: Iterable[str]) -> str:
 
 # ---- older forms of Karamelo, translated with the words of the script ----------------------------
 
-# Words used instead of the style region in 2020, and the equivalent shapes.
+# Shapes that scripts of 2020 name instead of the style region.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "cylinder": "cylinder",
     "sphere": "sphere",
 }
 FLIPS = ("FLIP", "AFLIP", "ASFLIP")
-# Names of reference and melting temperature in Karamelo scripts.
+# Reference and melting temperature in Karamelo scripts.
 OWN_NAMES = {"T0": ("T0", "Tr", "Troom"), "Tm": ("Tm", "Tmelt", "Tmelting")}
 
 
@@ -287,7 +286,7 @@ def filled(statement: Any) -> str | None:
 
 
 def longer(name: str, arguments: Sequence[Any]) -> str | None:
-    """Complete the line of a style (`name`: ``eos shock``) that got fewer arguments."""
+    """Complete the line of a style (``eos shock``) with too few arguments."""
     forms = table()["shorter"].get(name)
     if forms is None or not arguments:
         return None
@@ -306,7 +305,7 @@ def longer(name: str, arguments: Sequence[Any]) -> str | None:
 
 
 def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | None:
-    """Translate a Karamelo line with a renamed style, or without arguments after it."""
+    """Translate a Karamelo line with a renamed style, or without arguments."""
     form = table()["renamed"].get(f"{family} {style}")
     try:
         return form and f"{family}({form.format(*words, ID=ID, all=', '.join(words))})"
