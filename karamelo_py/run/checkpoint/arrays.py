@@ -1,4 +1,4 @@
-"""The state of a simulation as named arrays: to return to, to write, to read."""
+"""The state of a simulation as named arrays: to return to, write and read."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
 ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 
-# Name and shape of an array, the index of a piece of it, and the piece.
+# Name and shape of an array, index of a piece of it, and the piece.
 Index = EllipsisType | slice | tuple
 Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
 def changing(simulation: Backend) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield every array, as far as it is in use, that a step changes and the next one needs."""
+    """Yield the used part of every array that a step changes and the next one needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         for name, rows in in_use(block.tiling):
@@ -43,7 +43,7 @@ def changing(simulation: Backend) -> Iterator[tuple[str, np.ndarray]]:
     for name, array in kept_at_nodes(s):
         yield f"kept/{name}", array
     for k, block in enumerate(s.blocks):
-        now = s.control.clock[0].now  # known once the clock is put back
+        now = s.control.clock[0].now  # known once the clock is restored
         for name, array in arrays_of(block.points):
             # The other positions belong to the step before.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
@@ -52,7 +52,7 @@ def changing(simulation: Backend) -> Iterator[tuple[str, np.ndarray]]:
 def copied(simulation: Backend, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Copy the state and the published values, reusing the arrays of `before`."""
     copies = {}
-    # One array after another: if the number of points changed, none exists twice.
+    # One by one: if the number of points changed, no two arrays exist twice.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -66,7 +66,7 @@ def copied(simulation: Backend, before: dict[str, np.ndarray]) -> dict[str, np.n
 def touched(simulation: Backend) -> dict[str, np.ndarray]:
     """Return the nodes where contact acted lately, and its memory of them.
 
-    Liquids may return to nodes that are not in use now. Processes list the nodes in use.
+    Liquids may return to nodes not in use now. Processes list the nodes in use.
     """
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
@@ -88,7 +88,7 @@ def touched(simulation: Backend) -> dict[str, np.ndarray]:
 
 
 def stored(simulation: Backend, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield the content of a restart file for the present state, or for the `kept` one.
+    """Yield a restart file's content for the present state, or the `kept` one.
 
     Collective; the first process gets the arrays, with the bits and in the order of a serial run.
     """
@@ -107,7 +107,7 @@ def _shown_by_nodes(simulation: Backend) -> Iterator[Stored]:
     comm, counted = simulation.comm, simulation.nodes.counted()
     nonzero = np.zeros(len(counted), np.bool_)
     for _, array in of_nodes(simulation.setup):
-        for first in range(0, len(counted), PIECE):  # no copy of all of them
+        for first in range(0, len(counted), PIECE):  # avoids a copy of all
             piece = slice(first, first + PIECE)
             nonzero[piece] |= array[counted[piece]].any(axis=1)
     parts = comm.gather(counted[nonzero])
@@ -123,7 +123,7 @@ def _shown_by_nodes(simulation: Backend) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as files hold it; the digits of exact sums are normalised."""
+    """Yield a state as files hold it, with the digits of exact sums normalised."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -181,7 +181,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Convert errors of HDF5 within the block to an error about a damaged file."""
+    """Turn HDF5 errors within the block into errors about a damaged file."""
     try:
         yield
     except OSError as error:
@@ -193,7 +193,7 @@ def reading() -> Iterator[None]:
 
 def restore(simulation: Backend, state: ArraysByName) -> None:
     s = simulation.setup
-    # Nodes that were not in use in the state must be empty.
+    # Nodes not in use in the state must be empty.
     simulation.tiles.empty_nodes(s)
     blocks = []
     for k, block in enumerate(s.blocks):
@@ -215,7 +215,7 @@ def restore(simulation: Backend, state: ArraysByName) -> None:
         s.control.values[:] = state["values"]
     for memory in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
         memory[memory != 0] = 0
-        if "touched/nodes" in state:  # a process without points has no nodes in use
+        if "touched/nodes" in state:  # a process without points uses no nodes
             memory[state["touched/nodes"][()]] = state["touched/rows"]
     simulation.changed()
 
@@ -232,7 +232,7 @@ def take_snapshot(simulation: Backend, path: Path) -> dict[str, np.ndarray]:
 
 def take_stored(simulation: Backend, path: Path) -> None:
     with opened(path) as state, simulation.comm.joint():
-        # Arrays must not change if the file belongs to another scene.
+        # Check first: arrays must not change if the file belongs to another scene.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
         check_numbers(simulation, state)
@@ -279,7 +279,7 @@ def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
 def rows_at(
     simulation: Backend, nodes: np.ndarray, gather: Callable
 ) -> dict[str, np.ndarray] | None:
-    """Gather rows of all arrays of nodes (ascending numbers), zero if not in use; or None."""
+    """Gather node rows of all arrays (ascending numbers), zero if not in use; or None."""
     counted, kinds = simulation.nodes.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
@@ -343,7 +343,7 @@ def check_numbers(simulation: Backend, arrays: ArraysByName) -> None:
         ends[points + "material"] = len(flat(block.laws)[0])
         ends[points + "id"] = simulation.count
         ends[points + "grid"] = ends[tiling + "grid"] = len(s.grids.x0)
-        # Points deleted since the last sort are still in the ranges; the next step sorts first.
+        # Ranges still hold points deleted since the last sort; the next step sorts first.
         sorted_since = np.isfinite(np.asarray(arrays["clock"][()])["drift"]).all()
         number = arrays[points + "id"].size if sorted_since else simulation.count
         ends[tiling + "range"] = number + 1
@@ -433,7 +433,7 @@ def _points(
         if of_piece is not None:
             tiles = stripped(local, f"tiling/{k}/")
             gathered = comm.gather(points_of_tiles(tiles, arrays, *of_piece))
-        else:  # not sorted yet: each process has an equal range of the ids
+        else:  # not sorted yet: equal ranges of the ids
             gathered = comm.gather({"points": arrays})
         if gathered is None:
             continue
@@ -454,7 +454,7 @@ def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def own_share(simulation: Backend, state: ArraysByName, costs: np.ndarray) -> dict[str, np.ndarray]:
-    """Read the own part of the state in a file, after cutting its tiles for the processes."""
+    """Divide a file's tiles among the processes, and read the own part of the state."""
     blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
     tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]
     whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]

@@ -1,16 +1,15 @@
-"""States of the parts of a scene: what they remember, to go back to and to write.
+"""States of the parts of a scene: what they remember, to return to and to write.
 
 A part names the attributes that store what it has seen or summed::
 
     class Dose(Compute):
         remembers = ("total",)
 
-Numbers, texts, bytes, arrays, generators of random numbers of NumPy, lists, tuples, sets and
-dictionaries of these can be kept, and objects whose class says in the same way what they remember.
-Classes add to what their bases name. After a part has got back what it remembers, its method
-``resumed()`` is called where it has one; before a file takes that, ``filed()``. What writes files,
-such as a dump, begins them anew in another script (read_restart), and gets back there only what it
-names in ``carries``, too.
+Numbers, texts, bytes, arrays, NumPy's random generators, and lists, tuples, sets and dictionaries
+of these can be stored; so can objects whose class declares what they remember in the same way.
+Classes add to the names of their bases. The optional method ``resumed()`` is called after a part is
+restored, ``filed()`` before a file stores it. Writers of files, such as a dump, start afresh in
+another script (read_restart): there, only the names in ``carries`` are restored.
 """
 
 from __future__ import annotations
@@ -32,11 +31,11 @@ from karamelo_py.script.errors import ScriptError
 OUTPUTS = ("dump", "log", "curve", "restart")
 CLOCK = ("time", "timestep", "dt")  # values that belong to the arrays of a state
 
-Key = tuple[str, str, str]  # family, ID and style of a part
+Key = tuple[str, str, str]  # family, ID and style
 
 
 class PartStates(NamedTuple):
-    """The memories of parts and the published values at one state, as JSON knows them."""
+    """The memories of parts and the published values of a state, in JSON types."""
 
     parts: dict[Key, dict[str, Any]]
     arrays: list[np.ndarray]  # indexed by the numbers in `parts`
@@ -141,7 +140,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A copy of Python values that no file can store, and the warning for them."""
+    """Copies a Python value that no file can store; holds the warning for it."""
 
     kept: object
     fault: ScriptError
@@ -172,7 +171,7 @@ def _random_state(state: dict) -> np.random.RandomState:
     return generator
 
 
-# Types that JSON does not know: functions to JSON arguments, and back.
+# Types unknown to JSON: functions to JSON arguments, and back.
 KINDS: dict[type, tuple[Callable, Callable]] = {
     tuple: (list, lambda *items: items),
     set: (list, lambda *items: set(items)),
@@ -191,7 +190,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: object, arrays: list[np.ndarray]) -> Any:
-    """Return a value as JSON knows it; arrays are copied into `arrays` and numbered."""
+    """Convert to JSON types; arrays are copied into `arrays` and numbered."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -218,7 +217,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
-        self.hub, self.halve = hub, halve  # whether the run may go back there
+        self.hub, self.halve = hub, halve  # whether the run may return there
         self.halvings = self.returns = 0  # of the step so far; to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1

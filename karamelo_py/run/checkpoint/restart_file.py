@@ -1,8 +1,8 @@
 """Restart files: the whole scene at one time, in HDF5.
 
-Their content follows from declarations: arrays from fields, the rest from what parts remember
-(:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not stored: the script makes it again, and
-a file lists the statements that had been executed.
+Content: arrays as fields declare them, and what parts remember
+(:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not stored: the script repeats it, and a
+file lists the statements executed before.
 """
 
 import json
@@ -39,14 +39,14 @@ CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
     "values", "begun", "parts", "run",
 )  # fmt: skip
-# HDF5 stores checksums of all but arrays from this version on; arrays have one as an attribute.
+# From this version on HDF5 stores checksums of all but arrays, which have one as an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
 PIECE = 1 << 22  # bytes per read
 
 
 class Restarts(Rhythmic):
-    """Writes restart files during a run; a first ``*`` in the name becomes the step number."""
+    """Writes restart files during a run; the step number replaces the first ``*`` in the name."""
 
     place: Place | None = None
     style = ""
@@ -68,7 +68,7 @@ def path_of(hub: Hub, file: Path) -> Path:
 
 
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
-    """Write the present state of a scene, `within` a run or between two; return the path."""
+    """Write the present state, `within` a run or between two; return the path."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
     groups, point = {"state": stored(simulation)}, simulation.rollback if hub.in_run else None
     if point and point.halve and point.arrays:
@@ -131,7 +131,7 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
     """Compare checksums of the arrays of points and nodes (`large`), or of the others.
 
-    Each of several processes compares some.
+    Several processes divide the arrays.
     """
     import h5py
 
@@ -146,7 +146,7 @@ def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> 
 
 
 def _checksum(data: "h5py.Dataset", file: BinaryIO) -> int:
-    """Return the checksum of an array: of a piece of the file, unless it is compressed."""
+    """Return an array's checksum: of a piece of the file, unless it is compressed."""
     begin, crc, left = data.id.get_offset(), 0, data.id.get_storage_size()
     if begin is None:
         return zlib.crc32(np.ascontiguousarray(data[()]))
@@ -163,7 +163,7 @@ def _put(group: "h5py.Group", pieces: Iterator[Stored]) -> None:
     begun: dict[str, h5py.Dataset] = {}
     for name, shape, where, array in pieces:
         if array.shape == shape and array.size and name not in begun:
-            group.create_dataset(name, data=array, track_times=False)  # in half the time
+            group.create_dataset(name, data=array, track_times=False)  # twice as fast
             continue
         if name not in begun:
             begun[name] = group.create_dataset(name, shape, array.dtype, track_times=False)
@@ -182,7 +182,7 @@ def is_restart(path: Path) -> bool:
 
 
 class Restart:
-    """The content of a file; for a name with ``*``, of the file with the largest number."""
+    """A file's content; a name with ``*`` means the largest number."""
 
     def __init__(self, path: Path, out: Path | None = None):
         import h5py
@@ -235,9 +235,9 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore the state of the file; with `outputs`, these continue in their files.
+        """Restore the file's state; with `outputs`, these continue in their files.
 
-        Within a run, `point` becomes the last good state that the file holds.
+        Within a run, `point` becomes the file's last good state.
         """
         check(hub, self)
         simulation, content = hub.simulation, self.content

@@ -39,7 +39,7 @@ class AveragedVolumes:
         self.volume[self.volume == 0] = 1.0
 
     def respond(self, dt: float) -> None:
-        """Compute the stresses after the increments of the points, and their derivatives."""
+        """Compute the stresses after the points' increments, and their derivatives."""
         self._grow()
         ratios = self._sums("grown") / self.volume
         for matter, seen, response, averages in self._parts():
@@ -60,7 +60,7 @@ class AveragedVolumes:
             loops.bring_mean(self.mode, PARTS, self.equations.s.kin, response, averages)
 
     def _matrix(self, name: str) -> sp.csr_matrix:
-        """Sum tensors of points, times weights and gradients of their nodes: (m, m d)."""
+        """Sum point tensors times weights and gradients of their nodes: (m, m d)."""
         e = self.equations
         columns = (e.pairs[1][:, None] * e.d + np.arange(e.d)).ravel()
         data = np.zeros(len(columns))

@@ -20,11 +20,11 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.methods.base import takes_average
 
-# Hooks of fixes in implicit steps; hooks of plug-ins may be called more than once per step.
+# Fix hooks in implicit steps; plug-in hooks may run more than once per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
-LONG = 1e30  # a time in which viscosity sustains no stress
+LONG = 1e30  # a time over which viscosity sustains no stress
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
@@ -143,7 +143,7 @@ def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
 
 
 def _bears_shear(law: Tag, kin: Tag) -> bool:
-    """Return True if a law resists slow shear; in one dimension all do."""
+    """Return True if a law resists slow shear; in 1D all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
     _, C = on_numbers(stress_and_tangent)(law, kin, initial_state(law, kin, 1.0), rest, LONG)
@@ -154,7 +154,6 @@ def _bears_shear(law: Tag, kin: Tag) -> bool:
 
 
 def check(hub: Hub) -> None:
-    """Refuse what an implicit scheme does not support, at its line of the script."""
     update = hub.update
     name = f"scheme {registry.name_of('scheme', type(update.scheme))}"
     if importlib.util.find_spec("scipy") is None:

@@ -1,4 +1,4 @@
-"""Conduction of heat in an implicit step, by the backward rule of Euler."""
+"""Heat conduction in an implicit step, by backward Euler."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,11 +13,11 @@ from karamelo_py.scene.modify import Fix
 
 
 def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
-    """Conduct heat for a step of `dt`, before the points are strained; raises `Singular`.
+    """Conduct heat for `dt`, before the points are strained; raises `Singular`.
 
-    With capacities C and conductances K of the nodes, C (T' - T) / dt = q - K T' (backward Euler).
-    Conduction is linear: one solution is exact. The split into conduction and an adiabatic step is
-    of first order in the step (Armero & Simo 1992). In this order a load step ends in equilibrium.
+    Nodal capacities C, conductances K: C (T' - T) / dt = q - K T'. Linear: one solution is exact.
+    The split from an adiabatic step is of first order in the step (Armero & Simo 1992). In this
+    order a load step ends in equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)
@@ -40,7 +40,7 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
     if np.any(free):
         change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
-    # Fixes get the temperature without them, and publish the heat that they supply.
+    # Fixes get the temperature without them, and publish the heat they supply.
     without = new - np.where(held, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
     update[nodes, 0], update[nodes, 1] = without, without - T

@@ -1,10 +1,10 @@
 """Contact between solids with separate fields, within Newton's method.
 
-Where two bodies meet at a node, their relative displacement u may close the gap g along the common
-normal N. Penetration is penalised: p = max(0, k (N u - g)). Tangentially the bodies stick by the
-same spring while |k s| <= mu p for the slip s of the step; then they slide with the force mu p
-(Coulomb; Wriggers 2006, "Computational Contact Mechanics", chapter 10). Derivatives are exact.
-Normals and gaps are those at the beginning of the step.
+Where bodies meet at a node, the relative displacement u may close the gap g along the common normal
+N. The penalty pressure is p = max(0, k (N u - g)). Tangentially the same spring holds while |k s|
+<= mu p for the slip s of the step; then bodies slide at mu p (Coulomb; Wriggers 2006,
+"Computational Contact Mechanics", chapter 10). Derivatives are exact. Normals and gaps are from the
+beginning of the step.
 """
 
 import numpy as np
@@ -17,9 +17,9 @@ from karamelo_py.kernels.contact import Bodies, ListedPairs, list_pairs
 from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.run.implicit.equations import Equations
 
-STIFF = 1e3  # springs, relative to the stiffness of a cell of the softer body
-LIGHT = 0.01  # fraction of the mass of nodes within a body
-SLIPPERY = 0.05  # the same: below it, spline nodes next to a body are too weak to stick
+STIFF = 1e3  # spring over cell stiffness of the softer body
+LIGHT = 0.01  # fraction of an inner node's mass
+SLIPPERY = 0.05  # the same: lighter spline nodes next to a body are too weak to stick
 CLOSE = 1e-4  # gap in cells below which contact is first assumed
 
 
@@ -48,7 +48,7 @@ class Contact:
         self.gap = np.maximum(gap[chosen], 0.0)
         self.first, self.second = (equations.number_of(one) for one in self.pairs.T)
         self.a, self.b = (equations.grid[one] for one in (self.first, self.second))
-        # Their drag would rotate with each correction, and Newton's method would not converge.
+        # Their drag would rotate with each correction and prevent convergence.
         mu = tag.friction[self.a, self.b]
         self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
@@ -64,7 +64,7 @@ class Contact:
         self.respond(np.zeros((m, self.d)), supposed=True)
 
     def _shares(self) -> np.ndarray:
-        """Return the mass of nodes (m,), as a fraction of a node within the body."""
+        """Return nodal masses (m,) as fractions of an inner node's."""
         equations = self.equations
         mass = equations.mass / self._around(equations.positions[:, 0], self.s.grids.spacing[0])
         most = np.zeros(len(self.s.grids.first))
@@ -72,7 +72,7 @@ class Contact:
         return mass / np.maximum(most[equations.grid], 1e-300)
 
     def _stiffness(self, moduli: np.ndarray) -> np.ndarray:
-        """Return the stiffness (c,) of the springs, from the softer body of each pair."""
+        """Return spring stiffnesses (c,), from the softer body of each pair."""
         both = np.stack([moduli[self.a], moduli[self.b]])
         softer = np.where(both > 0, both, np.inf).min(0)
         h = self.s.grids.spacing[self.a]
@@ -80,20 +80,20 @@ class Contact:
         return stiffness * self._around(self.equations.positions[self.first, 0], h)
 
     def _around(self, x: np.ndarray, h: np.ndarray) -> np.ndarray:
-        """Return the length or area (m,) per angle at radii `x`, for cells of `h`; or 1."""
+        """Return length or area (m,) per angle at radii `x`, for cells of `h`; or 1."""
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Return the pairs (c,) in contact at the end of the last step; with -1, that stuck."""
+        """Return pairs (c,) in contact at the end of the last step; with -1, that stuck."""
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
         last = sign * last if sign else np.abs(last)
         return (last > 0) & (last >= step)
 
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
-        """Compute forces after displacements (m, d) of the nodes, and their derivatives.
+        """Compute forces after nodal displacements (m, d), and their derivatives.
 
-        `supposed`: contact and sticking follow from the last step, before there are displacements.
+        `supposed`: contact and sticking are those of the last step, before displacements are known.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -153,17 +153,17 @@ class Contact:
         return np.concatenate(rows)
 
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Remove from velocities (m, d) the relative normal ones of pressed pairs.
+        """Remove the relative normal velocities of pressed pairs from `v` (m, d).
 
-        Momentum is conserved: `inverse` (m, d) are inverse masses, 0 where nodes are held.
+        Conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
         """
         return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
 
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Add to accelerations (m, d) the effect of contact at the beginning of the step.
+        """Add the effect of contact at the beginning of the step to accelerations (m, d).
 
-        It stops touching pairs that approach, and all pairs that stuck; others slide with their
-        velocities `v` (m, d).
+        It stops touching pairs that approach, and all that stuck; others slide with velocities `v`
+        (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
         touched = touched & (B @ a.ravel() > 0)  # others may separate

@@ -1,4 +1,4 @@
-"""Equations of an implicit step: unknown nodes, the sparse matrix, and ghost stabilisation."""
+"""Equations of an implicit step: unknown nodes, sparse matrix, ghost stabilisation."""
 
 from collections.abc import Iterable
 from functools import cached_property
@@ -23,17 +23,15 @@ from karamelo_py.scene.modify import Fix
 
 AT_ONCE = 8192  # points per batch of assembly
 FAR = 0.5  # cells that nodes may move at once towards others, per cell of distance
-# Reused from the step before if the first are the same.
+# The second are reused from the step before if the first are the same.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
 def valid(seen: loops.Seen) -> np.ndarray:
-    """Mask the entries (n, s) of stencils in use."""
     return np.arange(seen.nodes.shape[1]) < seen.count[:, None]
 
 
 def distinct(numbers: list[np.ndarray]) -> np.ndarray:
-    """Return the sorted distinct values of integer arrays."""
     numbers = [array for array in numbers if array.size]
     if not numbers:
         return np.zeros(0, np.int64)
@@ -46,8 +44,8 @@ def distinct(numbers: list[np.ndarray]) -> np.ndarray:
 
 class Moduli(NamedTuple):
     mean: float  # by volume; 0 if nothing deforms
-    of_grids: np.ndarray  # (g,) the means of each grid, 0 where nothing deforms
-    of_laws: list[np.ndarray]  # (2, k) numbers of the laws of each block; their specific volumes
+    of_grids: np.ndarray  # (g,) by grid, 0 where nothing deforms
+    of_laws: list[np.ndarray]  # (2, k) laws of each block, and their specific volumes
 
     def alike(self) -> bool:
         every = (table[0, table[1] > 0] for table in self.of_laws)
@@ -59,8 +57,8 @@ class Equations:
 
     `nodes` (m,) are in stencils of points: `mass` (m,) is 0 where there are gradients only,
     `places` (m, d) are grid indices, `deforming` (m,) masks nodes of points that deform (`blocks`,
-    with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid`
-    (m, d). `known` is from the step before, or empty.
+    with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid` (m,
+    d). `known` is from the step before, or empty.
     """
 
     def __init__(self, s: Setup, mode: Tag, known: dict[str, np.ndarray], stabilised: bool):
@@ -112,7 +110,7 @@ class Equations:
         return seen, response
 
     def _led(self, tools: list[tuple[Block, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nodes (m,) that see rigid points, and their velocities (m, d) from these."""
+        """Mask nodes (m,) of rigid points; return their velocities (m, d), too."""
         mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
         for block, seen in tools:
             loops.scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
@@ -139,7 +137,7 @@ class Equations:
     def _find_pairs(self, stabilised: bool) -> None:
         """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
 
-        Pairs of the ghost stabilisation are included, and each node with itself.
+        Includes pairs of the ghost stabilisation, and each node with itself.
         """
         d, m = self.d, len(self.nodes)
         reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
@@ -179,7 +177,7 @@ class Equations:
         return connected_components(graph, directed=False)[1]
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
-        """Return the nodal forces (m, d) of displacements (m, d); not finite if a point fails."""
+        """Return nodal forces (m, d) after displacements (m, d); not finite if a point fails."""
         s = self.s
         for seen, response in self.parts:
             loops.strain(self.mode, loops.PARTS, s.kin, seen, u, response)
@@ -200,10 +198,10 @@ class Equations:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, held: np.ndarray) -> float:
-        """Return the largest move, in cells, of a node towards others that move differently.
+        """Return the largest move in cells of a node towards others that move differently.
 
-        Those are nodes whose displacements (m, d) differ by more than bodies rotate or strain in a
-        step, or that no point sees and fixes hold (nodes, d).
+        Those differ in displacement (m, d) by more than bodies rotate or strain in a step, or are
+        held (nodes, d) without points.
         """
         cells = u / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > FAR)
@@ -259,7 +257,7 @@ class Equations:
         blocks = self.K.data
         blocks[:] = 0
         alone = ~self.deforming[self.pairs[0]] & (self.pairs[0] == self.pairs[1])
-        blocks[alone] = np.eye(d)  # sums of matrices drop blocks of zeros
+        blocks[alone] = np.eye(d)  # sums of matrices drop zero blocks
         into = loops.Blocks(self.layout, blocks.reshape(-1, d * d))
         for k, (block, (seen, response)) in enumerate(zip(self.blocks, self.parts, strict=True)):
             n, done = block.points.mass.size, np.zeros(len(self.nodes), np.int64)
@@ -331,7 +329,7 @@ class Equations:
             ):
                 young, volume = of_laws[:, block.points.material]
                 loops.scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
-            none = np.full(len(sums), np.inf)  # of nodes that see gradients only
+            none = np.full(len(sums), np.inf)  # of nodes with gradients only
             means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
             least = means[lines].min(1, initial=np.inf)
             weights = weights * np.where(np.isfinite(least), least, 0.0) / moduli.mean
@@ -342,9 +340,8 @@ class Equations:
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
         """Second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
-        A linear basis has them across faces between cells, of which one lies at the border (Coombs
-        2023). Splines have no such jumps; the differences hold their nodes at the border all the
-        same.
+        A linear basis has them across faces of border cells (Coombs 2023). Splines have no such
+        jumps, but the differences still hold their border nodes.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)

@@ -34,10 +34,10 @@ class Rest:
 class Motion:
     """Inertia by the Newmark rules and generalized-alpha.
 
-    With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points carry the
-    difference of a and the acceleration of the forces, initially 0. The scheme is stable with what
-    the transfer to the nodes and back takes of it. `before` (m, d) are residual forces at the
-    beginning; `given` and `prescribed` (m, d) mask held components and give their velocities.
+    With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points carry a
+    minus the acceleration of the forces, initially 0: stable with what the transfer to the nodes
+    and back removes. `before` (m, d) are the initial residual forces; `given` and `prescribed` (m,
+    d) mask held components and give their velocities.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Motion:
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
         """Return the work at held nodes, by the mean of their forces (m, d) in the step.
 
-        As the trapezoidal rule adds it to the energy of a linear body.
+        As the trapezoidal rule adds it to a linear body's energy.
         """
         old, new, given = self.v, self.prescribed, self.given
         after = self.mass * self.acceleration(u) - reaction

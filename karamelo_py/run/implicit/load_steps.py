@@ -30,12 +30,12 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 
-HALVINGS = 10  # of a load step, at most
+HALVINGS = 10  # maximum, of a load step
 LONG = 1.0  # cells
 
 
 class PointsWrong(Exception):
-    """A point has left the domain, or has failed."""
+    """A point left the domain, or failed."""
 
 
 class NoEquilibrium(Exception):
@@ -49,10 +49,10 @@ class LoadSteps:
         self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
         self.known: dict[str, np.ndarray] = {}  # of the last equations
-        self.parts = 0  # of the present step that have been done
+        self.parts = 0  # substeps done of the present step
         self.failure = ""  # why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; so far
-        self.seconds: dict[str, float] = {}  # in stages of the steps so far
+        self.seconds: dict[str, float] = {}  # by stage, so far
 
     def advance(self, hooks: Tag, count: int) -> int:
         """Take up to `count` load steps; return the status, as `run_steps` does."""
@@ -108,7 +108,7 @@ class LoadSteps:
                     self.simulation.restore(before)
                 raise
             except Failed as reason:
-                if before is None:  # the user may want to leave the step between parts
+                if before is None:  # the user may end the step between substeps
                     before = self.simulation.snapshot()
                 if fraction <= 2.0**-HALVINGS:
                     if self.scheme.limit == "error":
@@ -118,7 +118,7 @@ class LoadSteps:
                     break
                 fraction /= 2
                 if isinstance(reason, TooFar):
-                    # In as many equal parts as the distance needs.
+                    # As many equal parts as the distance needs.
                     fraction = most = 2 * fraction / min(max(ceil(1.1 * reason.at), 2), 4)
                 continue
             left -= fraction
@@ -173,7 +173,7 @@ class LoadSteps:
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
         """Take a substep, with the loads at its end; return corrections and residual.
 
-        Raises `Failed` if no equilibrium is found; the points have not moved then.
+        Raises `Failed` without equilibrium; the points have not moved then.
         """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
@@ -232,7 +232,7 @@ class LoadSteps:
         simulation.clear_forces()
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
-        # Points with prescribed velocity start one step earlier; here the present value is used.
+        # Points with prescribed velocity start a step earlier; use the present value.
         with simulation.steps.altered(last_dt=0.0):
             if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
                 raise PointsWrong
@@ -244,8 +244,8 @@ class LoadSteps:
     ) -> "Equilibrium":
         """Find the displacements at which forces balance.
 
-        `before` and `after` are the nodal forces of the present stress and the loads at the
-        beginning and the end; `before` is None without inertia.
+        `before` (None without inertia) and `after`: nodal forces of the present stress and the
+        loads at the beginning and the end.
         """
         simulation = self.simulation
         s = simulation.setup
@@ -314,7 +314,7 @@ class LoadSteps:
             raise self._error(trouble.message, trouble.fix, trouble.place)
 
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
-        """Let fixes publish the reactions at the nodes they hold; set nodal velocities.
+        """Let fixes publish the reactions at their nodes; set nodal velocities.
 
         Fixes get the velocity that a node would have without them. Rigid solids take the remaining
         forces.
@@ -406,14 +406,14 @@ class Equilibrium(NamedTuple):
     inertia: Rest | Motion
     pushing: list[Contact | PushingTool]
     u: np.ndarray
-    fixed: np.ndarray  # which components fixes hold
+    fixed: np.ndarray  # components held by fixes
     reaction: np.ndarray
     iterations: int
     residual: float
 
 
 class ImplicitSimulation(Simulation):
-    """Takes load steps, and implicit steps with inertia, on the processor."""
+    """Takes load steps, and implicit steps with inertia, on the CPU."""
 
     repeats_steps = False
     remedy = "smaller load steps (set_dt), or another tolerance, iterations or solver"

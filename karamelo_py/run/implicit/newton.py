@@ -1,4 +1,4 @@
-"""Newton's method for the displacements of the nodes in an implicit step."""
+"""Newton's method for the nodal displacements of an implicit step."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -29,7 +29,7 @@ def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 class Failed(Exception):
-    """Newton's method finds no equilibrium; `at` is a node, a point or a distance."""
+    """No equilibrium found; `at` is a node, a point or a distance."""
 
     def __init__(self, reason: str = "", at: float = 0):
         super().__init__(reason)
@@ -79,7 +79,7 @@ class Newton:
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
-        self.kept: dict = {}  # data of a solver between corrections
+        self.kept: dict = {}  # solver data between corrections
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
 
@@ -93,8 +93,7 @@ class Newton:
         """Return displacements (m, d), the number of corrections and the residual.
 
         `jump` (m, d) has the prescribed components. Raises `Failed` if the iterations do not
-        suffice, and `Broken` if the user has `interrupted` them (called with corrections and
-        residual).
+        suffice, `Broken` if `interrupted` (called with corrections and residual) returns True.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -124,7 +123,7 @@ class Newton:
 
     @property
     def unstable(self) -> bool:
-        """True if the last stiffness is not positive definite, as far as a solver knows."""
+        """True if the solver found the last stiffness not positive definite."""
         return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:

@@ -11,13 +11,13 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import MatrixRankWarning, splu
 
-MANY = 5000  # unknowns above which multigrid is faster than a direct solver
+MANY = 5000  # unknowns above which multigrid beats a direct solver
 MANY_IN_SPACE = 2000
-MANY_ITERATIONS = 25  # of multigrid, above which its hierarchy is rebuilt
+MANY_ITERATIONS = 25  # above which the hierarchy is rebuilt
 
 
 class Singular(Exception):
-    """The equations have no solution: something is not held, or a limit load is reached."""
+    """No solution: something is not held, or a limit load is reached."""
 
 
 class Unconverged(Exception):
@@ -35,7 +35,7 @@ def hold(A: sp.bsr_matrix, held: np.ndarray, more: np.ndarray) -> None:
 
 
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Scale rows and columns such that the diagonal is 1, or by the factors `s` (n,)."""
+    """Scale rows and columns to a diagonal of 1, or by factors `s` (n,)."""
     if A.format == "bsr":
         A = A.tocsr()
         A.eliminate_zeros()  # of decoupled components, which may be many
@@ -52,7 +52,7 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    release(kept)  # before new factors: they take most of the memory
+    release(kept)  # first: factors take most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
@@ -85,9 +85,9 @@ def amg(
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
     `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: the near null space of
-    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final residual, relative
-    to b. The hierarchy, which takes most of the time, is `kept` for later matrices, which differ
-    little, as long as few iterations suffice.
+    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy`: final residual over b. The
+    hierarchy takes most of the time, so similar later matrices use it (`kept`) while few iterations
+    suffice.
     """
     import pyamg
 
@@ -122,7 +122,7 @@ def amg(
 
 
 def is_symmetric(A: sp.spmatrix) -> bool:
-    """Return True if A x = A^T x of a random x, but for rounding."""
+    """Return True if A x = A^T x for a random x, up to rounding."""
     x = np.random.default_rng(0).uniform(0.5, 1.5, A.shape[0])
     return bool(np.linalg.norm(A @ x - A.T @ x) <= 1e-9 * np.linalg.norm(abs(A) @ x))
 
@@ -155,8 +155,7 @@ def solve(
 
 
 def rigid_motions(positions: np.ndarray, free: int) -> np.ndarray:
-    """Return rigid motions (m, d, k) of nodes at `positions` (m, d), which may
-    translate along the directions from `free` on."""
+    """Return rigid motions (m, d, k) of nodes; translations from direction `free` on."""
     m, d = positions.shape
     x = positions - positions.mean(0)
     motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(free, d)]

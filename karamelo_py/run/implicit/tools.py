@@ -13,7 +13,7 @@ NEAR = 1e-6  # cells, over which forces are compared
 
 
 class Displaced:
-    """Points of a view, displaced by (n, d); volume and damage are the old ones."""
+    """Points of a view displaced by (n, d), with old volume and damage."""
 
     def __init__(self, view: PointsView, way: np.ndarray):
         self.view, self.position = view, view.position + way
@@ -44,7 +44,7 @@ class PushingTool:
         self.known = self.force = self.at(self.way)  # included in the forces of the step
 
     def at(self, way: np.ndarray) -> np.ndarray:
-        """Return the forces (n, d) on points displaced by `way` (n, d)."""
+        """Return forces (n, d) on points displaced by `way` (n, d)."""
         return self.fix.forces(Displaced(self.view, way))
 
     def respond(self, u: np.ndarray) -> None:
@@ -64,7 +64,7 @@ class PushingTool:
         return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
-        """Publish the force, and apply the mean that has done the work to the points."""
+        """Publish the force; apply the mean, which has done the work, to the points."""
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.known) / 2
         self.view.write_back()

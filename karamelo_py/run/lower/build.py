@@ -51,15 +51,15 @@ class State(NamedTuple):
     """State of all points after a run, ordered by id; arrays (components, N)."""
 
     count: int  # type: ignore[assignment]  # number of points, N
-    present: np.ndarray  # (N,) bool, False for points that were deleted
+    present: np.ndarray  # (N,) bool, False for deleted points
     places: np.ndarray
     v: np.ndarray
-    laws: dict[tuple, np.ndarray]  # state for each kind of law
-    fields: dict[type, np.ndarray]  # declared fields that are kept
+    laws: dict[tuple, np.ndarray]  # by kind of law
+    fields: dict[type, np.ndarray]  # declared fields to retain
     grids: NamedTuple
     node_fields: dict[type, np.ndarray]  # of the nodes of `grids`, (nodes, components)
     contact: NamedTuple  # contact tag with its memory
-    clock: dict[str, float]  # fields that later steps need
+    clock: dict[str, float]  # that later steps need
 
 
 def check_scene(hub: Hub) -> None:
@@ -89,7 +89,7 @@ def check_scene(hub: Hub) -> None:
     boundary.check(hub)
     if hub.update.scheme.traits.implicit:
         implicit.check(hub)
-    # Points of rigid bodies would have domains that deform.
+    # Domains of rigid points would deform.
     basis = type(method.basis)
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
@@ -123,7 +123,7 @@ def lower(
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
     """Make the arrays of a run from the scene, and continue the state of earlier points.
 
-    With `ids` (first, end), only of those points; with the tiles of a process of `comm`.
+    With `ids` (first, end): only those points, with the tiles of a process of `comm`.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -225,7 +225,7 @@ def resume_nodes(nodes: arrays.Nodes, grids: NamedTuple, previous: State) -> Non
 
 
 def part_of(solid: Solid, first: int, end: int) -> Solid:
-    """Return a copy of a solid with only the points whose ids are in [first, end)."""
+    """Return a copy of a solid with the points of ids [first, end)."""
     begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
     other = copy.copy(solid)
     for name, value in vars(solid).items():
@@ -258,7 +258,7 @@ def lower_points(
     def joined(values: Iterable, dtype: type) -> np.ndarray:
         """Join a number or column per solid, or a value per point: (n,) or (k, n).
 
-        No further array of the length of all points is made.
+        Makes no further array as long as all points.
         """
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):

@@ -1,4 +1,4 @@
-"""Scenes on a GPU: choice of the card, refusals, and memory."""
+"""Scenes on a GPU: choice of the card, refusals, memory."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
             hint=f"an explicit scheme (musl, usf, usl, usavg), or {WITHOUT}",
         )
         return
-    from karamelo_py.run.gpu import Card  # registers the rows that it takes
+    from karamelo_py.run.gpu import Card  # registers its rows
 
     rows = scheme.rows if setup is None else table.plain(scheme.rows, setup)
     for kind in untaken(rows, Card):

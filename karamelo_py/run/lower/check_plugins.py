@@ -1,4 +1,4 @@
-"""Trial calls of plug-in parts on some points, in plain Python, before kernels are compiled."""
+"""Trial calls of plug-in parts on some points in plain Python, before compilation."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -27,7 +27,7 @@ from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
 STRAINS = (0, 1e-3, 0.05)  # the last beyond yield of metals
-TRIED = 8  # points, at least, if the scene has enough
+TRIED = 8  # minimum points, if the scene has enough
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
@@ -111,7 +111,7 @@ def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
         except ArithmeticError:
             return
         except ValueError as error:
-            if str(error) != "math domain error":  # what is returned has another shape
+            if str(error) != "math domain error":  # the returned value has another shape
                 raise
 
 

@@ -1,4 +1,4 @@
-"""Hooks of the fixes: compiled ones as tables for kernels, and those in Python."""
+"""Hooks of the fixes: tables of compiled ones for kernels, and those in Python."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
@@ -31,7 +31,7 @@ NO_PROGRAM = (-1, -1, -1, -1)
 def lower_hooks(
     hub: Hub, fixes: list, mode: Tag = None, threads: int = 1
 ) -> arrays.Hooks | arrays.NoHooks:
-    """Make the tables of the compiled hooks of fixes, in their order."""
+    """Make the tables of compiled fix hooks, in their order."""
     dimension = hub.domain.dimension
     builder = _Builder(hub, sum(s.count for s in hub.solids.values()))
     for fix, name, hook in compiled_hooks(fixes):
@@ -79,25 +79,25 @@ class _Builder:
     def __init__(self, hub: Hub, points: int):
         self.hub = hub
         self.points = points
-        self.uses_first = False  # places of points before the first step
+        self.uses_first = False  # positions before the first step
         self.rows: list[tuple] = []
         self.programs: list[list[tuple]] = []
         self.members: list[np.ndarray] = []
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
         self.holding: list[Fix] = []
-        self.loaded_nodes = 0  # the number of nodes, where hooks bring forces
+        self.loaded_nodes = 0  # the number of nodes, if hooks bring forces
         method = hub.update.method
         self.told = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         laws = (solid.material.law for solid in hub.solids.values())
         self.rigid = any(can(law, constrained_velocity) for law in laws)
-        self.whole: list[Tag] = []  # tags of hooks on whole points
+        self.whole: list[Tag] = []  # of hooks on whole points
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
         slot = -1
         if hook.publishes and fix.published:
-            # Components lie one after another, from x on; a total without direction is separate.
+            # Components are contiguous from x on; a total without direction is separate.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         if hook.tag is not None:
@@ -194,7 +194,7 @@ class ActingFixes:
         return called.CalledHooks(self.compiled, address_of_python(act, called.CALL))
 
     def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
-        """Call Python hooks of a stage on a setup: of all processes if they need all points."""
+        """Call Python hooks of a stage, on the setup of all processes if they need all points."""
         if stage not in self.in_python:
             return
         if all(fix.point_by_point for fix, _ in self.in_python[stage]):
@@ -241,7 +241,7 @@ def _on_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
 
 
 def _on_heat_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
-    # A temperature is to a capacity what a velocity is to a mass: the same view shows it.
+    # Temperature is to capacity as velocity to mass: the same view shows it.
     nodes = s.heat.nodes._replace(fields=s.nodes.fields)
     _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 

@@ -1,6 +1,6 @@
-"""Memory of a scene, or of a process's part of it; scenes that do not fit are refused.
+"""Memory of a scene or a process's part of it; scenes that do not fit are refused.
 
-Only the least that a run needs is compared: nothing that would run is refused.
+Only the minimum that a run needs is compared, so nothing that would run is refused.
 """
 
 import gc
@@ -27,12 +27,12 @@ THERE = 1  # bytes per point of the whole scene, in `present`
 
 class MemoryTaken(NamedTuple):
     touched: int
-    copied: int  # of the last good state, with present positions only
-    known: int  # to each process, of the whole scene
+    copied: int  # of the last good state, present positions only
+    known: int  # of the whole scene, to each process
 
 
 def memory_of(simulation: Backend, s: arrays.Setup, boxes: int) -> MemoryTaken:
-    """Return the memory of the points in the tiles of `s`, nodes in use, and `boxes` bytes."""
+    """Return the memory of the points in the tiles of `s`, used nodes, and `boxes` bytes."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
@@ -66,7 +66,7 @@ def _held(item: object, seen: set[int]) -> int:
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
     """Return the bytes of array rows in ascending spans (k, 2).
 
-    For large arrays Linux uses pages of 2 MiB, which include what lies between the nodes in use.
+    For large arrays Linux uses pages of 2 MiB, which include gaps between used nodes.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row

@@ -50,8 +50,8 @@ def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTup
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """Yield the direction of walls, and the cells (n, d) above them.
 
-    A face of a cell is a wall if its nodes are held, but not within a block of held nodes, where
-    the next faces on both sides are held, too. At the ends of the grid there are walls anyway.
+    A face is a wall if its nodes are held, except within a block of held nodes, where the next
+    faces on both sides are held, too. The ends of the grid are walls anyway.
     """
     d = lattice.dimension
     places = lattice.places(nodes)[:, :d]

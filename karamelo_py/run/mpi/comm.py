@@ -27,13 +27,13 @@ LAUNCHED = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
-# Ctrl-C; batch systems, kill; a terminal that is closed (which Windows does not tell).
+# Ctrl-C; batch systems and kill; a closed terminal (not reported on Windows).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 # Answers of processes besides step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
 RankArray = tuple[int, np.ndarray]
-PAUSE = 0.005  # seconds between two checks for the others
+PAUSE = 0.005  # seconds between checks for the other processes
 
 
 @contextmanager
@@ -44,7 +44,7 @@ def handled_signals(
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    # The program may be meant to continue when the terminal is closed (nohup).
+    # Ignored if the program shall outlive the terminal (nohup).
     heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
     for number in heeded:
         signal.signal(number, handler)
@@ -82,11 +82,11 @@ class MpiComm(SerialComm):
                 hint=INSTALL,
             ) from None
         self.mpi = MPI
-        # Its messages may be longer than 2 GB.
+        # Its messages may exceed 2 GB.
         self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
-        self._aside = world.Dup()  # for agreement, independent of other messages
-        self._between = world.Dup()  # for messages within steps
+        self._aside = world.Dup()  # agreement, independent of other messages
+        self._between = world.Dup()  # messages within steps
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
         self.beside = self.allgather(mine).count(mine)

@@ -1,4 +1,4 @@
-"""Tiles divided among processes, and what these send each other.
+"""Tiles divided among processes, and the messages between these.
 
 Each process has the points of neighbouring tiles. Nodes in reach of several processes are summed by
 each of them, from the same boxes in the same order.
@@ -36,8 +36,8 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
     on multiprocessors", IEEE Transactions on Computers C-36, 570-580. A layer of tiles whose work
     must be divided is cut across the next longest direction. `places` (T, d) are lower corners,
-    `work` (T,) integers; tiles without work fill the parts. The last direction must be `rows` times
-    as long as the others to be cut.
+    `work` (T,) integers; tiles without work fill the parts. The last direction is cut only if
+    `rows` times as long as the others.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -61,16 +61,16 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     return part
 
 
-IMBALANCE = 1.1  # largest work over its value after repartitioning, if that is worth it
-# Times longer than across, from which on bodies are cut along long tiles: to go through rows of
-# nodes with gaps between them takes twice as long, and longer than to pass on more nodes.
+IMBALANCE = 1.1  # repartitioning must lower the largest work by this factor
+# Times longer than across, from which on bodies are cut along long tiles: passing through rows of
+# nodes with gaps takes twice as long, and longer than sending more nodes.
 ROWS = 4
-OF_TILES = ("number", "range", "grid", "box", "rows")  # arrays of a tiling with a row per tile
+OF_TILES = ("number", "range", "grid", "box", "rows")  # with a row per tile
 FINE = 1000  # integer work per unit of cost
 
 
 class Needs(NamedTuple):
-    """Nodes in use of a process: boxes of them at k tiles of nodes."""
+    """Used nodes of a process: boxes of them at k tiles of nodes."""
 
     place: np.ndarray  # (k,) ascending
     lo: np.ndarray  # (k, d)
@@ -105,7 +105,7 @@ class SharedTiles(Tiles):
             ]
         )
         self.owner = np.zeros(self.count, np.int64)
-        # Memory of the points by block and field, and what is free by shape and type.
+        # Memory of the points by block and field; free memory by shape and type.
         self._rooms: dict[tuple[int, str], np.ndarray] = {}
         self._spare: dict[tuple, np.ndarray] = {}
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
@@ -113,7 +113,7 @@ class SharedTiles(Tiles):
         self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
         self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
-        self._from = np.empty(0, np.int64)  # ranks of the boxes of others
+        self._from = np.empty(0, np.int64)  # ranks of other processes' boxes
 
     def share_out(self, work: np.ndarray) -> None:
         if not self.direct:
@@ -155,7 +155,7 @@ class SharedTiles(Tiles):
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
-                # Contiguous, unlike what a mask gives.
+                # Contiguous, unlike a masked array.
                 [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
                 for block, to in zip(s.blocks, owners, strict=True)
             ]
@@ -198,7 +198,7 @@ class SharedTiles(Tiles):
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     def _boxes(self, s: Setup) -> Boxes:
-        """Return the own boxes, then boxes of others that may contain the same nodes."""
+        """Return the own boxes, then others' that may contain the same nodes."""
         local, me = self.own_boxes(s), self.comm.rank
         self._looks_beyond = beyond(s.contact) > 0
         of_all = {me: local, **dict(enumerate(self.comm.allgather(local)))}
@@ -249,7 +249,7 @@ class SharedTiles(Tiles):
         return tile % int(self._first_of_nodes[1]) if self.one_place else tile
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """Find what own boxes reach, and add the parts of others' boxes at nodes in use here."""
+        """Find what own boxes reach; add the parts of others' boxes at nodes used here."""
         _, reached = super()._reached(boxes)
         of, place = self._of[reached.box], self._place(reached.tile)
         me = self.comm.rank
@@ -313,7 +313,7 @@ class SharedTiles(Tiles):
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        # The first process with a node in use counts it.
+        # The first process that uses a node counts it.
         self.foreign[self._marked] = 0
         nodes, me = [self._marked[:0]], self.comm.rank
         if self._looks_beyond:
@@ -327,7 +327,7 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the `nodes` that other processes count: the first that has them."""
+        """Return the `nodes` counted by other processes: by the first that uses them."""
         count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
         place = nodes % count
         for rank, boxes in sorted(self._inner.items()):
@@ -338,7 +338,7 @@ class SharedTiles(Tiles):
         return nodes
 
     def give(self, s: Setup, number: int, kinds: int) -> None:
-        """Begin to exchange the contributions of tiles to nodes of other processes."""
+        """Begin to exchange the contributions of tiles to other processes' nodes."""
         link = self._links.get((number, kinds))
         if link is None:
             of = next(one for one in buffers_of(s) if one.number == number)

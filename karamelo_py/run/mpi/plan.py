@@ -1,4 +1,4 @@
-"""The division of a scene among processes, predicted by one: memory and messages per step."""
+"""The division of a scene among processes, predicted by one: memory, messages per step."""
 
 from typing import NamedTuple
 
@@ -17,21 +17,21 @@ from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
 
-MAY_CHANGE = 1.25  # largest number of points over the mean that is acceptable
+MAY_CHANGE = 1.25  # acceptable largest number of points over the mean
 
 
 class ProcessShare(NamedTuple):
     points: int
-    tiles: int  # of points, that are occupied
+    tiles: int  # occupied tiles of points
     nodes: int  # in use
     others: int  # to which it sends
     given: int  # bytes sent per step
-    memory: int  # bytes touched in steps, and of a copy of its last good state
-    known: int  # of these, of data about the whole scene
+    memory: int  # bytes touched in steps, and of a copy of the last good state
+    known: int  # of these, data about the whole scene
 
 
 class _Sums(NamedTuple):
-    """Sweeps nothing, and notes which arrays of the nodes a step sums."""
+    """Instead of sweeping, note which nodal arrays a step sums."""
 
     found: list
 

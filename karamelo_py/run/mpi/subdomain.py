@@ -20,16 +20,16 @@ from karamelo_py.run.mpi import partition
 from karamelo_py.run.mpi.whole import Whole
 from karamelo_py.scene.comm import SerialComm
 
-LEARN_EVERY = 100  # steps between two checks of the balance
+LEARN_EVERY = 100  # steps between checks of the balance
 
 
 class Load:
-    """Time in sweeps over the points of each block, and in everything else but waiting."""
+    """Time in sweeps over each block's points, and in everything else but waiting."""
 
     def __init__(self, blocks: int):
         # Per step: of a point of each block, and of a node in reach of a tile.
         self.costs = np.append(np.ones(blocks), 0.0)
-        self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds, and points times steps
+        self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds; points times steps
         self._rest = self._at = blocks
         self._since: int | None = None
 
@@ -168,7 +168,7 @@ class Subdomain(WholeDomain):
         return self.load.costs
 
     def rebalance(self) -> None:
-        """Hand over whole tiles if that is due: points may never be sorted again."""
+        """Hand over whole tiles if due: points may never be sorted again."""
         simulation, tiles = self.simulation, self.tiles
         s = simulation.setup
         clock = s.control.clock[0]

@@ -21,7 +21,7 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """A fix in Python has moved points to other processes: begin the step anew."""
+    """A Python fix moved points to other processes: begin the step again."""
 
 
 class Whole:
@@ -38,7 +38,7 @@ class Whole:
     def act(self, function: Callable[[Setup], None]) -> None:
         """Call a function of the whole on the first process; all take over its changes.
 
-        If points were moved, the step must begin anew (`PointsMoved`).
+        If it moved points, the step must begin again (`PointsMoved`).
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
