@@ -5,12 +5,15 @@ import re
 import signal
 from pathlib import Path
 
+import h5py
 import meshio
 import numpy as np
 import pytest
 from hubs import SmallHub
+from scipy.io import netcdf_file
 
 from karamelo_py.scene.meshes.by_gmsh import begin
+from karamelo_py.scene.meshes.elements import _MIDDLES as MIDDLES
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.script.errors import ScriptError
@@ -332,3 +335,125 @@ def test_a_line_that_is_cut_ends_in_a_message(tmp_path):
     (tmp_path / "a.bdf").write_text("BEGIN BULK\nGRID,1\n")
     with pytest.raises(ScriptError):
         volume(tmp_path / "a.bdf", 3)
+
+
+NODES = np.array([[x, y, 0] for y in (0, 1) for x in (0, 1, 2)], float)
+PAIR = [("quad", np.array([[0, 1, 4, 3], [1, 2, 5, 4]]))]
+SU2 = (
+    "NDIME= 2\nNELEM= 2\n9 0 1 4 3 0\n9 1 2 5 4 1\nNPOIN= 6\n"
+    + "".join(f"{x:g} {y:g} {k}\n" for k, (x, y, _) in enumerate(NODES))
+    + "NMARK= 2\nMARKER_TAG= low\nMARKER_ELEMS= 2\n3 0 1\n3 1 2\n"
+    "MARKER_TAG= left\nMARKER_ELEMS= 1\n3 0 3\n"
+)
+
+
+def lines(path, group):
+    """Number of lines in a group on the boundary."""
+    (part,) = elements_of(read(path, 2), 2, group, lower=True)
+    assert part.shape.name == "line"
+    return len(part.corners)
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "group"),
+    [
+        ("a.vtu", "mat_id", "mat_id:4"), ("a.vtk", "mat_id", "4"), ("a.xdmf", "mat_id", "4"),
+        ("a.mesh", "medit:ref", "4"), ("a.bdf", "nastran:ref", "4"), ("a.avs", "mat", "4"),
+        ("a.med", "cell_tags", "4"),
+    ],
+)  # fmt: skip
+def test_groups_by_number(name, key, group, tmp_path):
+    """Of two squares with the numbers 3 and 4, in cell data, references and properties."""
+    path = tmp_path / name
+    meshio.write(path, meshio.Mesh(NODES, PAIR, cell_data={key: [np.array([3, 4])]}))
+    for chosen, area in ((None, 2), (group, 1)):
+        assert volume(path, 2, chosen) == pytest.approx(area, rel=1e-14)
+    with pytest.raises(ScriptError) as caught:
+        volume(path, 2, "5")
+    assert "3, 4" in caught.value.expected
+
+
+def test_markers_of_su2_have_names(tmp_path):
+    (tmp_path / "a.su2").write_text(SU2)
+    assert volume(tmp_path / "a.su2", 2) == 2
+    assert [lines(tmp_path / "a.su2", group) for group in ("low", "left", "1")] == [2, 1, 2]
+
+
+def test_a_column_of_numbers_is_one_array(tmp_path):
+    """As in VTK's old format: SCALARS of one component."""
+    data = {"mat": [np.array([[3], [4]], np.int32)]}
+    meshio.write(tmp_path / "a.vtk", meshio.Mesh(NODES, PAIR, cell_data=data))
+    assert volume(tmp_path / "a.vtk", 2, "mat:3") == 1
+
+
+def exodus(path, blocks, points, more):
+    """Write netCDF-3 (.e), or the same variables as HDF5 (.exo), as netCDF-4 does."""
+    words = {name: np.array(of, "S9").view("S1").reshape(len(of), -1) for name, of in more.items()
+             if name.endswith("names")}  # fmt: skip
+    arrays = {f"coord{axis}": points[:, k] for k, axis in enumerate("xyz")} | more | words
+    connect = {f"connect{k + 1}": np.array(of) + 1 for k, (_, of) in enumerate(blocks)}
+    kinds = {f"connect{k + 1}": kind for k, (kind, _) in enumerate(blocks)}
+    opened = netcdf_file(path, "w") if path.suffix == ".e" else h5py.File(path, "w")
+    with opened as file:
+        for name, array in (arrays | connect).items():
+            array = np.asarray(array)
+            if isinstance(file, h5py.File):
+                file[name] = array
+                file[name].attrs["elem_type"] = kinds.get(name, "")
+                continue
+            of = array.astype(np.int32) if array.dtype.kind == "i" else array
+            sizes = [f"{name}_{k}" for k in range(of.ndim)]
+            for size, count in zip(sizes, of.shape, strict=True):
+                file.createDimension(size, count)
+            variable = file.createVariable(name, of.dtype, sizes)
+            variable[:] = of
+            variable.elem_type = kinds.get(name, "")
+
+
+@pytest.mark.parametrize("name", ["a.e", "a.exo"])
+def test_blocks_and_sets_of_exodus(name, tmp_path):
+    x = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1, 2)], float)
+    one = [0, 1, 4, 3, 6, 7, 10, 9]
+    blocks = [("HEX8", [one]), ("HEX8", [[k + 1 for k in one]])]
+    more = {
+        "eb_prop1": [10, 20], "eb_names": ["left", "right"], "ss_prop1": [5],
+        "ss_names": ["bottom"], "elem_ss1": [1, 2], "side_ss1": [5, 5], "ns_prop1": [7],
+        "ns_names": ["base"], "node_ns1": [1, 2, 4, 5],
+    }  # fmt: skip
+    exodus(tmp_path / name, blocks, x, more)
+    for group, right in ((None, 2), ("left", 1), ("20", 1)):
+        assert volume(tmp_path / name, 3, group) == pytest.approx(right, rel=1e-14)
+    hub = SmallHub(3, -1, 3, 0.25)
+    for group, right in (("bottom", 2), ("5", 2), ("base", 1), ("7", 1)):
+        region = MeshRegion(hub, tmp_path / name, group)
+        inside = region.inside(np.array([[0.5, 0.5, 0], [1.5, 0.5, 0], [0.5, 0.5, 1]]))
+        assert inside.tolist() == [True, right == 2, False]
+
+
+@pytest.mark.parametrize(
+    ("kind", "family", "order"),
+    [
+        ("HEX20", "hexahedron20", [*range(12), *range(16, 20), *range(12, 16)]),
+        ("WEDGE15", "wedge15", [*range(9), *range(12, 15), *range(9, 12)]),
+    ],
+)
+def test_edges_of_exodus_are_in_their_order(kind, family, order, tmp_path):
+    """Straight edges have their nodes in the middle: others would change the volume."""
+    shape = SHAPES[family.rstrip("0123456789")]
+    corners = np.array(shape.corners, float)
+    middles = [corners[list(of)].mean(axis=0) for of in MIDDLES[shape.name] if len(of) == 2]
+    x = np.concatenate([corners, middles])
+    straight = np.arange(len(corners))
+    exodus(tmp_path / "a.e", [(kind, [order])], x, {})
+    solid, whole, _ = measured(elements_of(read(tmp_path / "a.e", 3), 3)[0])
+    assert whole[0] == pytest.approx({"hexahedron": 8, "wedge": 1}[shape.name], rel=1e-12)
+    assert solid.bulge < 1e-12 and len(straight) == solid.corners.shape[1]
+
+
+def test_gmsh_entities_are_groups_where_there_are_no_others(tmp_path):
+    """Two squares of two entities; none of them in a physical group."""
+    text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n6\n"
+    text += "".join(f"{k + 1} {x:g} {y:g} 0\n" for k, (x, y, _) in enumerate(NODES))
+    text += "$EndNodes\n$Elements\n2\n1 3 2 0 8 1 2 5 4\n2 3 2 0 9 2 3 6 5\n$EndElements\n"
+    (tmp_path / "a.msh").write_text(text)
+    assert [volume(tmp_path / "a.msh", 2, group) for group in (None, "8", "9")] == [2, 1, 1]

@@ -1,5 +1,6 @@
 """Region styles mesh and stl, solid style mesh: shapes from mesh files."""
 
+from collections import Counter
 from typing import Annotated, Literal
 
 import numpy as np
@@ -89,12 +90,14 @@ class MeshRegion(Enclosed):
     Parameters
     ----------
     file
-        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), MED, Nastran, VTK and any other
-        format that meshio reads; or of a geometry (.geo, .step, .brep), which Gmsh meshes.
+        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), Exodus (.e), MED, Nastran,
+        CGNS, VTK and any other format that meshio reads; or of a geometry (.geo, .step, .brep),
+        which Gmsh meshes.
     group
-        Name or number of a physical group (a set of elements, an instance or a surface in other
-        formats). Default: the whole mesh. A group of lower dimension, such as a boundary, contains
-        the positions on it, for groups of nodes.
+        Name or number of a physical group; in other formats a set, an instance, a block, a property
+        or a surface, and ``name:number`` for numbers of cells in VTK. Default: the whole mesh. A
+        group of lower dimension, such as a boundary, contains the positions on it, for groups of
+        nodes.
     exterior
         The word ``exterior`` selects everything outside.
 
@@ -275,8 +278,11 @@ class MeshSolid(Solid):
 
     def _tell_of_left_out(self, hub: Hub, mesh: Mesh) -> None:
         highest = max(cells.dimension for cells in mesh.cells)
-        shells = {c.label: len(c.nodes) for c in mesh.cells if c.label and c.dimension < highest}
-        counts = ", ".join(f"{n} {kind}" for kind, n in (mesh.left_out | shells).items())
+        left_out = Counter(mesh.left_out)
+        for cells in mesh.cells:
+            if cells.label and cells.dimension < highest:
+                left_out[cells.label] += len(cells.nodes)
+        counts = ", ".join(f"{n} {kind}" for kind, n in left_out.items())
         if counts:
             hub.warn(f"elements of {self.file.name} that no solid has are left out: {counts}")
 

@@ -150,15 +150,17 @@ def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None 
     names = dict(of_file.names) if of_file else {}
     for dim, number in gmsh.model.getPhysicalGroups():
         names.setdefault((dim, number), gmsh.model.getPhysicalName(dim, number).strip())
+    entities = {} if names else dict.fromkeys(gmsh.model.getEntities(), "")
+    names |= entities  # such as the properties of Nastran
     # By element type: nodes, and groups (-1: none).
     by_kind: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for dim, tag in gmsh.model.getEntities():
-        numbers = gmsh.model.getPhysicalGroupsForEntity(dim, tag)
+        numbers = [tag] if entities else gmsh.model.getPhysicalGroupsForEntity(dim, tag)
         if only_groups and not len(numbers):
             continue
         for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
             count = gmsh.model.mesh.getElementProperties(kind)[3]
-            if of_file and of_file.groups is not None:
+            if not entities and of_file and of_file.groups is not None:
                 groups = np.array([[of_file.groups.get(int(n), -1)] for n in elements])
             else:
                 groups = np.tile(np.append(numbers, -1).astype(int), (len(elements), 1))

@@ -63,7 +63,9 @@ class Mesh(NamedTuple):
             # no dimension in front.
             once = [name for name in names if name.rpartition(":")[2] not in {*names} - {name}]
             named = [name for name in once if not name.isdigit()] or once
-            raise unknown(message, group, named, argument="group")
+            error = unknown(message, group, named, argument="group")
+            error.expected = error.expected if named else "no group: the whole mesh"
+            raise error
         masks = self.sets.get(name) or [self.node_sets[name]]
         if not any(mask.any() for mask in masks):
             filled = [n for n, masks in self.sets.items() if any(mask.any() for mask in masks)]

@@ -18,16 +18,18 @@ from karamelo_py.language.kinds import InputFile
 from karamelo_py.scene.meshes.abaqus import read_deck
 from karamelo_py.scene.meshes.by_gmsh import NoGmsh, alone, mesh_geometry, read_by_gmsh
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
+from karamelo_py.scene.meshes.exodus import ENDINGS as EXODUS
+from karamelo_py.scene.meshes.exodus import read_exodus
 from karamelo_py.scene.meshes.geometry import refuse_commands
 from karamelo_py.scene.meshes.obj import read_obj
 from karamelo_py.script.errors import FAILURES, ScriptError
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-_BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas")
+_BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas", ".cgns")
 # Other text is Gmsh's geometry language to Gmsh.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
-_BY_ENDING = (".unv", ".bdf", ".nas")  # recognised by ending
+_BY_ENDING = (".unv", ".bdf", ".nas", ".cgns")  # recognised by ending
 _MED = b"\x89HDF"
 # Other programs' files with endings of meshes: first bytes, and advice.
 _FOREIGN = (
@@ -43,7 +45,7 @@ _FOREIGN = (
 class MeshFile(InputFile):
     """Annotation: a file that `read` can read, by its ending."""
 
-    endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH} - {".svg"}
+    endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH, *EXODUS} - {".svg"}
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
@@ -115,6 +117,11 @@ def _by_content(path: Path) -> Mesh:
         return _by_meshio(path, "avsucd")
     if ending == ".obj":
         return read_obj(path)
+    if ending in EXODUS:
+        try:
+            return read_exodus(path)
+        except FAILURES as error:
+            raise _unreadable(path, _reason(error)) from None
     if ending in (".bdf", ".nas"):
         _refuse_systems(path)
     why = None
@@ -176,7 +183,19 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     cells = [CellBlock(block.type, np.asarray(block.data)) for block in mesh.cells]
-    return Mesh(points, cells, dict(_sets_of(mesh)), {}, {})
+    sets = dict(_sets_of(mesh))
+    if path.suffix.lower() == ".su2":
+        sets |= _markers(path, sets)
+    return Mesh(points, cells, sets, {}, {})
+
+
+def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
+    """Return the sets of SU2's markers by name: meshio counts those whose names are words."""
+    number, named = 0, {}
+    for name in re.findall(r"^MARKER_TAG *= *(\S+)", path.read_text("latin-1"), re.M):
+        number = int(name) if name.isdigit() else number + 1
+        named[name] = sets.get(str(number), [])
+    return named
 
 
 def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
@@ -191,9 +210,9 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
                 ],
             )
     tags = {
-        name: [np.asarray(array) for array in arrays]
+        name: [np.asarray(array).reshape(-1) for array in arrays]
         for name, arrays in mesh.cell_data.items()
-        if all(np.ndim(a) == 1 and np.issubdtype(np.asarray(a).dtype, np.integer) for a in arrays)
+        if all(np.size(a) == len(a) and np.asarray(a).dtype.kind in "iu" for a in arrays)
         and name != "gmsh:geometrical"
     }
     for name, arrays in tags.items():
