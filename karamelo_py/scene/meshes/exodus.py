@@ -59,7 +59,7 @@ class _File:
         ]
 
     def each(self, begin: str) -> list[np.ndarray]:
-        found = []
+        found: list[np.ndarray] = []
         while (array := self.arrays.get(f"{begin}{len(found) + 1}")) is not None:
             found.append(np.asarray(array, np.int64))
         return found
