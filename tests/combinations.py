@@ -17,7 +17,8 @@ TRANSFERS = {
     "XPIC": "XPIC, {basis}, 3",
 }
 SCHEMES = ("musl", "usl", "usf", "usavg")
-KINEMATICS = ("line", "plane", "axisymmetric", "space")
+KINEMATICS = ("line", "plane", "axisymmetric", "spherical", "space")
+ROUND = ("axisymmetric", "cylindrical", "spherical")  # masses grow with the radius
 PRODUCTS = ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp")
 DOMAINS = ("R4", "Q4", "T3", "R8", "H8", "Tet4")
 # Method, basis and option: everything that says which nodes a point sees.
@@ -40,7 +41,7 @@ def fits(kinematics: str, option: str) -> bool:
 
 def dimension(kinematics: str) -> int:
     """Number of directions."""
-    return {"line": 1, "plane": 2, "axisymmetric": 2, "space": 3}[kinematics]
+    return {"plane": 2, "axisymmetric": 2, "space": 3}.get(kinematics, 1)
 
 
 def refused(kind: str, basis: str, option: str, transfer: str, scheme: str) -> str:
@@ -75,7 +76,7 @@ def scene(
     centre = LO + SIDE / 2
     velocities = []
     for k, axis in enumerate("xyz"[:d]):
-        if kinematics == "axisymmetric":  # masses grow with the radius
+        if kinematics in ROUND:
             velocities.append(("0.5*x0", str(SPEED[1]))[k])
         else:
             velocities.append(f"{SPEED[k]} + 0.5*({axis}0 - {centre})")
@@ -85,8 +86,8 @@ def scene(
         f"scheme({scheme})",
         f"dimension({d}, {', '.join(['0, 0.5'] * d)}, {SIDE})",
     ]
-    if kinematics == "axisymmetric":
-        lines.append("axisymmetric(true)")
+    if kinematics in ROUND:
+        lines.append(f"{kinematics}(true)")
     lines.append(f"material(rubber, {law}, 2, 100, 0.3)")
     if mesh is not None:
         lines.append(f'solid(body, mesh, "{mesh}", rubber, {SIDE}, 0)')

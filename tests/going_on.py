@@ -277,6 +277,12 @@ SCENES = {
     "groups": block(2, GROUPS, "run(7)", size=SIZE),
     "functions in Python": block(2, PYTHON, "run(5)", size=SIZE),
     "bench": block(3, BENCH, size=(0.2, 0.1, 0.1)),
+    "sphere": block(
+        1, "fix(v, initial_velocity_particles, all, 3*sin(9*x0))",
+        "fix(p, edge_pressure, all, box, 9)",
+        "dump(d, all, particle, 2, d.*.txt, x, s11, s22, s33, volume)", "set_output(1)",
+        "log_modify(custom, step, dt, time, p_x)", "run(6)",
+    ).replace("region(box", "spherical(true)\nregion(box"),
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(6)"),
     "fluids": FLUIDS,
 }  # fmt: skip

@@ -63,6 +63,8 @@ OWN = {
     "axisymmetric": AXIS,
     "axisymmetric MLS": _method(AXIS, "ulmpm, MLS, quadratic-spline"),
     "axisymmetric total": _method(AXIS, "tlmpm, APIC, linear"),
+    "sphere MLS": _block(1, transfer="MLS", scheme="usl").replace(
+        "region(box", "spherical(true)\nregion(box"),
     "total APIC": _method(_block(2), "tlmpm, APIC, linear"),
     "total TPIC 3D": _method(_block(3), "tlmpm, TPIC, quadratic-spline"),
     "total bernstein": _method(_block(2), "tlmpm, FLIP, Bernstein-quadratic, 0.99"),

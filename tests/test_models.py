@@ -1,4 +1,4 @@
-"""The same body by axisymmetric, quarter and full models (inputs/models)."""
+"""The same body by 1D, axisymmetric, quarter and full models (inputs/models)."""
 
 import pytest
 from conftest import INPUTS
@@ -12,12 +12,29 @@ def last(run, script, column, model, *words):
     return result.log[column][-1]
 
 
-def test_a_ring_by_two_models(run_script):
+def test_a_ring_by_three_models(run_script, run_interpreted):
     """Lame 1852. On four cells the plane of radius and axis errs by less than 1 % of the
-    displacement, the ring in the plane, whose inner surface is a staircase, by a fifth."""
+    displacement, the ring in the plane, whose inner surface is a staircase, by a fifth. The line
+    has the same error as the plane of radius and axis, to the digits of the log."""
     words = ("-var", "refine", "0.5")
-    assert last(run_script, "lame", "err", "axisymmetric", *words) < 0.01
+    error = last(run_script, "lame", "err", "axisymmetric", *words)
+    assert error < 0.01
+    line = last(run_interpreted, "lame", "err", "cylindrical", *words)
+    assert line == pytest.approx(error, rel=1e-8)
     assert 0.1 < last(run_script, "lame", "err", "quarter", *words) < 0.25
+
+
+def test_a_shell_on_a_line(run_interpreted):
+    """Lame 1852, on four cells. The staircases of the other models err by ten times as much."""
+    assert last(run_interpreted, "shell", "err", "spherical", "-var", "refine", "0.5") < 0.025
+
+
+@pytest.mark.full
+def test_a_shell_by_three_models(run_script):
+    """Eight cells: the line errs by 0.6 %, the plane and an eighth of the shell by a fifth."""
+    models = ("spherical", "axisymmetric", "eighth")
+    line, plane, eighth = (last(run_script, "shell", "err", model) for model in models)
+    assert line < 0.006 and 0.15 < eighth < plane < 0.22
 
 
 @pytest.mark.full

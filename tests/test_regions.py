@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from meshed import grid_mesh, sphere_surface, write
 
 from karamelo_py.commands import domain as commands
+from karamelo_py.commands import revolution
 from karamelo_py.kernels import surfaces
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.domain import Domain
@@ -159,15 +160,15 @@ def test_the_domain_comes_once():
 
 def test_axisymmetric():
     hub = SmallHub()
-    commands.axisymmetric(hub, False)
+    revolution.axisymmetric(hub, False)
     assert not hub.domain.kin.hoops
     with pytest.raises(ScriptError, match="x is a radius"):
-        commands.axisymmetric(hub, True)
+        revolution.axisymmetric(hub, True)
     hub = SmallHub(2, 0, 1, 0.1)
-    commands.axisymmetric(hub, True)
+    revolution.axisymmetric(hub, True)
     assert hub.domain.kin.hoops
     with pytest.raises(ScriptError, match="two dimensions"):
-        commands.axisymmetric(SmallHub(3, 0, 1, 0.1), True)
+        revolution.axisymmetric(SmallHub(3, 0, 1, 0.1), True)
 
 
 def test_regions_need_a_domain():

@@ -44,6 +44,8 @@ CALLS = {
     "plane_stress": (BARE, "create_domain(0, 1, 0, 1)\nplane_stress(false)"),
     "uniaxial_stress": (BARE, "dimension(1, 0, 1, 0.1)\nuniaxial_stress(false)"),
     "axisymmetric": (BARE, "create_domain(0, 1, 0, 1)\naxisymmetric(true)"),
+    "cylindrical": (BARE, "dimension(1, 0, 1, 0.1)\ncylindrical(true)"),
+    "spherical": (BARE, "dimension(1, 0, 1, 0.1)\nspherical(true)"),
     "boundary": (SCENE, "boundary(delete)"),
     "compute": (SCENE, "compute(Es, strain_energy, all)"),
     "create_domain": (BARE, "create_domain(0, 1, 0, 1)"),

@@ -8,7 +8,6 @@ from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, style_of
 from karamelo_py.language.unknown import SHAPES, filled, in_own_words
-from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric
 from karamelo_py.scene.domain import Domain, require_domain
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.scene.hub import Hub
@@ -101,49 +100,6 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
 
 
 create_domain.syntax = "xmin, xmax[, ymin, ymax[, zmin, zmax]][, h]"
-
-
-def axisymmetric(hub: Hub, active: bool) -> None:
-    """Make x the radius and y the axis of symmetry.
-
-    Parameters
-    ----------
-    active
-        ``true`` or ``false`` (the default).
-
-    Example
-    -------
-    dimension(2, 0, 10, 0, 30, 0.5)
-    axisymmetric(true)
-
-    Notes
-    -----
-    Before the first solid, in a 2D domain with x >= 0. Points carry the volume and mass of one
-    radian: multiply forces and energies by 2 pi for the whole body.
-
-    See Also
-    --------
-    dimension
-    """
-    domain = require_domain(hub)
-    if active and domain.dimension != 2:
-        raise ScriptError(
-            f"axisymmetric scenes have two dimensions, radius and axis, not {domain.dimension}",
-            argument="active",
-            expected="dimension(2, ...) before axisymmetric(true)",
-        )
-    if active and domain.lo[0] < 0:
-        message = f"the domain begins at x = {domain.lo[0]:g}, and x is a radius"
-        expected = "dimension(2, 0, ...), or more than 0 instead of 0"
-        raise ScriptError(message, argument="active", expected=expected)
-    if active and domain.thin:
-        message = "the scene has plane stress, which has no stress around an axis"
-        raise ScriptError(message, argument="active", expected="plane_stress(false)")
-    if hub.solids and active != bool(domain.kin.hoops):
-        message = "the points of solids are made already"
-        expected = "axisymmetric(true) before the first solid"
-        raise ScriptError(message, argument="active", expected=expected, code="too-late")
-    domain.kin = Axisymmetric() if active else KINEMATICS[domain.dimension]()
 
 
 def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:

@@ -78,8 +78,8 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
         hint = {1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)
     if active and domain.kin.hoops:
-        message = "the scene is axisymmetric, which has stress around the axis"
-        raise ScriptError(message, argument="active", expected="axisymmetric(false)")
+        message = f"the scene is {domain.kin.word}, which has hoop stress"
+        raise ScriptError(message, argument="active", expected=f"{domain.kin.word}(false)")
     if hub.materials and active != domain.thin:
         first = next(iter(hub.materials))
         message = f"material '{first}' is defined already"
@@ -92,8 +92,20 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
     domain.thin, domain.thickness = active, float(thickness) if active else 1.0
 
 
+def refuse_uneven(hub: Hub, material: Material, argument: str) -> None:
+    """Refuse a material that is not the same in y and z for a sphere."""
+    if hub.domain is None or hub.domain.kin.hoops < 2 or is_round(material.whole):
+        return
+    raise ScriptError(
+        "the material is not the same in y and z, so that a sphere of it would not stay round",
+        argument=argument,
+        expected="cylindrical(true), or a material with equal axes y and z",
+    )
+
+
 def fit_to_domain(hub: Hub, material: Material) -> None:
     """Make a material thin if the bodies of the scene are."""
+    refuse_uneven(hub, material, "style")
     if hub.domain is None or not hub.domain.thin or is_rigid(material.whole):
         return
     parts = law_parts(material.whole)

@@ -17,7 +17,8 @@ from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
 MOST_OF_TEXT = 200  # every line of another program's script is wrong
-_BASIS = frozenset({"method", "dimension", "create_domain", "axisymmetric", "include", "quit"})
+_ROUND = {"axisymmetric", "cylindrical", "spherical"}
+_BASIS = frozenset({"method", "dimension", "create_domain", "include", "quit"} | _ROUND)
 # Runs depend on these; other definitions matter only where named.
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}

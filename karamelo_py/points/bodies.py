@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
-from karamelo_py.points.kinematics import dot
+from karamelo_py.points.kinematics import dot, product
 
 NEW = 0.05  # weight of a step in the running mean of the load
 
@@ -23,7 +23,9 @@ class MinimizePenetration(NamedTuple):
 
 
 def face(kin, volume, x):
-    """Area of a point as a cube: per unit thickness in 2D, per radian if axisymmetric."""
+    """Area of a point as a cube: per unit thickness in 2D, per angle around an axis or centre."""
+    if kin.hoops and kin.dimension == 1:
+        return product([x[0]] * kin.hoops)
     if kin.hoops:
         return sqrt(volume * x[0])  # r times the side of the square volume / r
     if kin.dimension == 2:
@@ -32,6 +34,8 @@ def face(kin, volume, x):
 
 
 def radius(kin, volume, x):
+    if kin.hoops and kin.dimension == 1:
+        return 0.5 * volume / face(kin, volume, x) if x[0] > 0 else 0.0
     if kin.hoops:
         return 0.5 * sqrt(volume / x[0]) if x[0] > 0 else 0.0
     if kin.dimension == 2:

@@ -21,7 +21,7 @@ class Along(NamedTuple):
 
 class Stencil(NamedTuple):
     lines: tuple[Along, ...]  # along each direction
-    inv_r: float  # 1 / r of an axisymmetric point
+    inv_r: float  # 1 / r of a point around an axis or centre
 
 
 def sees_same_nodes(stencil):
@@ -66,9 +66,9 @@ def evenly(basis, grid, stencil):
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """Gradient of a weight; in axisymmetry followed by N / r, on the axis dN/dr."""
+    """Gradient of a weight; around an axis or centre followed by N / r, there by dN/dr."""
     if kin.hoops:
-        slopes = (*slopes, where(inv_r > 0, weight * inv_r, slopes[0]))
+        slopes = (*slopes, *[where(inv_r > 0, weight * inv_r, slopes[0])] * kin.hoops)
     return gradient(kin, slopes)
 
 

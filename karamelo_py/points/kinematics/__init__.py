@@ -6,14 +6,17 @@ tag               vector          velocity gradient, F           symmetric tenso
 ``Line``          x               xx                             xx yy zz
 ``PlaneStrain``   x y             xx xy yx yy                    xx yy zz xy
 ``Axisymmetric``  r z             rr rz zr zz tt                 rr zz tt rz
+``Cylindrical``   r               rr tt                          rr tt zz
+``Spherical``     r               rr tt pp                       rr tt pp
 ``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
 ================  ==============  =============================  =================================
 
-The gradient of a basis function has the components of a vector; axisymmetric points add a third,
-N/r. The tags are empty NamedTuples, and kernels are compiled for each of them, without branches.
-Each tag has its own classes, NamedTuples of the components that exist, so objects know their
-kinematics. Kernels are traced: loops, classes and operators here cost nothing at run time. A
-number times a tensor added to another tensor is rounded once (`fma`): a + dt * b.
+The gradient of a basis function has the components of a vector, and N/r for each direction around
+an axis or a centre: it gives the hoop strain, and the force of the hoop stress. The tags are empty
+NamedTuples, and kernels are compiled for each of them, without branches. Each tag has its own
+classes, NamedTuples of the components that exist, so objects know their kinematics. Kernels are
+traced: loops, classes and operators here cost nothing at run time. A number times a tensor added to
+another tensor is rounded once (`fma`): a + dt * b.
 """
 
 from collections import namedtuple
@@ -53,11 +56,7 @@ class PlaneStrain(NamedTuple):
 
 
 class Axisymmetric(NamedTuple):
-    """2D, x the radius and y the axis: a body of revolution without torsion.
-
-    The gradient of a basis function N has three components, (dN/dr, dN/dz, N/r). The last gives the
-    hoop strain, and the force of the hoop stress.
-    """
+    """2D, x the radius and y the axis: a body of revolution without torsion."""
 
     word = "axisymmetric"
     per = " per radian"
@@ -66,6 +65,30 @@ class Axisymmetric(NamedTuple):
     tensor_size = 5
     tensor_names = ("11", "12", "21", "22", "33")
     symmetric_names = ("11", "22", "33", "12")
+
+
+class Cylindrical(NamedTuple):
+    """1D, x the distance from an axis, unit length and no strain along it."""
+
+    word = "cylindrical"
+    per = " per radian and length"
+    hoops = 1
+    dimension = 1
+    tensor_size = 2
+    tensor_names = ("11", "22")
+    symmetric_names = ("11", "22", "33")
+
+
+class Spherical(NamedTuple):
+    """1D, x the distance from a centre."""
+
+    word = "spherical"
+    per = " per steradian"
+    hoops = 2
+    dimension = 1
+    tensor_size = 3
+    tensor_names = ("11", "22", "33")
+    symmetric_names = ("11", "22", "33")
 
 
 class Space(NamedTuple):
@@ -78,7 +101,7 @@ class Space(NamedTuple):
     symmetric_names = ("11", "22", "33", "12", "13", "23")
 
 
-TAGS = (Line, PlaneStrain, Axisymmetric, Space)
+TAGS = (Line, PlaneStrain, Axisymmetric, Cylindrical, Spherical, Space)
 KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
@@ -214,12 +237,12 @@ I = Isotropic(1)  # noqa: E741
 
 
 class Vector(Elements):
-    """A vector, or the gradient of a basis function (axisymmetric: followed by N/r)."""
+    """A vector, or the gradient of a basis function (followed by N/r around an axis or centre)."""
 
     __slots__ = ()
 
     def planar(self):
-        return self if self.vector is type(self) else self.vector._make(self[:2])
+        return self if self.vector is type(self) else self.vector._make(self[: self.kin.dimension])
 
     def squared(self):
         return total([a * a for a in self])
@@ -275,7 +298,7 @@ class Tensor(Matrix):
 
     def planar(self):
         made = self.vector.tensor
-        return self if made is type(self) else made._make(self[:4])
+        return self if made is type(self) else made._make(self[: len(made.places)])
 
     def generator(self):
         """The matrix that gives strain and rotation of this increment, dt grad v."""
@@ -320,7 +343,7 @@ class Tensor(Matrix):
             return r.turned_back(self)
         a = self.at()
         if self.kin.dimension == 1:
-            return self.symmetric._make([abs(a[0, 0]), 1, 1])
+            return self.symmetric._make([abs(a.get((i, i), 1)) for i in range(3)])
         size = abs(a[0, 0] * a[1, 1] + a[0, 1] * -a[1, 0])
         c = {(i, j): a[0, i] * a[0, j] + a[1, i] * a[1, j] for i in (0, 1) for j in (0, 1)}
         k = 1 / sqrt(c[0, 0] + c[1, 1] + size + size)
@@ -506,7 +529,7 @@ class SymmetricTensor(Matrix):
     def nominal(self, F):
         """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress."""
         if self.kin.dimension == 1:
-            return type(F)._make([self[0] / F[0]])
+            return type(F)._make([s / f for s, f in zip(self, F, strict=False)])
         a, back = self.at(), inv(F).at()
         return type(F)._make(
             [
@@ -523,14 +546,15 @@ for _kind in (Elements, Vector, Matrix, Tensor, SymmetricTensor):
 # --- one class for each kinematics ------------------------------------------------------------
 
 
-def _class(kind: type, tag: type, names: tuple) -> type:
-    words = ["around" if name == "around" else name.translate(_WORDS) for name in names]
-    name = f"{tag.__name__}{kind.__name__}" + ("Gradient" if "around" in words else "")
+def _class(kind: type, tag: type, names: tuple, around: tuple = ()) -> type:
+    """Make the class of tensors of a kinematics; for gradients, `around` names the hoop parts."""
+    words = [name.translate(_WORDS) for name in names] + [f"around_{k + 1}" for k in around]
+    name = f"{tag.__name__}{kind.__name__}" + ("Gradient" if around else "")
     one = type(name, (kind, namedtuple(name, words)), {"__module__": __name__})
     one._make = classmethod(tuple.__new__)
     one.kin = tag()
-    places = ("33" if name == "around" else name for name in names)
-    one.places = tuple((int(n[0]) - 1, int(n[-1]) - 1) for n in places)
+    one.places = tuple((int(n[0]) - 1, int(n[-1]) - 1) for n in names)
+    one.places += tuple((k, k) for k in around)
     one.axes = tuple(sorted({i for i, _ in one.places}))
     globals()[name] = one
     return one
@@ -551,13 +575,13 @@ for _tag in TAGS:
     _tag.Symmetric = _class(SymmetricTensor, _tag, _tag.symmetric_names)
     _tag.Tensor = _class(Tensor, _tag, _tag.tensor_names)
     _tag.Tensor.symmetric = _tag.Symmetric
-    if _tag is Axisymmetric:
-        _tag.Vector = PlaneStrain.Vector
-        _tag.Gradient = _class(Vector, _tag, ("1", "2", "around"))
-        _tag.Gradient.tensor = _tag.Tensor
+    _names = "123"[: _tag.dimension]
+    if _tag.hoops:
+        _tag.Vector = KINEMATICS[_tag.dimension].Vector
+        _tag.Gradient = _class(Vector, _tag, _names, _tag.Tensor.axes[_tag.dimension :])
     else:
-        _tag.Vector = _tag.Gradient = _class(Vector, _tag, "123"[: _tag.dimension])
-        _tag.Vector.tensor = _tag.Tensor
+        _tag.Vector = _tag.Gradient = _class(Vector, _tag, _names)
+    _tag.Gradient.tensor = _tag.Tensor
     for _one in (_tag.Tensor, _tag.Symmetric):
         _rows(_one, _tag.Tensor)
     for _one in (_tag.Vector, _tag.Gradient, _tag.Tensor, _tag.Symmetric):
@@ -601,10 +625,9 @@ def zero_vector(kin, like):
 
 
 def det(f):
-    """Determinant; axisymmetric with the hoop stretch."""
+    """Determinant, with the hoop stretches."""
     a, d = f.at(), f.kin.dimension
-    plane = determinant(a, d)
-    return plane * a[2, 2] if len(f.axes) > d else plane
+    return product([determinant(a, d), *[a[i, i] for i in f.axes[d:]]])
 
 
 def inv(f):

@@ -362,7 +362,7 @@ class LoadSteps:
         for body in range(bodies.max() + 1):
             nodes = bodies == body
             rows = motions[nodes][fixed[nodes]]
-            if fixed[nodes].all():
+            if fixed[nodes].all() or not motions.shape[2]:
                 continue
             if contact is not None:
                 rows = np.concatenate([rows, contact.held(motions, nodes)])
@@ -386,7 +386,9 @@ class LoadSteps:
         """Refuse, before any step, a scene in which fixes hold no node near points."""
         s, held = self.simulation.setup, np.any(self.held(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
-        if not (self.dynamic or rigid or any(held[a:b].any() for a, b in used(s.spans)[1:])):
+        can_move = free_from(s.kin) < s.kin.dimension
+        moves = can_move and not (self.dynamic or rigid)
+        if moves and not any(held[a:b].any() for a, b in used(s.spans)[1:]):
             raise self._loose(next(iter(self.simulation.hub.solids)), "is held by nothing")
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:

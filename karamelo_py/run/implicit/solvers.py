@@ -166,4 +166,4 @@ def rigid_motions(positions: np.ndarray, free: int) -> np.ndarray:
             turn = np.zeros((m, d))
             turn[:, i], turn[:, j] = -x[:, j], x[:, i]
             motions.append(turn)
-    return np.stack(motions, 2)
+    return np.stack(motions, 2) if motions else np.zeros((m, d, 0))

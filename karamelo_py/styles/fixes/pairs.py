@@ -268,7 +268,7 @@ class ContactHertz(PairContact):
         super().__init__(hub, solid1, solid2)
         if hub.domain.kin.hoops:
             raise ScriptError(
-                "the force of Hertz is one of balls, and axisymmetric points are rings",
+                "the force of Hertz is one of balls, and points around an axis or centre are rings",
                 expected="fix contact/minimize_penetration, or a scene in 3D",
             )
         self.law()  # refuses materials without moduli

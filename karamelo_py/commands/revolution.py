@@ -1,0 +1,120 @@
+"""Commands for bodies around an axis or a centre: axisymmetric, cylindrical, spherical."""
+
+from karamelo_py.commands.thin import refuse_uneven
+from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric, Cylindrical, Spherical
+from karamelo_py.scene.domain import require_domain
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+
+def axisymmetric(hub: Hub, active: bool) -> None:
+    """Make x the radius and y the axis of symmetry.
+
+    Parameters
+    ----------
+    active
+        ``true`` or ``false`` (the default).
+
+    Example
+    -------
+    dimension(2, 0, 10, 0, 30, 0.5)
+    axisymmetric(true)
+
+    Notes
+    -----
+    Before the first solid, in a 2D domain with x >= 0. Points carry the volume and mass of one
+    radian: multiply forces and energies by 2 pi for the whole body.
+
+    See Also
+    --------
+    dimension, cylindrical, spherical
+    """
+    _set(hub, active, Axisymmetric())
+
+
+def cylindrical(hub: Hub, active: bool) -> None:
+    """Make a 1D scene a cylinder or tube: x is the distance from its axis.
+
+    Parameters
+    ----------
+    active
+        ``true`` or ``false`` (the default).
+
+    Example
+    -------
+    dimension(1, 0, 10, 0.1)
+    cylindrical(true)
+
+    Notes
+    -----
+    Before the first solid, in a 1D domain with x >= 0. Everything depends on the radius alone. The
+    hoop strain is the radial displacement over r (component 22); there is no strain along the axis
+    (33). Points carry the volume and mass of one radian and of unit length, r dr: multiply masses,
+    forces and energies by 2 pi for the whole ring. A node at x = 0 does not move.
+
+    See Also
+    --------
+    spherical, axisymmetric, dimension
+    """
+    _set(hub, active, Cylindrical())
+
+
+def spherical(hub: Hub, active: bool) -> None:
+    """Make a 1D scene a sphere or spherical shell: x is the distance from its centre.
+
+    Parameters
+    ----------
+    active
+        ``true`` or ``false`` (the default).
+
+    Example
+    -------
+    dimension(1, 0, 10, 0.1)
+    spherical(true)
+
+    Notes
+    -----
+    Before the first solid, in a 1D domain with x >= 0. Everything depends on the radius alone. The
+    hoop strains, components 22 and 33, are the radial displacement over r. Points carry the volume
+    and mass of one steradian, r^2 dr: multiply masses, forces and energies by 4 pi for the whole
+    sphere. A node at x = 0 does not move. The material must be the same in y and z.
+
+    See Also
+    --------
+    cylindrical, axisymmetric, dimension
+    """
+    _set(hub, active, Spherical())
+
+
+SPACES = {1: "one dimension, the radius", 2: "two dimensions, radius and axis"}
+INSTEAD = {1: "cylindrical(true) or spherical(true)", 2: "axisymmetric(true)"}
+
+
+def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) -> None:
+    domain, d, name = require_domain(hub), kin.dimension, kin.word
+    same = isinstance(domain.kin, type(kin))
+    if active and domain.dimension != d:
+        message = f"{name} scenes have {SPACES[d]}, not {domain.dimension}"
+        expected = f"dimension({d}, ...) before {name}(true)"
+        hint = INSTEAD.get(domain.dimension)
+        raise ScriptError(message, argument="active", expected=expected, hint=hint)
+    if active and domain.lo[0] < 0:
+        message = f"the domain begins at x = {domain.lo[0]:g}, and x is a radius"
+        expected = f"dimension({d}, 0, ...), or more than 0 instead of 0"
+        raise ScriptError(message, argument="active", expected=expected)
+    if active and domain.thin:
+        thin = {1: "uniaxial_stress", 2: "plane_stress"}[d]
+        message = f"the scene has {thin.replace('_', ' ')}, which has no hoop stress"
+        raise ScriptError(message, argument="active", expected=f"{thin}(false)")
+    if active and domain.kin.hoops and not same:
+        message = f"the scene is {domain.kin.word} already"
+        expected = f"{domain.kin.word}(false) first, or no {name}(true)"
+        raise ScriptError(message, argument="active", expected=expected)
+    if hub.solids and active != same:
+        message, expected = "the points of solids are made already", "before the first solid"
+        expected = f"{name}(true) {expected}"
+        raise ScriptError(message, argument="active", expected=expected, code="too-late")
+    if active != same:
+        domain.kin = kin if active else KINEMATICS[d]()
+    for material in hub.materials.values():
+        refuse_uneven(hub, material, "active")
