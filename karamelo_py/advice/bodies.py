@@ -18,8 +18,8 @@ from karamelo_py.script.expressions import POINT_SEEDS
 
 SLOW = 0.01  # of the wave speed: below, no energy gain was seen for any duration
 TORN = 9.0, 14.0  # tolerable rotation (radians) with one point per cell: FLIP, affine transfers
-# Squared distance of a point from its nodes over h^2, weighted mean per direction: two points per
-# cell with a linear basis, and second-order basis functions.
+# Squared distance of a point from its nodes over h^2, weighted mean per direction: linear basis
+# with two points per cell; second-order bases.
 SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
 
@@ -27,7 +27,7 @@ class Noise(NamedTuple):
     """The motion with the largest energy gain."""
 
     share: float  # of the tolerable amount
-    speed: float  # of the body, or of its rim, over the wave speed
+    speed: float  # of the body or its rim, over the wave speed
     cells: float  # path of the body, or of its rim
     angle: float = 0.0  # rotation in radians
     noisy: bool = True  # noise grows
@@ -46,7 +46,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """Return True if a body of this law vibrates: not fluids, not flowing materials."""
+    """Return True if a body of this law vibrates, unlike fluids and flowing materials."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -88,7 +88,7 @@ def drift_of(facts: BasicFacts) -> Noise | None:
 
 
 def _thrown(facts: BasicFacts) -> bool:
-    """Return True if nothing strains the only body."""
+    """Return True if the only body moves without strain."""
     return (
         len(facts.motions) == 1
         and bool((facts.motions[0].fast == facts.motions[0].slow).all())
@@ -127,7 +127,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 def lag_of(facts: BasicFacts) -> Lag:
     """Estimate the lag of a free rotation in the total frame.
 
-    Of the angular momentum, sum m r^2, the grid lacks the part within stencils, sum m tr D.
+    The grid lacks sum m tr D, the part within stencils, of the angular momentum sum m r^2.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:
@@ -182,7 +182,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
     """Return True if smooth plates hold all sides of a box but one, so that it deforms evenly.
 
-    A plate is a fix that holds all nodes of one side across it.
+    A plate is a fix that holds all nodes of one side in its normal direction.
     """
     h, low, high = lattice_at(facts, body).h, body.motion.low, body.motion.high
     box = sides(body).prod() * facts.hub.domain.thickness
@@ -207,7 +207,7 @@ def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
 
 
 def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
-    """Return the time until a body meets another, or the domain's edge."""
+    """Time until a body meets another or the domain's edge."""
     d, domain = facts.d, facts.hub.domain
     ways = zip(motion.velocity, motion.low, motion.high, domain.lo[:d], domain.hi[:d], strict=True)
     first = min(
@@ -221,7 +221,7 @@ def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
 
 
 def _meeting(motion: BodyMotion, other: BodyMotion) -> float:
-    """Return when the boxes around two bodies meet, or inf."""
+    """Time when two bodies' bounding boxes meet, or inf."""
     begin, end = 0.0, inf
     v = motion.velocity - other.velocity
     for speed, gap, over in zip(v, other.low - motion.high, other.high - motion.low, strict=True):

@@ -1,8 +1,8 @@
 """Stress that a linear basis loses when stressed material moves through the grid.
 
-Its gradient jumps at cell faces, so points that cross them change the strain rates of cells, and
-their volumes drift: in the updated frame, pressure falls by 10 to 35 % per cell of motion, at any
-speed and strain. GIMP and splines lose 0 to 0.3 %.
+The basis gradient jumps at cell faces, so points that cross them change strain rates and their
+volumes drift: in the updated frame, pressure falls by 10 to 35 % per cell of motion, at any speed
+and strain. GIMP and splines lose 0 to 0.3 %.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +20,7 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.run.listening import when
 
-STRESSED = 0.1  # of the initial energy: less does not count as initial stress
+STRESSED = 0.1  # of the initial energy: below, there is no initial stress
 OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
 LOADED = 0.5  # of the energy: if loads supply more, they maintain the stress
 
@@ -74,7 +74,7 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
     """Yield the longest path, as speed and duration, of each solid that meets others.
 
-    By impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
+    With impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
     returned through the thinner solid.
     """
     bodies = [b for b in facts.bodies if not can(b.solid.material.law, constrained_velocity)]
@@ -98,7 +98,7 @@ def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 class BodyBoxes(NamedTuple):
-    """Boxes around n bodies and their motion, arrays (n, d)."""
+    """Bounding boxes of n bodies and their motion, arrays (n, d)."""
 
     centre: np.ndarray
     velocity: np.ndarray
@@ -128,10 +128,7 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 
 def measured(facts: BasicFacts) -> Crossing:
-    """Return the path so far, as a mean over stressed material.
-
-    It is 0 if loads do most of the work: they maintain the stress.
-    """
+    """Return the path so far, as a mean over stressed material; 0 if loads maintain the stress."""
     clock = facts.simulation.control.clock[0]
     matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(facts)
     loaded = clock.supplied > LOADED * clock.largest_energy
@@ -139,7 +136,7 @@ def measured(facts: BasicFacts) -> Crossing:
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
-    """Describe the lost stress after a run, and warn of it once."""
+    """Describe the lost stress after a run; warn once."""
     crossing, hub = measured(facts), facts.hub
     if crossing.lost <= TOLD:
         return {}

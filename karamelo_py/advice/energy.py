@@ -43,7 +43,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
     courant, _ = stable_step.own_step_of_waves(hub, still=False)
-    # Of undeformed bodies: later they may be softer.
+    # Of undeformed bodies, which may soften later.
     fastest = stable_step.fastest_wave(simulation)
     across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
@@ -124,7 +124,7 @@ def taken_by(hub: Hub) -> list[str]:
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    # Nodal velocities lack the part that the grid does not resolve.
+    # Nodal velocities lack what the grid does not resolve.
     if flip_coefficient(transfer) < 1:
         share = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
@@ -201,6 +201,6 @@ def words_of_change(hub: Hub, share: float) -> str:
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
-    # Losses may add up to more than the largest energy at any time.
+    # The sum of losses may exceed the largest energy.
     much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
     return f"{much} {words}{by}"

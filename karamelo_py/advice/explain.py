@@ -17,15 +17,15 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import named, solid_with
 
 DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings
-ABSURD = 10.0  # cells in one step: no smaller step prevents that
-LOOSE = 1.5  # cells: points of an unstrained solid are at most one apart
+ABSURD = 10.0  # cells in one step: a smaller step would not help
+LOOSE = 1.5  # cells between points of an unstrained solid, at most
 APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain the `status` of a failed step.
+    """Explain the `status` of a failed step; `smaller`:
 
-    `smaller` is the step to take if it was too large from the start of the run.
+    the fix if it was too large from the start.
     """
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
@@ -126,7 +126,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _first_wrong(simulation: Simulation) -> tuple | None:
-    """Return the failed point with the smallest id: id, old and new position, velocity, grid."""
+    """Failed point with the smallest id: id, old and new position, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
@@ -141,7 +141,7 @@ def _first_wrong(simulation: Simulation) -> tuple | None:
 
 
 def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
-    """Explain the first failed point; `smaller` is a step to take."""
+    """Explain the first failed point; `smaller` is a suggested step."""
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         hint = "check fixes that act on heat: a formula that gives NaN, or heat without bounds"
@@ -204,7 +204,6 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
 
 
 def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> bool:
-    """Return True if no other point of the solid lies within `reach`."""
     solid = solid_with(simulation.hub, number)
 
     def others(simulation: Simulation) -> tuple[int, int]:
@@ -220,7 +219,7 @@ def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> 
 
 
 def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
-    """Return True if the domain of a point is folded over."""
+    """Return True if the domain of a point is folded."""
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
@@ -228,7 +227,7 @@ def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
-    """Suggest a smaller step, `instead` if given; doubtful units come first."""
+    """Suggest a smaller step (`instead`, if given), after a check of doubtful units."""
     if doubted := [name for name in hub.update.warned_of if code_of(name) in DOUBTED_UNITS]:
         units = f"check the {doubted[0]} (see the warning)"
         return f"{units}, then {instead}" if instead else units

@@ -1,4 +1,4 @@
-"""Facts of a scene before a run, which rules judge."""
+"""Facts of a scene before a run, for rules."""
 
 import re
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import read_script
 
 PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities taken from the grid
-TURN = 0.3  # rotation, in radians, beyond which a scene counts as rotating
+TURN = 0.3  # radians beyond which a scene counts as rotating
 SEQ = methodcaller("particle", "seq")
 
 
@@ -38,7 +38,7 @@ class Vibration(NamedTuple):
 
 
 class SceneFacts(BasicFacts):
-    """Facts of a scene before a run of `duration`, computed when a rule asks."""
+    """Facts of a scene before a run of `duration`, computed on demand."""
 
     def parts(self) -> Iterator[tuple[Any, Any]]:
         """Yield each part once, with its material if it is part of a law."""
@@ -56,7 +56,7 @@ class SceneFacts(BasicFacts):
         yield from ((kind, None) for kind in dict.fromkeys(kinds))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
-        """Yield the advice of one kind; with `of_laws`, of laws and initial states only."""
+        """Yield the advice of one kind; with `of_laws`, only of laws and initial states."""
         foreign = {piece.kind: piece for piece in foreign_parts(self.hub)}
         for piece, owner in self.parts():
             if of_laws and owner is None and not (isinstance(piece, Fix) and piece.first_step_only):
@@ -70,7 +70,7 @@ class SceneFacts(BasicFacts):
     lag, crossing = cached_property(lag_of), cached_property(expected)
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
-    # The step over the stable one, and over the limit for neighbours of different density.
+    # Step over the stable step, and over the limit for neighbours of different density.
     share = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
     share_of_uneven = property(lambda self: self.share * self.uneven.of_step)
     fastest = cached_property(lambda self: self.simulation.fastest())  # velocity component
@@ -88,7 +88,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def turn(self) -> float:
-        """Rotation, in radians, of the solid that rotates most."""
+        """Rotation in radians of the solid that rotates most."""
         if self.d == 1 or self.hub.domain.kin.hoops:
             return 0.0
         return max((motion.spin for motion in self.motions), default=0.0) * self.duration
@@ -101,7 +101,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def grid_viscosity(self) -> float:
-        """Kinematic viscosity of velocities from the grid, `PIC` (1 - alpha) h^2/dt."""
+        """Kinematic viscosity of grid velocities, `PIC` (1 - alpha) h^2/dt."""
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
@@ -111,7 +111,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def moving_walls(self) -> bool:
-        """True if a rigid solid moves or is led by a fix."""
+        """True if a rigid solid moves or a fix leads its points."""
         rigid = [
             can(solid.material.law, constrained_velocity) for solid in self.hub.solids.values()
         ]
@@ -122,7 +122,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def free_turns(self) -> float:
-        """Revolutions of the unheld solid that rotates most."""
+        """Revolutions of the free solid that rotates most."""
         free = [b.motion.spin for b in self.bodies if self.turns and is_free(self, b)]
         return max(free, default=0.0) * self.duration / (2 * pi)
 
@@ -154,10 +154,10 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain by weight or motion of the slenderest solid.
+        """Bending strain of the slenderest solid by weight or motion.
 
-        A cantilever of length L and height H strains by 3 g L^2/(H c^2); a beam whose kinetic
-        energy becomes strain energy by sqrt(3) v/c.
+        Cantilever of length L and height H: 3 g L^2/(H c^2). Beam whose kinetic energy becomes
+        strain energy: sqrt(3) v/c.
         """
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:
@@ -192,9 +192,9 @@ class SceneFacts(BasicFacts):
 
 
 def script_text(hub: Hub) -> str:
-    """Read the script and all includes, without comments."""
+    """Return the script with its includes, without comments."""
     lines: list[str] = []
     for path in dict.fromkeys([*hub.interpreter.files, *hub.interpreter.files_ahead]):
-        with suppress(ScriptError):  # the file may be gone by now
+        with suppress(ScriptError):  # the file may be gone
             lines += read_script(path).splitlines()
     return "\n".join(line.partition("#")[0] for line in lines)

@@ -1,7 +1,7 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-Parts declare theirs as rules (`karamelo_py.language.rules`); these are those that no single part
-knows. Each is reported once, by `check` or before the first step.
+Parts declare their own as rules (`karamelo_py.language.rules`); here are those that involve several
+parts. Each is reported once, by `check` or before the first step.
 """
 
 from collections.abc import Iterable, Iterator
@@ -30,10 +30,10 @@ from karamelo_py.script.errors import Place, ScriptError
 
 LOOK = 100  # steps: shorter runs only inspect a scene
 ENDLESS = 1e8  # steps
-MIXED = 300  # step over the stable one, from which on wrong units are likelier than a bad guess
-DENSITIES = 10.0, 1e5  # kg/m^3, of all but gases: foams to beyond osmium
-IMPOSSIBLE = 30.0  # times the wave speed: mm/s instead of m/s give a factor of 1000
-SPEEDS = 1.0, 5e4  # m/s, of waves: jelly to beyond diamond
+MIXED = 300  # step over the stable one, above which units are likelier wrong than the step
+DENSITIES = 10.0, 1e5  # kg/m^3: foams to beyond osmium; gases excluded
+IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
+SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to beyond diamond
 REST = "a scene at rest"
 UNITS = (
     "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
@@ -98,7 +98,7 @@ def mixed_units(hub: Hub, simulation: Simulation) -> str:
 
 
 class Step(NamedTuple):
-    """The step requested for run number `run`, and the scene that its limit depends on.
+    """The step requested for run number `run`, and the scene on which its limit depends.
 
     `span` is the run's length in time and in steps, infinite if a condition ends it.
     """
@@ -113,7 +113,7 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """Return the step requested now; with `halves`, a run in trouble halves it."""
+    """Return the step requested now; `halves`: a run in trouble halves it."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
@@ -201,7 +201,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Warn once of what will go wrong in a run of `duration` and later ones."""
+    """Warn once of what will fail in a run of `duration` and later ones."""
     _warn_about_groups(hub, simulation)
     refuse_endless_speeds(simulation)
     scene = SceneFacts(hub, simulation, duration)
@@ -221,7 +221,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 
 def warn_about_factor(hub: Hub) -> None:
     update = hub.update
-    # With set_dt, dt_factor has warned already.
+    # With set_dt, dt_factor has already given a warning.
     idle = update.dt_factor is not None and update.fixed_dt is None
     if idle and update.first_time("dt_factor"):
         hub.warn(
@@ -271,7 +271,7 @@ def _tell(hub: Hub, advice: Iterable[Advice]) -> None:
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Return the duration of later runs of the same scene, where known."""
+    """Sum the known durations of later runs of the same scene."""
     present = step_of(hub, False).scene
     later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -279,7 +279,6 @@ def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
 
 
 def _gone(hub: Hub, simulation: Simulation) -> float:
-    """Return the time since the fixes last changed."""
     fixes, update = list(hub.fixes.values()), hub.update
     before, since = update.moving
     if any(all(fix is not other for other in before) for fix in fixes):
@@ -289,15 +288,11 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Warn if single precision cannot resolve the motion in a step, or refuse it.
+    """Warn if single precision cannot resolve the motion in a step.
 
-    Compare with the cell size too: a block that falls at 50 000 cells from the origin is wrong by
-    3.5 % of its path, and at 200 000 it does not move.
-
-    Raises
-    ------
-    ScriptError
-        If positions have a spacing of 1/500 cell or more.
+    The cell size matters too: a block that falls at 50 000 cells from the origin errs by 3.5 % of
+    its path, and at 200 000 it does not move. ScriptError if positions have a spacing of 1/500 cell
+    or more.
     """
     if s.hub.settings.precision != "single":
         return
@@ -323,7 +318,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
 
 
 def _out_of_reach(hub: Hub, simulation: Simulation, fix: Fix) -> bool:
-    """Return True if no point lies within reach of a fix's nodes, taken as a box."""
+    """Return True if no point is in reach of a fix's nodes, taken as a box."""
     x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
     method, setup = hub.update.method, simulation.setup
     reach = (method.basis.traits.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)
@@ -337,7 +332,6 @@ def _out_of_reach(hub: Hub, simulation: Simulation, fix: Fix) -> bool:
 
 
 def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
-    """Warn once of node groups without nodes or points."""
     for fix in hub.fixes.values():
         of_mass = any(
             hook.uses_share or moment in HEAT_STAGES

@@ -35,7 +35,6 @@ class Narrator(Listener):
         self.hub = hub
 
     def begun(self, run: RunLoop, simulation: Simulation, *, resumed: bool = False) -> None:
-        """Warn of what is known to go wrong."""
         hub, halve = self.hub, run.rollback.point.halve
         self.smaller = ""
         if resumed:
@@ -43,7 +42,7 @@ class Narrator(Listener):
                 self.smaller = "a smaller time step"  # the state in the file may be bad
             if not (
                 run.rollback.point.halvings or simulation.implicit
-            ):  # otherwise the script has not chosen the step
+            ):  # else the script has not chosen the step
                 known_failures.warn_about_steps(hub, simulation, halve, again=True)
             return
         steps = inf if run.steps is None else run.steps
@@ -59,7 +58,7 @@ class Narrator(Listener):
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
         """Start the record, and print the banner."""
         hub, why = self.hub, unknown_work(self.hub)
-        # For the first state: a failed one has no meaningful limit.
+        # Of the first state: a failed one has no meaningful limit.
         if simulation.steps.too_large:
             self.smaller = self.smaller or own_step_instead(simulation)
         facts: dict[str, Any] = {
@@ -117,7 +116,6 @@ class Narrator(Listener):
         boundary.tell_of_bounces(hub, simulation)
 
     def _tell_of_limit(self, simulation: Simulation) -> None:
-        """Note a limit that is new, or has halved."""
         name, limit, before = simulation.steps.ruling_limit, simulation.steps.limit, self.least
         if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
             return
@@ -130,7 +128,6 @@ class Narrator(Listener):
         self.hub.console.say(render_message("note", words))
 
     def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
-        """Warn once of a loss above a fraction of the largest energy."""
         hub, watch = self.hub, simulation.energy_watch
         loss = None if watch.told_of_loss else energy.words_of_loss(hub, simulation, within)
         if loss is not None:
@@ -143,7 +140,7 @@ class Narrator(Listener):
         return explain.trouble(self.hub, simulation, status, self.smaller * too_large)
 
     def ended(self, run: RunLoop, simulation: Simulation, first_step: int, wall: float) -> None:
-        """Complete the record, and print the closing table."""
+        """Complete the record and print the closing table."""
         self._tell_of_loss(simulation, energy.LOSS)
         steps = simulation.step - first_step
         stages = [(name, float(passed)) for name, (passed, _) in run.timings.on.items()]

@@ -1,4 +1,4 @@
-"""Thin bodies, and bodies next to each other, as rules judge them before a run."""
+"""Slender bodies and neighbouring bodies, as rules judge them before a run."""
 
 from typing import Any, NamedTuple
 
@@ -12,15 +12,15 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
 
-SLENDER = 4.0  # length over thickness from which a body bends
-# c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two blocks that vibrate, with usl and
-# a linear basis, 1 to 3 points per cell: 3.2 and 5.9 break within 3000 steps, 1.9 does not.
+SLENDER = 4.0  # length over thickness above which a body bends
+# c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two vibrating blocks, usl, linear
+# basis, 1 to 3 points per cell: 3.2 and 5.9 fail within 3000 steps, 1.9 does not.
 BREAKS, HOLDS = 2.5, 1.9
-STEPS = 500  # the first of them broke after 800
+STEPS = 500  # the first failed after 800
 
 
 class Uneven(NamedTuple):
-    """The pair of bodies that exceeds the light one's step most."""
+    """The pair of bodies that most exceeds the light one's stable step."""
 
     heavy: str = ""
     light: str = ""
@@ -34,7 +34,6 @@ class Uneven(NamedTuple):
 
 
 def _one_row(solid: Solid, axis: int) -> bool:
-    """Return True if all points lie in one row across an axis."""
     ends = [(x[:, axis].min(), x[:, axis].max()) for _, x in solid.pieces() if len(x)]
     low, high = np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]
     return bool(high - low < 1e-6 * solid.h)
@@ -57,7 +56,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Find bodies on one grid that begin within a cell of each other and part."""
+    """Find bodies on one grid that start within a cell of each other and separate."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None
@@ -83,9 +82,9 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def uneven(facts: BasicFacts) -> Uneven:
-    """Find a pair of elastic bodies that touch, or will meet, with too long a step.
+    """Find the pair of elastic bodies in present or future contact with the worst step.
 
-    At a node of mostly light mass, the stiffness of a heavy point makes it too long by
+    At a node of mostly light mass, the stiffness of a heavy point makes the step too long by
     sqrt(rho_heavy / rho_light).
     """
     most, dt = Uneven(), facts.simulation.dt

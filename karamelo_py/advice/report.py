@@ -29,7 +29,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.solid import words_of_volumes
 
-LOADED = 24 << 20  # bytes of compiled loops and of modules imported by steps and output, measured
+LOADED = 24 << 20  # bytes of compiled loops and imported modules, measured
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -136,14 +136,14 @@ def _size(count: float) -> str:
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
-    """List the used materials with the kind of law of a block."""
+    """List the used materials whose law is of a block's kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
     kind = without_rate(law_kind(block.laws))
     return [material for material in used if law_kind(material.law) == kind]
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print the unknowns of an implicit step, at most, and the memory of its matrix.
+    """Print the largest number of unknowns of an implicit step, and the memory of its matrix.
 
     Nodes couple if a point sees both.
     """
@@ -155,7 +155,6 @@ def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None
 
 
 def stages(hub: Hub, simulation: Simulation) -> list[str]:
-    """List the stages of a step with their fixes."""
     acting: dict[str, list[str]] = {}
     for fix in hub.fixes.values():
         for name in fix.hooks():

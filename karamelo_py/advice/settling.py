@@ -1,9 +1,9 @@
 """Displacement of soft elastic bodies by a weight that acts from the first step.
 
-A body that vibrates under a sudden load crosses the cells of a linear basis again and again, loses
-stress, and is pushed further down: by 19, 28, 67 and 165 % for a displacement at rest of 0.26,
-0.32, 0.64 and 1.24 cells (FLIP 0.9; cpgimp and splines within 7 %, a load that grows over 7 periods
-1 and 3 % at 0.26 and 0.32 cells). Reactions are right.
+A body that vibrates under a sudden load crosses cells of a linear basis repeatedly, loses stress
+and sinks further: by 19, 28, 67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24
+cells (FLIP 0.9; cpgimp and splines within 7 %; a load that grows over 7 periods 1 and 3 % at 0.26
+and 0.32 cells). Reactions are right.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from karamelo_py.advice.crossing import loses
 from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 
-CELLS = 0.25  # displacement at rest: with less, hardly a point crosses a cell
+CELLS = 0.25  # displacement at rest: below, hardly a point crosses a cell
 
 
 class Settling(NamedTuple):
@@ -24,14 +24,14 @@ class Settling(NamedTuple):
 
     name: str = ""
     strain: float = 0.0  # mean, at rest
-    cells: float = 0.0  # displacement of its free end at rest, over the cell size
+    cells: float = 0.0  # displacement of the free end at rest, over the cell size
 
 
 def expected(facts: BasicFacts) -> Settling:
     """Estimate how far bodies at rest settle on their supports.
 
     The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
-    + m_1/m); c is the speed of longitudinal waves.
+    + m_1/m), with the speed c of longitudinal waves.
     """
     most = Settling()
     if facts.simulation.step or not (facts.waves > 0 and loses(facts)):

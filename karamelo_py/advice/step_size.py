@@ -1,4 +1,4 @@
-"""The default step, the stable step, and words that compare a script's step with them."""
+"""The default step, the stable step, and their comparison with a script's step."""
 
 from math import inf
 
@@ -7,7 +7,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
 from karamelo_py.schemes.traits import USUAL
 
-LOST = 2.05  # times the stable step, beyond which every run that was tried failed
+LOST = 2.05  # times the stable step: every run above it failed
 NO_LIMITS = ("set_dt", "end")  # of stability
 
 
@@ -24,7 +24,7 @@ def own_step(simulation: Simulation, *, still: bool = False) -> float:
 
 
 def _stable_in_place(simulation: Simulation) -> float:
-    """Return the largest stable step of points at their present positions."""
+    """Return the largest stable step at the present positions."""
     clock = simulation.control.clock[0]
     courant, _ = own_step_of_waves(simulation.hub, still=clock.path <= STILL)
     return courant * clock.spacing / clock.rate
@@ -57,7 +57,7 @@ def own_step_instead_of(simulation: Simulation) -> float | None:
 
 
 def words_of_own_step(simulation: Simulation, step: float) -> str:
-    """Describe the default step, and the one after a quarter of a cell."""
+    """Describe the default step, and the one after a quarter of a cell of motion."""
     after = own_step(simulation, still=False)
     far = f", {after:.6g} once points have gone a quarter of a cell"
     return f"{step:.6g}" + (far if after < step else "")

@@ -1,4 +1,4 @@
-"""Suggestions of check: what a scene pays for without need, and what to write instead."""
+"""Suggestions of `check`: needless costs, and what to write instead."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -20,20 +20,20 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import plural
 
-Words = Iterator[tuple[str, str]]  # cost, and what to write instead
+Words = Iterator[tuple[str, str]]  # cost; what to write instead
 
 AXES = "xyz"
-NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio from which a linear basis locks
-LARGE = 100_000  # points from which on caches do not hold them
+NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio above which a linear basis locks
+LARGE = 100_000  # points that no longer fit in caches
 RESOLVED = 1000  # least motion per step over the spacing of single-precision numbers
-# Seconds of a core (Intel Xeon): a point in a step with a linear basis, a line of the log, a
-# picture and the first one, a file of points, and a number in it.
+# Core seconds (Intel Xeon): a point per step with a linear basis, a log line, a picture, the first
+# picture, a file of points, and a number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 10.0  # seconds of output worth a suggestion
 
 
 def seconds_of_step(hub: Hub, count: int) -> float:
-    """Estimate the least seconds of a core per step."""
+    """Estimate the least core seconds per step."""
     return POINT * count + sum(fix.seconds() for fix in hub.fixes.values())
 
 
@@ -88,7 +88,7 @@ def _acting(hub: Hub) -> list[Fix]:
 
 
 def _given(fix: Fix) -> tuple:
-    """Return the formulas of a fix; NaN without any: it may do anything."""
+    """Formulas of a fix; NaN if it has none: it may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 
@@ -101,7 +101,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if a group has all points (or nodes) of equal `key`, or none."""
+    """Return True if a group has all or no points (nodes) of equal `key`."""
     group = fix.group
     if group is None or group.all:
         return group is not None
@@ -154,7 +154,6 @@ def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
 
 
 def _acts_alike(hub: Hub, rest: list[int]) -> bool:
-    """Return True if fixes act alike at equal coordinates `rest`."""
     for fix in _acting(hub):
         smooth_wall = fix.wall_friction is None and all(_given(fix)[j] is None for j in rest)
         if not smooth_wall and not _alike(hub, fix, lambda x: x[:, rest]):
@@ -182,7 +181,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Return True if nodes of the planes `low` and `high` (in cells) do not move along k."""
+    """Return True if nodes of the planes `low` and `high` (in cells) are fixed along k."""
     lattice = hub.lattices[0]
     fixed = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -267,7 +266,7 @@ def _mirrored(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Return for each fix True if it neither acts along k nor depends on it."""
+    """Yield for each fix whether it neither acts along k nor depends on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         rest_formulas = [formulas[j] for j in rest if j < len(formulas)]
@@ -300,7 +299,7 @@ def _precision(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _output(hub: Hub, simulation: Simulation) -> Words:
-    """Find output that takes seconds, and more than the steps."""
+    """Find output that takes seconds, and longer than the steps."""
     span = simulation.control.clock[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):

@@ -1,4 +1,4 @@
-"""Derivatives of formulas, and formulas put for names."""
+"""Derivatives of formulas, and substitution of names."""
 
 from collections.abc import Mapping
 
@@ -17,20 +17,20 @@ def plus(a: Term, b: Term) -> Term:
 
 
 def times(a: Term, b: Term) -> Term:
-    """Multiply formulas; 0 and 1 are left out."""
+    """Multiply formulas, omitting 0 and 1."""
     if is_number(a, 0) or is_number(b, 0):
         return ZERO
     return b if is_number(a, 1) else a if is_number(b, 1) else applied("*", a, b)
 
 
 def to_power(base: Term, exponent: float) -> Term:
-    """Raise a formula to a constant power; 0 and 1 are left out."""
+    """Raise a formula to a constant power, omitting 0 and 1."""
     if exponent in (0, 1):
         return base if exponent else ONE
     return applied("^", base, constant(exponent))
 
 
-# Functions of one number, by the number x and their value f.
+# Functions of one number: their slope at x, from x and the value f.
 OF_ONE = {
     "neg": lambda x, f: constant(-1),
     "sqrt": lambda x, f: applied("/", constant(0.5), f),

@@ -1,7 +1,4 @@
-"""Errors of a script, with their place in the text and a fix.
-
-Fixes are similar names, and translations of words of other programs.
-"""
+"""Errors of a script, with their place in the text and a fix."""
 
 import difflib
 import re
@@ -17,7 +14,7 @@ _WIDEST_LINE = 160
 
 
 class Place(NamedTuple):
-    """A place in a script: `line` and `column` count from 1, `text` is the whole source line."""
+    """A place in a script: `line` and `column` count from 1; `text` is the source line."""
 
     file: str
     line: int
@@ -37,7 +34,7 @@ class Quit(Exception):
     """The statement quit: the script ends normally."""
 
 
-# Exceptions of foreign code, whose exit() would end the program silently.
+# Exceptions of foreign code, including its exit().
 FAILURES = (Exception, SystemExit)
 
 
@@ -47,14 +44,14 @@ class Pause(Exception):
 
 @dataclass(eq=False, repr=False)
 class ScriptError(Exception):
-    """A mistake in a script or on the command line, which the user has to correct.
+    """A mistake in a script or on the command line, for the user to correct.
 
     Parameters
     ----------
     message
         What is wrong, in one sentence without a full stop.
     argument
-        Name or index of the argument at fault (from 0; negative from the last one without a name);
+        Name or index of the wrong argument (from 0; negative from the last one without a name);
         `karamelo_py.language.signature.call` converts it to a place.
     expected
         What would be correct.
@@ -70,21 +67,21 @@ class ScriptError(Exception):
     hint: str | None = None
     # Command or style that raises it, prepended to the message.
     command: str | None = None
-    # Includes of the script, the nearest first.
+    # Includes of the script, nearest first.
     included: list[Place] = field(default_factory=list)
-    # Independent further mistakes of the script.
+    # Independent further mistakes.
     others: "list[ScriptError]" = field(default_factory=list)
-    # For syntax errors: the statements that are correct.
+    # Of syntax errors: the correct statements.
     statements: list = field(default_factory=list)
-    # Kind of message (codes.toml), word at fault, what it should name, similar known name.
+    # Kind of message (codes.toml), wrong word, what it should name, similar known name.
     code: str = ""
     name: str | None = None
     kind: str = ""
     alike: str | None = None
-    # For failed runs: the likely cause, and the command that resumes.
+    # Of failed runs: likely cause, and the command that resumes.
     cause: str = ""
     resume: str = ""
-    # True once the statement is known; callers further out add nothing.
+    # True once the statement is known.
     complete: bool = False
 
     def __str__(self) -> str:
@@ -95,7 +92,7 @@ class ScriptError(Exception):
         return f"{self.command}: {self.message}" if self.command else self.message
 
     def render(self) -> str:
-        """Format the message and further mistakes for the user."""
+        """Format the message and further mistakes."""
         physics = {"code": self.code, "cause": self.cause, "resume": self.resume}
         text = render_message(
             "error", self.sentence, self.place, self.expected, self.hint, **physics
@@ -144,7 +141,7 @@ def _marked(place: Place) -> list[str]:
         start += (3 if cut else 0) - cut
         length = min(length, max(end - cut - start, 1))
         text = shown
-    # Tabs are copied, so that the carets line up for any tab width.
+    # Tabs are copied to align the carets for any tab width.
     before = "".join(c if c == "\t" else " " * _width(c) for c in text[:start].ljust(start))
     carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
     number = str(place.line)
@@ -161,14 +158,14 @@ def _width(character: str) -> int:
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """Format ``did you mean '...'?`` with the most similar names; None without any."""
+    """Format ``did you mean '...'?`` with the most similar names, if any."""
     ratios = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
     close = [f"'{n}'" for n, ratio in ratios if ratio == ratios[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """Format ``one of a, b, c``; of many, the nearest, their number, and where to find all."""
+    """Format ``one of a, b, c``; of many, the nearest and where to find all."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
@@ -185,7 +182,7 @@ def plural(count: float, noun: str) -> str:
 def unknown(
     message: str, name: str, names: Iterable[str], hint: str | None = None, **where: Any
 ) -> ScriptError:
-    """Make the error for a `name` that is none of `names`; `where` gives the place."""
+    """Make the error for a `name` that is not among `names`; `where` gives the place."""
     names = list(names)
     few = nearest_few(name, names)
     return ScriptError(
@@ -199,7 +196,7 @@ def unknown(
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
-    """Return up to three `names` similar to `name`, most similar first."""
+    """Return up to three similar names, most similar first."""
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
@@ -208,13 +205,13 @@ def nearest_few(name: str, names: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """Return the most similar of `names`, or None if none is similar."""
+    """Return the most similar name, or None if none is similar."""
     names = list(names)
     lowered = name.lower()
     for candidate in names:
         if candidate.lower() == lowered and candidate != name:
             return candidate
-    # A longer name is not a misspelling of a short one: Ek_s is not Es.
+    # A longer name does not misspell a short one: Ek_s is not Es.
     candidates = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
     by_lower = {candidate.lower(): candidate for candidate in candidates}
     for word, among in (name, {n: n for n in candidates}), (lowered, by_lower):
@@ -242,7 +239,7 @@ def codes() -> dict[str, dict[str, Any]]:
 
 
 def of_karamelo(name: str) -> bool:
-    """Tell if `name` is a Karamelo command, which no variable can be called."""
+    """Return True for a Karamelo command, whose name no variable can have."""
     return name in table()["karamelo"].split()
 
 

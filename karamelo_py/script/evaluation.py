@@ -1,4 +1,4 @@
-"""Evaluate trees of expressions to numbers, texts and formulas."""
+"""Evaluate expression trees to numbers, texts and formulas."""
 
 import math
 from functools import partial, reduce
@@ -22,7 +22,6 @@ class NameScope(Protocol):
 
 
 def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
-    """Evaluate the tree of `raw` to a number, a text or a formula."""
     if isinstance(node, (syntax.NumberLiteral, syntax.TextLiteral)):
         return node.value
     if isinstance(node, syntax.Name):
@@ -48,7 +47,7 @@ def _binary(node: syntax.BinaryOperation, raw: syntax.Raw, scope: NameScope) -> 
     left = evaluate(node.left, raw, scope)
     logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
     if logical and (left != 0) == (node.operator == "||"):
-        # Short-circuit evaluation, so that a != 0 && 1/a > 2 is fine.
+        # Short-circuit: a != 0 && 1/a > 2 is fine.
         return 1.0 if left != 0 else 0.0
     right = evaluate(node.right, raw, scope)
     if isinstance(left, str) or isinstance(right, str):
@@ -93,7 +92,7 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
             return evaluate(node.operands[1 if condition != 0 else 2], raw, scope)
     values = tuple(_numeric(operand, raw, scope, node.name) for operand in node.operands)
     if node.name in ("min", "max"):
-        # Pairwise: the evaluator has them for two operands only.
+        # Pairwise: the evaluator takes two operands.
         return reduce(lambda a, b: _apply(node.name, node, (a, b), raw), values)
     return _apply(node.name, node, values, raw)
 

@@ -1,7 +1,7 @@
 """Values of expressions: numbers, texts, and formulas that are evaluated repeatedly.
 
-An operation with a variable operand (a position, the time, a published value) gives a formula, with
-constants folded in.
+An operation with a variable operand (position, time, published value) gives a formula, with
+constants folded.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CHUNK = 1 << 18  # points per evaluation of a formula
 class Expression:
     """A number, or a formula of positions, time and published values.
 
-    Its `names` are the seeds it needs: some of x y z x0 y0 z0, time timestep dt, published names.
+    `names` are its seeds: some of x y z x0 y0 z0, time timestep dt, published names.
     """
 
     __slots__ = ("_term",)
@@ -63,14 +63,14 @@ class Expression:
 
     @property
     def constant(self) -> float:
-        """The constant number; ValueError if it is not constant."""
+        """The number; ValueError if not constant."""
         if not self.is_constant:
             raise ValueError(f"{self.text} is not constant")
         return self._term.value
 
     @property
     def text(self) -> str:
-        """The formula in script syntax, down to its seeds, unless it is too long."""
+        """The formula in script syntax down to its seeds, unless too long."""
         if not terms.is_short(self._term):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
         return terms.text_of(self._term)
@@ -79,7 +79,7 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Tell if it is visibly the same number everywhere."""
+        """Return True if it is visibly the same number everywhere."""
         return terms.alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
@@ -92,7 +92,7 @@ class Expression:
         return _evaluate(self._term, values)
 
     def program(self, values: Values) -> formula.Program:
-        """Compile for :func:`karamelo_py.compiler.formula.evaluate`."""
+        """Return the present number; ScriptError for a formula of positions."""
 
         def place(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
@@ -102,7 +102,7 @@ class Expression:
         return terms.program(self._term, place)
 
     def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
-        """Compile a formula of unpublished numbers for a stack of this depth only."""
+        """Compile a formula without published numbers for a stack of this depth."""
         return terms.program(
             self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth
         )
@@ -110,14 +110,17 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Evaluate (n,) at positions `x` (n, 1 to 3), first at `x0`, by default also `x`."""
+        """Evaluate (n,) at positions `x` (n, 1 to 3), with initial positions `x0` (default:
+
+        `x`).
+        """
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 
         out = np.empty(len(x))
         scratch = np.empty((6 + formula.ROWS, formula.BLOCK))
         program = self.program(values)
-        # In chunks: copies with three columns of millions of points would take much memory.
+        # In chunks: three-column copies of millions of points take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])
@@ -126,7 +129,7 @@ class Expression:
         return out
 
     def evaluate_columns(self, values: Values, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Evaluate for rows of named `columns`, at most six, (n,)."""
+        """Evaluate (n,) for rows of at most six named `columns`."""
         names = list(columns)
         if not names:
             return np.array([self.evaluate(values)])

@@ -1,6 +1,5 @@
-"""Functions of the script language, for numbers.
-
-For many points at once they are in :mod:`karamelo_py.compiler.formula`.
+"""Functions of the script language, for numbers; for many points see
+`karamelo_py.compiler.formula`.
 """
 
 import math
@@ -10,13 +9,13 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.operations import BINARY, UNARY, quietly
 
-# Pi, the golden ratio, and Euler's constant.
+# Pi, golden ratio, Euler's constant.
 CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}
-# Words that look like names, with a meaning for particular commands only.
+# Words that look like names, with a meaning for some commands.
 WORDS = frozenset({"NULL", "INF", "EDGE"})
-# Functions that no variable may be named after; other names were free in Karamelo.
+# Functions that cannot name variables; other names were free in Karamelo.
 RESERVED = frozenset({"exp", "sqrt", "cos", "sin", "tan", "atan2", "log", "if"})
-# Tails of the normal distribution omitted by inv_norm, on each side.
+# Tails of the normal distribution omitted by inv_norm, per side.
 TAIL = 1e-10
 
 
@@ -62,7 +61,7 @@ FUNCTIONS: dict[str, Signature] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """Apply a function or operator to numbers; NaN in, NaN out, errors as in `math`."""
+    """Apply a function or operator to numbers; NaN propagates, errors as in `math`."""
     if any(map(math.isnan, numbers)):
         return math.nan
     result = _COMPUTED[name](*numbers)

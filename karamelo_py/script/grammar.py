@@ -1,4 +1,4 @@
-"""The grammars script.lark and expression.lark, their parsers, and the trees they build."""
+"""Parsers of script.lark and expression.lark, and the trees they build."""
 
 import functools
 import hashlib
@@ -14,7 +14,7 @@ from karamelo_py.compiler import files
 from karamelo_py.script import syntax
 from karamelo_py.script.syntax import Mistake
 
-# Trees are traversed recursively; this stays far below Python's limit.
+# Trees are traversed recursively; far below Python's limit.
 MAX_DEPTH = 150
 
 SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
@@ -30,14 +30,14 @@ def refused() -> type[Exception]:
 def parser_of(start: str) -> Any:
     """Make the parser of statements or of expressions.
 
-    Lark needs 0.06 s for each, and 0.01 s from tables cached on disk. Cache errors are ignored.
+    Lark takes 0.06 s for each, 0.01 s from tables cached on disk. Cache errors are ignored.
     """
     import lark
     from lark.grammar import Rule
     from lark.lexer import TerminalDef
 
     text = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
-    # The tables contain only numbers and strings, so that their bytes create no other objects.
+    # Tables contain only numbers and strings: their bytes create no other objects.
     stamp = hashlib.sha256(f"{lark.__version__} {sys.version} {text}".encode()).hexdigest()[:24]
     path = files.folder().with_name("parsers") / f"{start}-{stamp}.tables"
     with suppress(OSError, ValueError, EOFError, TypeError):
@@ -63,7 +63,7 @@ def literal(word: str, start: int) -> float:
 
 
 def span(part: Any) -> tuple[int, int]:
-    """Return the start and end of a token, or of what was built from some."""
+    """Start and end of a token, or of what was built from tokens."""
     return part if isinstance(part, tuple) else (part.start_pos, part.end_pos)
 
 
@@ -76,7 +76,7 @@ def _spelled(sign: str) -> str:
 
 
 def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
-    """Return start, end and depth of a node above others."""
+    """Start, end and depth of a node above others."""
     depth = 1 + max((node.depth for node in below), default=0)
     if depth > MAX_DEPTH:
         raise Mistake(
@@ -92,7 +92,7 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
 class _TreeBuilder:
     """Builds statement spans and expression trees while Lark parses.
 
-    Each method is named after a grammar rule and receives what it matched.
+    Each method is named after the grammar rule whose matches it receives.
     """
 
     def script(self, parts: list) -> list:
@@ -150,5 +150,4 @@ class _TreeBuilder:
         return syntax.FunctionCall(*around, str(parts[0]), operands)
 
     def parenthesis(self, parts: list) -> syntax.Node:
-        # The same tree, marked and quoted with its parentheses.
         return replace(parts[1], start=parts[0].start_pos, end=parts[2].end_pos)

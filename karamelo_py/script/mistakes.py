@@ -1,6 +1,6 @@
 """Syntax errors in the user's terms: characters, quotes and parentheses, then expressions.
 
-Lark's parser, fed token by token, tells where it stopped, what it had read and what was open.
+Lark's parser, fed token by token, shows where it stopped, what it had read and what was open.
 """
 
 import re
@@ -17,7 +17,7 @@ _PUNCTUATION = re.compile(
 )
 # A C++ comment in the line that ends there.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
-# Empty lines and comments of Abaqus, then a keyword: no script begins like this.
+# How files of Abaqus begin: empty lines, comments, a keyword.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
 _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
@@ -100,7 +100,7 @@ def _type(part: Any) -> str:
 
 
 class _Stop(NamedTuple):
-    """Position where the parser stopped: tokens before and at it, and the parser's stack.
+    """Where the parser stopped: tokens before and at it, and the parser's stack.
 
     `here` is a character that starts no token, a token, or None at the end.
     """
@@ -137,7 +137,6 @@ class _Stop(NamedTuple):
 
 
 def _stop(parser: Any, code: str) -> _Stop:
-    """Feed `code` to Lark's `parser` until it stops."""
     from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
     interactive = parser.parse_interactive(code)
@@ -308,7 +307,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
         style = other.removeprefix("the style ")
         if other and (style == other or " " in style):
             return other
-        if words[1] == "all" or other:  # LAMMPS has the group before the style
+        if words[1] == "all" or other:  # in LAMMPS the group precedes the style
             words[1:3] = style or words[2], words[1]
     if name == "dump" and len(words) > 2:
         words[2] = (instead(name, words[2]) or words[2]).removeprefix("the style ")

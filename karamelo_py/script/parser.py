@@ -1,4 +1,4 @@
-"""Read files as text, and text as statements and expression trees."""
+"""Parse text as statements and expression trees."""
 
 import difflib
 import re
@@ -11,7 +11,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import Mistake
 
 _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
-# First bytes of files that programs write next to scripts.
+# Endings of files that programs write next to scripts.
 _WRITTEN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
     *(".LAMMPS", ".log", ".part"),
@@ -47,7 +47,6 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
 
     The first syntax error has further ones in `others`, and correct statements in `statements`.
     """
-    # Ignore a byte order mark, and normalise line ends.
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     source = syntax.Source(text, file)
     try:
@@ -79,7 +78,7 @@ def parse_expression(raw: syntax.Raw) -> syntax.Node:
 
 
 def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node]:
-    """Parse an expression outside of scripts, such as one from the command line."""
+    """Parse an expression from outside a script, such as the command line."""
     raw = syntax.Raw(syntax.Source(text, file), 0, len(text))
     return raw, parse_expression(raw)
 
@@ -88,7 +87,7 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
 def _tree(code: str) -> syntax.Node:
     """Parse `code`; offsets count from its start."""
     word = code.strip()
-    # Fast path: most arguments and many right-hand sides are one name or integer.
+    # Fast path: most arguments and right-hand sides are one name or integer.
     start = code.index(word)
     if word.isascii() and word.isidentifier() and word not in grammar.SPELLINGS:
         return syntax.Name(start, start + len(word), 1, word)
@@ -121,7 +120,7 @@ def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> s
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
-    """Raw arguments of a call; `parts` are spans (None if empty) and the commas between them."""
+    """Raw arguments of a call; `parts` alternates spans (None: empty) and commas."""
     if parts == [None]:
         return []
     raws = []

@@ -1,4 +1,4 @@
-"""Read text files in the usual encodings, and refuse endless pipes."""
+"""Read text files in the usual encodings; refuse endless pipes."""
 
 import os
 import re
@@ -10,14 +10,14 @@ _CODES = (
     (b"\xff\xfe\0\0", "utf-32"), (b"\0\0\xfe\xff", "utf-32"), (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
-# Shell substitutions <(command), and the read end of a pipe: they will be written to.
+# Shell substitutions <(command), and the read end of a pipe.
 _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
 
 
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
     """Read a regular file of at most `largest` bytes (None: any size).
 
-    Raises OSError if it cannot be read or is not regular.
+    Raises OSError if it is not regular or cannot be read.
     """
     piped = _PIPED.fullmatch(str(path)) is not None
     # Opening a pipe without a writer would block.

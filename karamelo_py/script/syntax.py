@@ -7,12 +7,12 @@ from functools import cached_property
 
 from karamelo_py.script.errors import Place, ScriptError
 
-# Quoted text is matched first, so that # in it starts no comment.
+# Quoted text comes first: a # in it starts no comment.
 _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
 
 class Source:
-    """The text of one script file, with conversion of offsets to places."""
+    """The text of a script file; converts offsets to places."""
 
     def __init__(self, text: str, file: str):
         self.text = text
@@ -23,7 +23,7 @@ class Source:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
     def place(self, start: int, end: int) -> Place:
-        """Return the place of the characters from `start` up to `end`."""
+        """Return the place of the characters from `start` to before `end`."""
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
@@ -33,7 +33,7 @@ class Source:
         return Place(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """Return the characters from `start` to `end`, with comments and line ends blanked."""
+        """Return the characters `start` to before `end`, with comments and line ends blanked."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(
@@ -44,7 +44,7 @@ class Source:
 
 @dataclass(eq=False)
 class Mistake(Exception):
-    """A syntax error at offsets of a text, without a place in a file."""
+    """A syntax error at offsets of a text that has no file yet."""
 
     message: str
     start: int
@@ -93,15 +93,13 @@ class Name(Node):
 
 @dataclass(frozen=True, slots=True)
 class UnaryOperation(Node):
-    """`operator` (``-``, ``+`` or ``!``) in front of `operand`."""
-
     operator: str
     operand: Node
 
 
 @dataclass(frozen=True, slots=True)
 class BinaryOperation(Node):
-    """`left` `operator` `right`; operators are spelled ``^ && ||`` whatever the script uses."""
+    """`left` `operator` `right`; operators are always spelled ``^ && ||``."""
 
     operator: str
     left: Node
@@ -129,7 +127,7 @@ class Raw:
 
     @property
     def code(self) -> str:
-        """The text to parse: as written, with comments and line ends blanked."""
+        """The text to parse, with comments and line ends blanked."""
         return self.source.code(self.start, self.end)
 
     @property
@@ -147,7 +145,7 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Assignment(Statement):
-    """``name = expression``; `right` is the expression as written, `node` its tree."""
+    """``name = expression``: `right` as written, `node` its tree."""
 
     name: str
     right: Raw

@@ -11,7 +11,7 @@ from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import TAIL, compute_quietly
 
-# Number of operations, at most; and the number shown in messages.
+# Largest number of operations, and of those shown in messages.
 _MAX_SIZE = 20000
 _MAX_SHOWN = 1000
 _MAX_LEVELS = 100
@@ -71,7 +71,7 @@ _PRECEDENCE = {
 
 
 class Term:
-    """A node of a formula: a number, the name of a seed, or an operation on terms."""
+    """A node of a formula: a number, a seed's name, or an operation on terms."""
 
     __slots__ = ("names", "operands", "operation", "size", "value")
 
@@ -84,7 +84,7 @@ class Term:
             self.names = frozenset({value})
         elif operands:
             self.names = frozenset().union(*(term.names for term in operands))
-        # Counts shared operations repeatedly; exact only if needed.
+        # Counts shared operations repeatedly; exact only where needed.
         self.size = 1 + sum(term.size for term in operands)
         if self.size > _MAX_SIZE:
             self.size = len(in_order(self))
@@ -153,7 +153,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Tell if two terms are equal, up to the order of operands of + and *."""
+    """Return True for equal terms, up to the operand order of + and *."""
     numbers: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -173,7 +173,7 @@ def number_text(value: float) -> str:
 
 
 def number_of(text: str) -> float | None:
-    """Read the number that a text is, or None."""
+    """Convert a text to a number, or to None."""
     try:
         return float(text)
     except ValueError:
@@ -181,7 +181,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Tell if a term can be written out with shared parts repeated."""
+    """Return True if a term can be written out with shared parts repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -209,7 +209,6 @@ def text_of(term: Term) -> str:
 
 
 def _bracketed(term: Term, level: int) -> str:
-    """Format `term`, in parentheses if it binds less than `level`."""
     if term.operation == "number":
         precedence = 7 if math.copysign(1.0, term.value) < 0 else 9
     else:
@@ -219,11 +218,10 @@ def _bracketed(term: Term, level: int) -> str:
 
 # ---- as programs ---------------------------------------------------------------------------------
 #
-# A formula is a graph: a variable used twice is one term with two users. Terms with several users
-# are computed first, each into a row; so are operands that would not fit on the stack. The rest are
-# trees.
+# Terms with several users are computed once, each into a row, and so are operands that would not
+# fit on the stack. The rest are trees.
 
-# Depth of the stack without rows in between; limits Python's recursion, too.
+# Stack depth without rows; limits Python's recursion, too.
 _MOST_LEVELS = 60
 
 
@@ -232,8 +230,8 @@ def program(
 ) -> formula.Program:
     """Compile the stack program of a term.
 
-    `place` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With a given
-    `depth` the program stores no rows.
+    `place` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With `depth`
+    the program stores no rows.
     """
     return _Writer(root, place, depth).program()
 
@@ -249,14 +247,13 @@ class _Writer:
         self.uses: list[int] = []
         self.uniform: list[bool] = []
         self.code: list[tuple[int, int]] = []
-        self.constants: dict[str, int] = {}  # by hexadecimal text, because 0.0 and -0.0 differ
+        self.constants: dict[str, int] = {}  # by hexadecimal text: 0.0 and -0.0 differ
         self.rows: dict[int, int] = {}  # rows of stored terms
         self.free = list(range(formula.MAX_KEPT))[::-1]
         self.root = self._number(root)
         self.kept = self._chosen()
 
     def _number(self, root: Term) -> int:
-        """Number all terms; equal terms get the same number."""
         numbers: dict[int, int] = {}
         indices: dict[tuple, int] = {}
         for term in in_order(root):
@@ -279,14 +276,14 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """Choose terms to store: with several users, or too deep for the stack."""
+        """Choose the terms to store: with several users, or too deep for the stack."""
         kept = set()
         if not self.bare:
             kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
         rows, levels = [1] * len(self.terms), [1] * len(self.terms)
         for k, (_, operands, _) in enumerate(self.terms):
             while True:
-                # Operands wait on the stack while the next one is computed.
+                # Operands wait on the stack while the next is computed.
                 asked = [i + (1 if o in kept else rows[o]) for i, o in enumerate(operands)]
                 deep = [0 if o in kept else levels[o] for o in operands]
                 rows[k], levels[k] = max(asked, default=1), 1 + max(deep, default=0)

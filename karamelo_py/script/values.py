@@ -12,7 +12,7 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Tell if values with these suffixes have consecutive slots."""
+    """Return True if values with these suffixes have consecutive slots."""
     places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not places or places == list(range(places[0], places[0] + len(suffixes)))
 
@@ -20,8 +20,8 @@ def in_a_row(suffixes: Sequence[str]) -> bool:
 class Values:
     """Named numbers in one array that kernels read and write.
 
-    The array is never reallocated, so references to it stay valid. Slots 0, 1 and 2 are time,
-    timestep (the number of the step) and dt.
+    The array is never reallocated, so references stay valid. Slots 0, 1 and 2 are time, timestep
+    (the number of the step) and dt.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ class Values:
         """Publish the values of a fix or compute: ``ID_x`` for "x" and so on, ``ID`` for "".
 
         ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` have consecutive slots, named or not; so do other
-        suffixes. Earlier names of the ID that are not in `suffixes` are removed.
+        suffixes. Earlier names of the ID that `suffixes` lacks are removed.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
