@@ -15,7 +15,7 @@ from typing import Any, TextIO
 REDRAW = 0.1
 REPORT = 10.0
 # Rich redraws the bar after every line, in 0.25 ms. Lines faster than QUICK (seconds) for more than
-# BURST lines are written in bundles, every LINES seconds.
+# BURST lines are written in bundles every LINES seconds.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05
@@ -101,7 +101,7 @@ class Console:
         stages: Sequence[tuple[str, float]] = (),
         title: str = "Run finished",
     ) -> None:
-        """Write the closing table: facts, then stages and their seconds."""
+        """Write the closing table: facts, then stages in seconds."""
         total = sum(seconds for _, seconds in stages) or 1.0
         parts = {
             f"  {name}": f"{f'{seconds:.3g} s':>8}  {f'{100 * seconds / total:.0f} %':>8}"
@@ -110,7 +110,6 @@ class Console:
         self.banner(title, {**facts, **parts})
 
     def leave(self) -> None:
-        """Stop writing to a terminal that is gone."""
         self._broken, self._progress = True, None
 
     def begin_run(self, step: int = 0, fraction: float = 0.0) -> None:
@@ -131,9 +130,9 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show the progress, and the activity `within` a step; fast enough for each step.
+        """Show the progress and the activity `within` a step; fast enough for each step.
 
-        `fraction` is None if the end of the run is unknown (run_until, run_while).
+        `fraction` is None if the end is unknown (run_until, run_while).
         """
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT
@@ -187,8 +186,8 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe; the run still finishes its files.
-            # Otherwise the interpreter would complain on flushing at exit.
+            # The reader (head, less) has closed the pipe; the run still finishes its files. Without
+            # this, flushing at exit would fail.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
@@ -198,7 +197,7 @@ def _print(stream: TextIO, text: str) -> None:
     try:
         stream.write(text + "\n")
     except UnicodeEncodeError:
-        # Escape what the encoding of the stream (a Windows pipe) lacks.
+        # Escape what the stream's encoding (a Windows pipe) lacks.
         encoding = stream.encoding or "ascii"
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()

@@ -1,4 +1,4 @@
-"""Points and nodes of a whole scene for output, ordered by id; formulas of their columns."""
+"""Points and nodes of a scene for output, ordered by id; formulas of their columns."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -34,12 +34,10 @@ from karamelo_py.script.errors import ScriptError, one_of, table, unknown
 from karamelo_py.script.expressions import Expression
 
 LAST = 2**62  # above all point numbers
-PIECE = 1 << 17  # points per piece
+PIECE = 1 << 17
 
 
 class PointGroup(Protocol):
-    """A group of points, or all; see `scene.group`."""
-
     all: bool
     ids: np.ndarray
 
@@ -130,8 +128,8 @@ class Fields(PointTable):
     def added_up(self, part: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
         """Sum terms over the points of a part's group, exactly.
 
-        The method `name` of `part` is called with tables of some of the points, and `arguments`. It
-        returns rows of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
+        The method `name` of `part`, called with tables of some points and `arguments`, returns rows
+        of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(part.group):
@@ -148,7 +146,7 @@ class Fields(PointTable):
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        # Few of the thousands for a quantile are not 0.
+        # Most of a quantile's thousands are 0.
         return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
@@ -161,7 +159,7 @@ class Fields(PointTable):
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Grouped, name: str, *arguments: object) -> list:
-        """Collect results of a part's method, one per piece of its group."""
+        """Collect the results of a part's method, one per piece of its group."""
         results = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
         local = [one for one in results if one is not None]
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
@@ -223,7 +221,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """A dump or compute uses ``epdot``, which points then store."""
+        """True if a dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -258,7 +256,6 @@ class Fields(PointTable):
 
 
 def ranges(count: int) -> Iterator[tuple[int, int]]:
-    """Yield begin and end of each piece of `count` items."""
     return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
 
 
@@ -278,8 +275,6 @@ def _kinetic(s: Setup, block: Block) -> np.ndarray:
 
 
 def _of_law(density: Callable) -> Callable:
-    """Energy of each point from a density per volume."""
-
     def energies(s: Setup, block: Block) -> np.ndarray | None:
         if not can(block.laws, density):
             return None
@@ -297,7 +292,7 @@ def _bounces(_: Setup, block: Block) -> np.ndarray | None:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Initial internal energy of a gas; stored energy is relative to it, or would lose digits."""
+    """Initial internal energy of a gas; stored energy is relative to it, to retain digits."""
     law = elastic_law(block.laws)
     if not can(law, taken_heat):
         return None
@@ -381,7 +376,6 @@ def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -
 
 
 def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
-    """Make the error for an unknown column; `where` gives its place."""
     known = list(known)
     error = unknown(message, name, known, code="unknown-column", **where)
     error.expected = one_of(name, known, page="docs/reference/columns.md")

@@ -37,7 +37,7 @@ def folder_of_discarded() -> Path | None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a temporary file that becomes `path` once it is complete."""
+    """Open a temporary file that becomes `path` once complete."""
     if folder_of_discarded() is not None:
         yield BytesIO()
         return
@@ -67,7 +67,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open `path` at byte `start` (0: new); an error cuts it back to `start`, plus `tail`."""
+    """Open `path` at byte `start` (0: new); an error truncates it to `start`, plus `tail`."""
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)
@@ -94,11 +94,11 @@ def picture_format(path: Path) -> str:
 
 
 def savefig(figure: Any, path: Path) -> None:
-    """Save a Matplotlib figure by its file name; equal figures give equal bytes."""
+    """Save a Matplotlib figure; equal figures give equal bytes."""
     import matplotlib
 
     ending = picture_format(path)
-    # Equal files need no date and a fixed salt of SVG ids.
+    # For equal bytes: no date, and a fixed salt of SVG ids.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
     with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), unwarned(), whole(path) as file:
         figure.savefig(file, format=ending, metadata=undated)
@@ -106,7 +106,6 @@ def savefig(figure: Any, path: Path) -> None:
 
 @contextmanager
 def unwarned() -> Iterator[None]:
-    """Suppress Matplotlib's warnings of missing glyphs and tight layouts."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -151,7 +150,6 @@ class Frames:
         self._saved = 0
 
     def add(self, draw: Callable[[BinaryIO], None]) -> None:
-        """Add a frame that `draw` writes as PNG."""
         file = BytesIO()
         draw(file)
         self._frames.append(file.getvalue())
@@ -175,7 +173,7 @@ class Frames:
             format="GIF",
             save_all=True,
             append_images=others,
-            # In 1/100 s; viewers slow down below two of them.
+            # In 1/100 s; below two of them, viewers slow down.
             duration=max(20, 10 * round(100 / self.fps)),
             loop=0,
         )
@@ -183,7 +181,7 @@ class Frames:
     def _save_mp4(self, path: Path, file: BinaryIO) -> None:
         command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png"]
         command += ["-framerate", f"{self.fps:g}", "-i", "-"]
-        # Players need even sizes and chroma at half the resolution.
+        # Players need even sizes and chroma at half resolution.
         command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
         command += ["-f", "mp4", file.name]
         done = subprocess.run(command, input=b"".join(self._frames), capture_output=True)

@@ -22,7 +22,7 @@ _MASK = 0xFFFFFFFF
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open an HDF5 file at its present content; OSError if it is none, truncated or damaged."""
+    """Open an HDF5 file at its present content; OSError if not HDF5, truncated or damaged."""
     import h5py
 
     with path.open("rb", buffering=0) as raw, h5py.File(_Closed(raw), "r") as root:
@@ -62,7 +62,7 @@ class _Closed(io.RawIOBase):
 
 
 def _closed(head: bytes, size: int) -> bytes:
-    """Header with cleared flags and the present end."""
+    """Return the header with cleared flags and the present end."""
     if len(head) < _HEAD.size + 4 or head[:8] != _SIGNATURE or head[8] not in _NEW:
         return head  # left to HDF5
     signature, version, offsets, lengths, flags, base, extension, end, root = _HEAD.unpack_from(

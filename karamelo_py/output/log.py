@@ -23,9 +23,9 @@ NUMBER_WIDTH = 16
 class Log(Rhythmic):
     r"""Table of logged quantities.
 
-    A header, then rows. Columns start at the margin and are separated by blanks, for
-    ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; in
-    .csv by commas. Later runs append; if the columns change, a comment line (``#``) names the new
+    A header, then rows. Columns start at the margin, separated by blanks for
+    ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; by
+    commas in .csv. Later runs append; if the columns change, a comment line (``#``) names the new
     ones.
     """
 
@@ -75,7 +75,7 @@ class Log(Rhythmic):
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # A blank reserves the minus sign; pandas needs the first column at the margin.
+        # The blank is for a minus sign; pandas needs the first column at the margin.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
         self._put(cells)
@@ -94,7 +94,6 @@ class Log(Rhythmic):
                 file.close()
 
     def _go_on(self) -> None:
-        """Continue an earlier run's file after its last row."""
         if not self.hub.output.writes:
             return
         size = self.path.stat().st_size if self.path.is_file() else 0
@@ -149,7 +148,7 @@ class Log(Rhythmic):
 
 
 def _is_log(path: Path) -> bool:
-    """The file looks like a log (names, then numbers), or does not exist."""
+    """Return True for a log (names, then numbers) or a missing file."""
     try:
         with path.open(encoding="utf-8") as file:
             lines = [file.readline(1 << 16) for _ in range(4)]
@@ -175,7 +174,6 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 
 def begins_anew(path: Path) -> str:
-    """Warning that a run continues without this file."""
     if not path.is_file():
         return f"there is no {path} of the run that is gone on from: it begins anew"
     return f"{path} is not as the run left it that is gone on from: it begins anew"

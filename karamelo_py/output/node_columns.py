@@ -62,7 +62,7 @@ def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
 
 
 def mask(nodes: NodeTable) -> np.ndarray:
-    """Karamelo's bits: 1 for all nodes, 2 for nodes of the first group, 4 of the second, ..."""
+    """Karamelo's bits: 1 for all nodes, 2 for the first group, 4 for the second, ..."""
     bits = np.ones(len(nodes.ids))
     for k, group in enumerate(nodes.hub.groups.values(), 1):
         if group.kind == "nodes":
@@ -79,7 +79,7 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
     """Karamelo's type of a node along one axis.
 
-    Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 in between.
+    Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 between.
     Bernstein: 1 in the middle of a cell. Else 0.
     """
     basis = nodes.hub.update.method.basis
@@ -197,7 +197,6 @@ def brought(simulation: Any, name: str) -> np.ndarray:
 
 
 def loaded(hub: Scene, simulation: Any) -> dict[str, int]:
-    """Count the nodes with mass under each force fix, by ID."""
     loading = {
         ID: fix for ID, fix in hub.fixes.items() if isinstance(fix.hooks().get(LOADS), CompiledHook)
     }

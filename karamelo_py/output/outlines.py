@@ -9,8 +9,8 @@ import numpy as np
 from contourpy import contour_generator
 
 FINE = 300  # steps along the longest side of a tool's outline
-# Sections of tools in 3D: points per axis of the search, steps along a section, bisections for its
-# ends, and sections between these.
+# Sections of 3D tools: search points per axis, steps along a section, bisections for its ends,
+# sections between these.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines between faces
 # Points that measure spacing (least, most), and distances per batch.
@@ -26,7 +26,7 @@ class Tool(NamedTuple):
     faces: np.ndarray | None = None
 
     def lines(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield lines (m, d) on its surface between two corners (d,)."""
+        """Yield lines (m, d) on the surface between two corners (d,)."""
         plane = len(lo) == 2
         if self.faces is None:
             contours = (
@@ -45,7 +45,7 @@ class Tool(NamedTuple):
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) where points x (n, 2) fill half of the space.
 
-    Each point is scattered to nodes of cells of its size, over three of them. A node at the surface
+    Points are scattered to nodes of cells of their size, over three cells. A node at the surface
     gets half as much as nodes inside.
     """
     cell = spacing(x, 4)
@@ -82,7 +82,6 @@ def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _largest(values: np.ndarray, reach: int) -> np.ndarray:
-    """Maximum over neighbours up to `reach` along each axis."""
     for axis in [*range(values.ndim)] * reach:
         neighbours = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
         values = np.maximum(values, neighbours)
@@ -99,7 +98,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Lines (m, 2) of zero depth between corners (2,), in `fine` steps on the long side."""
+    """Lines (m, 2) of zero depth between corners (2,), with `fine` steps on the long side."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -110,8 +109,8 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
     """Yield lines (m, 3) on a tool's surface between two corners (3,).
 
-    They are sections across each axis: at the ends, where faces meet, and in between if the surface
-    is curved. A box gets its edges, a ball circles.
+    Sections across each axis: at the ends, where faces meet, and between if the surface is curved.
+    A box gets its edges, a ball circles.
     """
     lattice = _lattice_around(depth, lo, hi)
     for axis in range(3) if lattice else ():
@@ -121,8 +120,6 @@ def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.n
 
 
 class _Lattice(NamedTuple):
-    """Coordinates along each axis, depths, and bounds of a surface."""
-
     axes: list[np.ndarray]
     depths: np.ndarray
     lo: np.ndarray
@@ -150,13 +147,13 @@ def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | 
 
 
 def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
-    """Tell whether each section across an axis (n,) cuts the surface."""
+    """Mask (n,) of the sections across an axis that cut the surface."""
     within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
     return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
 
 def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
-    """Both ends of a surface along an axis, by bisection; empty if there is no surface."""
+    """Both ends of a surface along an axis, by bisection; empty without a surface."""
     axes, crossed = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
     ends = []
     for k, beyond in ((crossed[0], -1), (crossed[-1], 1)) if len(crossed) else ():
@@ -172,7 +169,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) of sections that show the surface, but not of a plane that cuts it off."""
+    """Yield lines (m, 3) of sections that show the surface, but not a plane that cuts it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(*ends, BETWEEN + 2)
@@ -258,7 +255,7 @@ class Front:
         return _contours(across, up, filled.T, 0.5)
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
-        """Tell whether all cells `around` x (n, 2) are in front of these heights."""
+        """Mask of x (n, 2) whose cells `around` are all in front of these heights."""
         return -_largest(-self.height, around)[self._cells(x)] > height + 3 * self.cell
 
 
@@ -270,7 +267,7 @@ def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bo
 
 
 def spacing(x: np.ndarray, count: int = 1) -> float:
-    """Mean distance from the nearest `count` neighbours, of points (n, d)."""
+    """Mean distance of points (n, d) from their nearest `count` neighbours."""
     if len(x) <= count:
         return 0.0
     near = []

@@ -46,7 +46,7 @@ HIDDEN = (0.0, 0.0, 0.0, 0.25)
 # Diameter of the circle with the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
 STEPS = (1, 2, 2.5, 5, 10)  # between ticks
-# Of the light: right, up, towards the eye.
+# Direction of the light: right, up, towards the eye.
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5
 LIT = 8  # points that make a surface
@@ -56,9 +56,9 @@ Window = Sequence[tuple[float | None, float | None]]
 
 
 class Options(NamedTuple):
-    column: str  # colours the points; 1D: ordinate
+    column: str  # colours the points; in 1D the ordinate
     label: str  # of the colour bar or ordinate
-    solids: tuple[str, ...] = ()  # names of solids that colour the points, instead of `column`
+    solids: tuple[str, ...] = ()  # solids that colour the points, instead of `column`
     limits: tuple[float | None, float | None] = (None, None)  # None: grow
     symmetric: bool = False  # about 0
     cmap: str = "viridis"
@@ -66,7 +66,7 @@ class Options(NamedTuple):
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # unit of lengths
-    mirror: bool = False  # points are drawn on both sides of x = 0
+    mirror: bool = False  # draw points on both sides of x = 0
     window: Window = ()  # x, y, z; None: the domain
     log: bool = False  # logarithmic colours; values <= 0 get the lowest
     quantile: float = 0.0  # fraction of values at each end beyond the limits
@@ -79,7 +79,7 @@ class DrawnPoints(Artist):
     def __init__(self, picture: Picture):
         super().__init__()
         self.picture = picture
-        self.rows = np.empty((3, 0))  # projected positions, value, in 3D also light
+        self.rows = np.empty((3, 0))  # projected positions, value; in 3D also light
         self.lines = LineCollection(
             [], colors="black", capstyle="round", linewidths=0.1 * picture.options.fontsize
         )
@@ -121,7 +121,7 @@ class Picture:
         self.axes = self.figure.add_subplot()
         self.limits: tuple[float, float] | None = None
         self.beyond = (False, False)
-        # Axis whose labels follow the limits.
+        # Axis with labels that follow the limits.
         self.scale: Any = None
         self._laid_out = False
         self._widest = 0.0  # title, in pixels
@@ -146,7 +146,7 @@ class Picture:
         """Mark ends of the colour bar with values beyond."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """Label an axis, in a unit that suits its numbers; without a unit, with a power of 1000."""
+        """Label an axis in a unit that suits its numbers; without a unit, with a power of 1000."""
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -216,20 +216,19 @@ class Picture:
         """Draw lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
-        """Write the title above the axes, or across the picture if it is wider."""
+        """Write the title above the axes, or across the picture if wider."""
         self.title.set_text(text)
         whole = self.figure.bbox.width - 2 * MARGIN
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
             self.title.set_fontsize(self.title.get_fontsize() * whole / wide)
-        self._widest = max(self._widest, min(wide, whole))  # shorter titles do not move
+        self._widest = max(self._widest, min(wide, whole))  # shorter titles stay in place
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
         at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
         self.title.set_x((at - box.x0) / box.width)
 
     def begin_with(self, limits: tuple[float, float] | None) -> None:
-        """Start from the limits of an earlier picture."""
         self.limits = limits
         if limits is not None:
             if not self._laid_out:
@@ -258,7 +257,7 @@ class Picture:
         self.canvas.restore_region(self._background)
         self.axes.draw_artist(self.title)
         self.axes.draw_artist(self.marks)
-        # Opaque: three channels are enough.
+        # Opaque: three channels suffice.
         pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
         image = Image.fromarray(np.ascontiguousarray(pixels))
         image.save(file, format="PNG", compress_level=compression)
@@ -301,7 +300,7 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Extend limits to the finite values, rounded outwards to change rarely (to 2^k / 8)."""
+    """Extend limits to the finite values, rounded outwards to 2^k / 8 to change rarely."""
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:
@@ -323,7 +322,6 @@ def within(values: np.ndarray, share: float) -> np.ndarray:
 
 
 def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.ndarray]:
-    """Select rows with x, y and z in a window."""
     for name, ends in zip("xyz", window, strict=False):
         for end, out in zip(ends, (np.less, np.greater), strict=True):
             if end is not None:
@@ -362,7 +360,6 @@ def _power(value: float, _: object = None) -> str:
 
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
-    """Invisible arrows at both ends of a colour bar."""
     looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
     return [
         Polygon(
@@ -406,7 +403,7 @@ class PlanePicture(Picture):
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
-        # The bar checks each end when it is set, and swaps ends in the wrong order.
+        # The bar checks each end when set, and swaps ends in wrong order.
         if hi > self.norm.vmin:
             self.norm.vmax, self.norm.vmin = hi, lo
         else:
@@ -562,7 +559,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Light on some points; a surface faces the side with fewer points."""
+        """Light on `some` points; a surface faces the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2

@@ -36,7 +36,7 @@ class PlottedCurve(Rhythmic):
 
 
 class Plots(dict[str, PlottedCurve]):
-    """Curves by ID, and their file, if any; curves over the same quantity have common axes."""
+    """Curves by ID, and their file, if any; curves of the same quantity have common axes."""
 
     def __init__(self, hub: Scene):
         super().__init__()
@@ -75,7 +75,6 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
             chosen = [curve for curve in over_x if curve.side == side]
             # Colours continue from left to right.
             lines += _over_one_axis(axes, side, chosen, len(lines), labelled) if chosen else []
-        # Above the curves.
         above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
         axes.legend(handles=lines, **above, frameon=False, fontsize="small")
     savefig(figure, path)
@@ -84,7 +83,6 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
 def _over_one_axis(
     axes: Any, side: str, curves: list[PlottedCurve], first: int, labelled: Callable[[str], str]
 ) -> list:
-    """Draw curves over one y axis; return the lines."""
     if side == "right":
         axes = axes.twinx()
         axes.spines[["top", "left"]].set_visible(False)
@@ -119,7 +117,7 @@ def in_mathtext(lead: str, exponent: int) -> str:
 
 
 def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
-    """Format numbers of an axis consistently: 0.02, 500, or 10^-7, 3·10^-7."""
+    """Format numbers of an axis alike: 0.02, 500, or 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
     return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 
@@ -151,7 +149,7 @@ def real_ticks(axis: Any) -> None:
 
 
 def tidy(axes: Any) -> None:
-    """Draw a light grid, no frame at the far sides, and full numbers at the ticks."""
+    """Draw a light grid, no frame at the far sides, full numbers at the ticks."""
     real_ticks(axes.xaxis)
     real_ticks(axes.yaxis)
     axes.grid(True, color="0.9", linewidth=0.7)

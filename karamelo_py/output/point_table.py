@@ -45,7 +45,6 @@ class Part(NamedTuple):
     places: np.ndarray | slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
-        """Select these points from an array (..., k) over the block."""
         whole = self.rows is None or len(self.rows) == array.shape[-1]
         return array if whole else fields.some_points(array, self.rows)
 
@@ -71,7 +70,7 @@ class Rows(NamedTuple):
             yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Gather a field (n, ...), which `of` selects; zero for deleted points."""
+        """Gather a field (n, ...) selected by `of`; zero for deleted points."""
         local = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
@@ -82,7 +81,7 @@ class Rows(NamedTuple):
         return field.T
 
     def put(self, of: Callable[[Points], np.ndarray], values: np.ndarray) -> None:
-        """Scatter a field (n, ...), which `of` selects."""
+        """Scatter a field (n, ...) selected by `of`."""
         for block, rows, places in self.parts:
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
@@ -100,7 +99,7 @@ class Rows(NamedTuple):
         local, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
-            # Empty arrays have another type: another compilation.
+            # Empty arrays have another type, which would be compiled again.
             if len(points.id) and (fill := of(part.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(Matter(s.kin, points, part.block.laws), rows)
@@ -190,16 +189,15 @@ class PointTable:
         return rows._filled(np.zeros(kept.T.shape, kept.dtype), local)
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (n, components); None if the scene does not have it."""
+        """A declared field (n, components); None if the scene lacks it."""
         return self._rows.declared(kind)
 
     def columns_of_laws(self) -> set[str]:
-        """Columns declared by the laws of the materials."""
         laws = [material.law for material in self.hub.materials.values()]
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """A column (n,) of the existing points; 0 if the scene does not have it, as in Karamelo."""
+        """A column (n,) of the existing points; 0 if the scene lacks it, as in Karamelo."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -227,7 +225,6 @@ class PointTable:
 
 
 def owners_of_fields(hub: Scene, contact: object = None) -> list:
-    """Parts of a scene that may declare fields."""
     update, method = hub.update, hub.update.method
     heat = Conducting if update.thermal else None
     grids = ReflectingGrid if update.boundary == "reflect" else None

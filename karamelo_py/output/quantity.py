@@ -25,7 +25,7 @@ class Quantity:
         self.hub = hub
         self.name = name
         self.formula = formula
-        self._reported_nan = False  # a NaN has been reported
+        self._reported_nan = False
         self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return
@@ -71,7 +71,7 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """Current number or word; the first NaN is reported."""
+        """Return the number or word; the first NaN is reported."""
         if self.is_word:
             return self.hub.simulation.steps.ruling_limit
         source = self._source()
@@ -89,7 +89,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """Current source: the script may redefine a variable between runs."""
+        """Read each time: the script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula

@@ -61,7 +61,6 @@ class RunRecord:
         self._begun = time.perf_counter()
 
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
-        """Note the script and values of its variables."""
         of_content = None
         with suppress(OSError):
             if Path(file).is_file():  # a pipe can be read only once
@@ -78,7 +77,6 @@ class RunRecord:
         return str(self.content.get("script", {}).get("file", "SCRIPT"))
 
     def begin(self, facts: Mapping[str, object]) -> None:
-        """Add a run, with facts known before its first step."""
         self.content["status"] = "running"
         self.runs.append(dict(facts))
         self._write()
@@ -93,7 +91,6 @@ class RunRecord:
         self._note("warning", text, place, hint=hint, code=code, cause=cause)
 
     def end(self, status: str, error: BaseException | None = None) -> None:
-        """Note the end of the script: finished, interrupted or failed."""
         self.content["status"] = status
         if isinstance(error, ScriptError):
             fields = {"code": error.code, "cause": error.cause, "resume": error.resume}
@@ -101,7 +98,7 @@ class RunRecord:
             self._note("error", error.sentence, error.place, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
-        # In Python each command ends here, and few change anything.
+        # In Python each command ends here; few change anything.
         if (self.runs or self.is_asked_for) and self._written != (status, len(self.messages)):
             self._write()
 
@@ -127,7 +124,7 @@ class RunRecord:
 
 
 def _finite(value: object) -> object:
-    """Python numbers of NumPy's; None if not finite."""
+    """Convert NumPy's numbers to Python's; None if not finite."""
     if isinstance(value, dict):
         return {name: _finite(of) for name, of in value.items()}
     if isinstance(value, (list, tuple)):

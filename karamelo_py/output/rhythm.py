@@ -44,7 +44,7 @@ class Rhythmic:
         self.write()
 
     def finish(self) -> None:
-        """Complete the files at the end of each run, also of a failed one."""
+        """Complete the files at the end of each run, including failed ones."""
 
     @property
     def passed(self) -> int | None:

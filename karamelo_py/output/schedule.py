@@ -20,9 +20,9 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    Each is due at the first and last state of every run and at multiples of its `every`, in
-    absolute steps or time: further runs continue the sequence. No state is written twice to a file.
-    Nothing is written in a rehearsal.
+    Due are the first and last state of every run and multiples of `every`, in absolute steps or
+    time: further runs continue the sequence. No state is written twice to a file, and nothing in a
+    rehearsal.
     """
 
     def __init__(self, hub: Scene):
@@ -34,14 +34,11 @@ class Output:
         self.writes = True
         # Written after everything else of a state.
         self.last: list[Rhythmic] = []
-        # Live pages being watched.
         self.pages: list[Rhythmic] = []
-        # Writer by file.
         self.files: dict[Path, str] = {}
 
     @property
     def takes_part(self) -> bool:
-        """Tell whether this process takes part in writing dumps."""
         return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:
@@ -86,7 +83,6 @@ class Output:
             self.write(last=True)
 
     def next_step(self, step: int) -> int:
-        """First step after `step` at which output is due."""
         update = self.hub.update
         fixed = update.fixed_dt is not None
         return min(
@@ -119,7 +115,6 @@ class Output:
                 item.last_step = self.hub.update.step
 
     def end(self, last: bool = True) -> None:
-        """Write the last state (if `last`), and complete plots and dumps."""
         if self.hub.rehearsing:
             return
         if last:
@@ -158,7 +153,6 @@ class Output:
 
 @contextmanager
 def _reported(item: Rhythmic | Plots, what: str) -> Iterator[None]:
-    """Point errors to the command that defined an item."""
     naming = as_script_error(f"dump {item.style}", what, type(item), item.place)
     try:
         with naming if item.style else nullcontext():
@@ -178,7 +172,7 @@ def _located(error: ScriptError, place: Place | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Tell whether `path`, whose first ``*`` becomes a number, can name the file `other`."""
+    """Return True if `path`, whose first ``*`` becomes a number, can name the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

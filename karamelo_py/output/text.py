@@ -1,12 +1,12 @@
 """Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``, compiled.
 
 The nine digits of x are the rounded digits of x 10^k. The product has twice the digits of a double:
-it is exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Such numbers,
-and those near the ends of the range of doubles, are left to Python; all are without compilation, or
-on big-endian machines.
+exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Such numbers and those
+near the ends of the range of doubles are left to Python; all are without compilation or on
+big-endian machines.
 
-Digits are written eight at a time; surplus ones are overwritten: mispredicted branches cost more
-than bytes.
+Digits are written eight at a time; surplus ones are overwritten, because mispredicted branches cost
+more than bytes.
 """
 
 import sys
@@ -32,7 +32,6 @@ FIRST = -280  # of the powers in POWERS
 
 
 def _power(k: int) -> tuple[float, float]:
-    """Return 10^k as a sum of two doubles."""
     exact = Fraction(10) ** k
     high = float(exact)
     return high, float(exact - Fraction(high))
@@ -48,7 +47,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
     """Yield the rows of a table as text, block by block.
 
-    Integers are written as integers, the rest with nine significant digits.
+    Integers are written as such, the rest with nine significant digits.
     """
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
@@ -75,12 +74,12 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 
 @kernel
 def write_rows(table, start, text, at):
-    """Write numbers, row after row, until the end or one that is left to Python.
+    """Write numbers, row after row, up to one that is left to Python.
 
     `table`: numbers (rows, columns), the same memory as integers, and which columns are integers.
-    `start` is the index of the first number, along the rows. `text` has `NUMBER_BYTES` per number,
-    and continues at `at`. Returns the index of the number left to Python (or their count), and the
-    end of the text.
+    `start`: index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and
+    continues at `at`. Returns the index of the number left to Python (or their count), and the end
+    of the text.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -161,7 +160,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Return nine digits of x > 0 as an integer (0 if in doubt), and the power of ten of the first.
+    """Return nine digits of x > 0 as an integer (0 if in doubt), and the first one's power of ten.
 
     `binary` is the power of two of x.
     """

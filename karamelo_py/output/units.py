@@ -70,7 +70,6 @@ class Units(NamedTuple):
         return " ".join(self)
 
     def si(self, powers: Powers) -> float:
-        """SI value of the unit of a mechanical quantity."""
         si = LENGTHS[self.length] ** powers.length * MASSES[self.mass] ** powers.mass
         return si * TIMES[self.time] ** powers.time
 

@@ -9,7 +9,7 @@ from karamelo_py.output.files import whole
 from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.vtu import arrays_of
 
-VERSION = "v110"  # of HDF5: programs read the files of this version and later ones
+VERSION = "v110"  # of HDF5: readable with this version and later ones
 POSITIONS = ("x", "y", "z")
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
@@ -30,7 +30,7 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
         top.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", 8))
 
         def virtual(group: h5py.Group, name: str, parts: Sequence[str]) -> None:
-            """Add the columns `parts`, step after step; 0 where there is none."""
+            """Add the columns `parts`, step after step; 0 for missing ones."""
             layout = h5py.VirtualLayout((steps * count, *[len(parts)] * (len(parts) > 1)), float)
             for k, part in enumerate(parts):
                 if part in columns:

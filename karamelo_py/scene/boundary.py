@@ -37,7 +37,7 @@ def check(hub: Scene) -> None:
 def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     """Delete points that left the domain in a failed step, and restore its start.
 
-    The choice depends on the state only, not on threads or on how a run is divided.
+    Depends on the state only, not on threads or on how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False

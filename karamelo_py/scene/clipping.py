@@ -1,7 +1,7 @@
 """Clip the boxes of points at the edge of a region: volumes and centroids.
 
-The surface in a box is a plane, fitted to `Region.depth` at corners and centre; boxes where it is
-not plane are halved, up to `HALVED` times.
+The surface in a box is a plane, fitted to `Region.depth` at corners and centre; boxes with other
+surfaces are halved, up to `HALVED` times.
 """
 
 import itertools
@@ -44,7 +44,7 @@ class Pieces(NamedTuple):
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
     """Boxes of edge `size` around `x` (n, d) in a region: mask, and pieces at its edge.
 
-    Boxes end at the domain and at the region's bounding box: faces along the axes are exact.
+    Boxes end at the domain and at the region's bounding box, so faces along the axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -199,8 +199,10 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, less (plus, less ...)
-    the simplices at the other corners, outside the cube.
+    """`_plane` for slopes -`m` < 0 (d, n):
+
+    a simplex at the lowest corner, minus (plus, minus ...) those at the other corners, outside the
+    cube.
     """
     d = len(m)
     top = mean + m.sum(axis=0) / 2

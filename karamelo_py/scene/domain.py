@@ -15,8 +15,8 @@ from karamelo_py.script.errors import Place, ScriptError
 class Domain:
     """A box with a grid of square cells from its lower corner.
 
-    If a side is not a multiple of `h`, the grid extends past the upper corner by less than a cell.
-    `lo` and `hi` (3,) are 0 in unused directions. Without `h` the first solid sets the cell size.
+    The grid extends past an upper corner that is no multiple of `h` by less than a cell. `lo` and
+    `hi` (3,) are 0 in unused directions. Without `h` the first solid sets the cell size.
     """
 
     thin = False  # plane stress, or uniaxial stress in 1D

@@ -69,11 +69,11 @@ class AnyGroup(Named):
 
 
 class ParticleGroup(AnyGroup):
-    """Points, chosen by their reference positions when they are added."""
+    """Points, chosen by their reference positions when added."""
 
     kind = "particles"
     script_kind = "a group of points, or all"
-    # Membership, one bit per point from the lowest of a byte on, and 64 spare bits.
+    # One bit per point from the lowest of a byte on, and 64 spare bits.
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
@@ -122,7 +122,7 @@ class ParticleGroup(AnyGroup):
         return self.take(self._found(region, solids))
 
     def take(self, pieces: Iterable[np.ndarray]) -> int:
-        """Add ascending pieces of numbers; return how many."""
+        """Add ascending pieces of numbers; return their count."""
         bits, count = self.bits(self.total() + 64), 0
         for ids in pieces:
             if len(ids):
@@ -202,7 +202,7 @@ class NodeGroup(AnyGroup):
                 )
 
     def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
-        """Nodes in `region`; with separate grids, only on the grids of `solids`."""
+        """Nodes in `region`; with separate grids, only on those of `solids`."""
         if region.unknown:
             return np.empty(0, dtype=np.int64)
         require_grid(self.hub)

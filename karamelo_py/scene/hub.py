@@ -223,12 +223,11 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """A run has changed the state (in a rehearsal: will have)."""
+        """True if a run has changed the state (in a rehearsal: will have)."""
         return bool(self.begun or self.update.step)
 
     @property
     def simulation(self) -> Any:
-        """Arrays of the current scene, made on demand."""
         run, current = self.in_run, self._simulation
         if current is not None and run and run == self._fits_run:
             return current
@@ -271,7 +270,7 @@ class Hub:
                         item.place,
                         hint="its author calls self.publish in refresh, or says published = ()",
                     )
-        # A compute of a plug-in may use random numbers: rank 0's values count.
+        # A plug-in's compute may use random numbers: rank 0's values count.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
@@ -325,7 +324,7 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """Copy for trying the rest of the script; objects that commands never change are shared."""
+        """Copy for trying the rest of the script; shares objects that commands never change."""
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)
@@ -361,5 +360,5 @@ class Hub:
             mine = self.groups[ID] = copy.copy(group)
             mine.hub = self
         if real._lattices is not None:
-            # Unchanged grids stay the same objects, so that node groups need no new search.
+            # The same objects if unchanged: node groups need no new search.
             self._lattices = self._key_of_lattices, real._lattices[1]

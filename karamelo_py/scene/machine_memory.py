@@ -149,7 +149,7 @@ def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Roo
     """Room for points whose law has `state` numbers.
 
     A point has two positions, a velocity, a mass, the state and three integers; the last good state
-    of a run has position, velocity and state again.
+    of a run repeats position, velocity and state.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

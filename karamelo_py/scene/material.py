@@ -1,4 +1,4 @@
-"""Named materials and parts of materials: entries of catalogues."""
+"""Named materials and their parts: entries of catalogues."""
 
 from typing import NamedTuple
 

@@ -1,8 +1,8 @@
 """Base classes of fixes and computes (Modify in LAMMPS and Karamelo).
 
-A fix overrides hooks, named as in Karamelo; docs/plugins.md lists them. A hook is a method, called
-with a view of the group at that stage of each step, or a compiled hook made by :func:`node_hook`,
-:func:`point_hook` or :func:`vector_hook`.
+A fix overrides hooks, named as in Karamelo and listed in docs/plugins.md. A hook is a method,
+called with a view of the group at that stage of each step, or a compiled hook made by
+:func:`node_hook`, :func:`point_hook` or :func:`vector_hook`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -100,7 +100,7 @@ class Fix(Publisher):
     # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
     # are all held, as at the ends of the grid.
     held_directions: tuple[int, ...] = ()
-    # Formula of the friction coefficient of this wall in directions without a formula; None:
+    # Friction coefficient (formula) of this wall in directions without a formula; None:
     # frictionless.
     wall_friction: Any = None
     # Declared fields (`compiler.fields`); `Force` for forces on points set in

@@ -19,7 +19,7 @@ MAX_POINTS = 2**31 - 1
 SAMPLE = 4096  # positions
 LOOKS = 9  # doublings of the sample, to a million
 FEW = 1_000_000  # points that any machine can store
-# With more candidates, points outside the domain are not counted.
+# Above, points outside the domain are not counted.
 _MAX_COUNTED = 20_000_000
 
 
@@ -145,9 +145,7 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and sizes (m, d) of points in Karamelo's order (x before y; in 3D the lowest z
-    first).
-    """
+    """Positions and sizes (m, d) of points in Karamelo's order (x before y; lowest z first)."""
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
 
@@ -166,8 +164,9 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill `region` in chunks of cells, x outermost; ScriptError for points beyond numbers or
-    `room`.
+    """Fill `region` in chunks of cells, x outermost.
+
+    ScriptError for more points than numbers or `room`.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -232,7 +231,7 @@ def fill(
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
-            # Past an open side there is nothing to miss.
+            # Nothing is missing past an open side.
             beyond = x[kept & ~in_domain]
             outside += int(((beyond >= open_lo) & (beyond <= open_hi)).all(axis=1).sum())
         if rule == "cut":

@@ -319,7 +319,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Make exceptions in plug-in code ScriptErrors naming the part (else `usual`)."""
+    """Convert exceptions in plug-in code to ScriptErrors that name the part (else `usual`)."""
     try:
         yield
     except faults.KNOWN:
@@ -342,7 +342,6 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
 
 
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
-    """Part defined in a file, or else in its package."""
     path = Path(file).resolve()
     for part in parts:
         with suppress(TypeError, OSError):  # of a built-in module

@@ -43,7 +43,7 @@ class Region(Named):
         self.exterior = exterior
         self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)
-        # Depends on results that a rehearsal does not have.
+        # Depends on results that a rehearsal lacks.
         self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
         # Bounding box, infinite if open; 0 in unused directions.
         self.box_lo, self.box_hi = np.zeros((2, 3))
@@ -67,12 +67,12 @@ class Region(Named):
 
     @property
     def aligned(self) -> bool:
-        """All faces are known to be parallel to the axes."""
+        """True if all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
     def flat(self) -> bool:
-        """Some part consists of lines or surfaces without an inside."""
+        """True if some part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -135,7 +135,7 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Refuse a lower end, argument number `argument`, above the upper end, the next one."""
+    """Refuse a lower end (argument number `argument`) above the upper end, the next one."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

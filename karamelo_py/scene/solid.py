@@ -39,7 +39,7 @@ class Solid(Named):
 
     catalogue = "solids"
     source = "region"  # argument that gives the points, for messages
-    # Of points, and of the shape from a file that they fill; per radian if axisymmetric.
+    # Volumes of points and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
     region: Region | None = None  # that it fills
     ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
@@ -69,7 +69,6 @@ class Solid(Named):
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
         self.initial: dict[str, np.ndarray] = {}  # columns (n,) of its points
-        # An id is a number plus 1.
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
@@ -109,7 +108,7 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Store the points; raise ScriptError for none, too many, or points left of the axis."""
+        """Store the points; ScriptError for none, too many, or points left of the axis."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -186,7 +185,6 @@ def named(hub: Scene, number: int) -> str:
 
 
 def words_of_volumes(hub: Scene) -> str:
-    """Volumes of points and of their shapes from files."""
     volumes = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
     words = [
         f"{name} {volume:.6g} of {whole:.6g} in its file"
@@ -227,7 +225,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Tell whether points of two solids coincide; large solids are sampled."""
+    """Return True if points of two solids coincide; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():

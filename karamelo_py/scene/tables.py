@@ -42,7 +42,7 @@ def _is_dump(path: Path) -> bool:
 
 
 def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
-    """Return the columns of the last snapshot that a new solid can have, without zero ones."""
+    """Columns of the last snapshot that a new solid can have, without zero ones."""
     from karamelo_py.output import snapshots  # with XML, for dumps only
 
     *_, last = snapshots.read(path)
@@ -60,8 +60,9 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Read columns named by the first row (or "1", "2", ...), separated by commas, semicolons or
-    blanks; # begins a comment line.
+    """Read columns separated by commas, semicolons or blanks; # begins a comment line.
+
+    The first row names them, else "1", "2", ...
     """
     rows = []
     try:

@@ -70,7 +70,6 @@ class Shown:
         now[...] = value
 
 
-# Columns, with the arrays that have them.
 _VECTORS = VECTORS | {f"{of}{axis}": ("force", k) for of in "fb" for k, axis in enumerate("xyz")}
 
 
@@ -507,7 +506,7 @@ def set_columns(
 ) -> None:
     """Set columns of points (ids from 0; default all) between steps, to numbers or (n,).
 
-    Raises ScriptError for derived columns, wrong shapes and values that are not finite.
+    ScriptError for derived columns, wrong shapes and values that are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids

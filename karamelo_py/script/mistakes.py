@@ -100,7 +100,7 @@ def _type(part: Any) -> str:
 
 
 class _Stop(NamedTuple):
-    """Where the parser stopped: tokens before and at it, and the parser's stack.
+    """Position at which the parser stopped: tokens before and at it, and the parser's stack.
 
     `here` is a character that starts no token, a token, or None at the end.
     """
