@@ -199,9 +199,9 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_plane` for slopes -`m` < 0 (d, n):
+    """Return `_plane` for slopes -`m` < 0 (d, n).
 
-    a simplex at the lowest corner, minus (plus, minus ...) those at the other corners, outside the
+    A simplex at the lowest corner, minus (plus, minus ...) those at the other corners, outside the
     cube.
     """
     d = len(m)

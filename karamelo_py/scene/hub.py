@@ -324,7 +324,7 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """Copy for trying the rest of the script; shares objects that commands never change."""
+        """Copy for trying the rest of the script, except objects that commands never change."""
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)
