@@ -32,8 +32,10 @@ INPUTS = ROOT / "inputs"
 
 # Processes that tests start run the tree, whatever is installed.
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
-# And keep its bytecode: hundreds of them would each compile the tree for 0.3 s.
+# And keep its bytecode: hundreds of them would each compile the tree for 0.3 s. Without bytecode,
+# each process of tests also rewrites the assertions of all modules, for 6 s.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # Where a script asks for a GPU, the processor takes its part.
 os.environ["KARAMELO_PY_GPU"] = "emulated"
