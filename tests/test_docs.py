@@ -489,7 +489,7 @@ QUESTIONS = {
     "pore pressure": "limits",
     "retaining wall force": "tutorials/slope",
     "free rigid body": "limits",
-    "JWL": "limits",
+    "JWL": "reference/generated/eos/jwl",
     "Mooney-Rivlin": "reference/generated/material/mooney-rivlin",
     "terrain raster": "limits",
     "strength reduction": "howto/safety-factor",

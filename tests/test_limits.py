@@ -17,7 +17,7 @@ STYLES = {
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],
     "creep": [("strength", "norton"), ("strength", "perzyna"), ("material", "mullins")],
-    "explosives": [("eos", "jwl"), ("strength", "johnson-holmquist"), ("eos", "p-alpha")],
+    "ceramics": [("strength", "johnson-holmquist"), ("eos", "p-alpha"), ("eos", "ignition")],
     "UMAT": [("material", "umat")],
     "cracks": [("method", "dfg"), ("fix", "crack")],
 }

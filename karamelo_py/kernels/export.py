@@ -66,6 +66,16 @@ def impose_temperature(kin, points, laws, rows, temperature):
 
 
 @kernel
+def impose_lighting(kin, points, laws, rows, since):
+    """Light the points in these rows, times ``since`` (n,) ago."""
+    points, laws = at_hand(points), at_hand(laws)
+    for k in range(rows.size):
+        p = index(rows[k])
+        law, state = state_at(kin, points, laws, p)
+        store(points.state, p, law_functions.lit(law, kin, state, since[k]))
+
+
+@kernel
 def export_to_nodes(at, values, unit, out):
     """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
 

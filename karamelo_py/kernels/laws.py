@@ -53,5 +53,5 @@ def law_on(law: Any, h: float, T0: float | None) -> Any:
 
 
 def elastic_law(law: Any) -> Any:
-    """Return the law of the stress, of one that adds a temperature."""
-    return getattr(law, "elastic", law)
+    """Return the law of the stress, of one that adds a temperature or relaxation."""
+    return elastic_law(law.elastic) if hasattr(law, "elastic") else law

@@ -18,6 +18,7 @@ from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.kernels.export import (
     export_velocity_moment,
+    impose_lighting,
     impose_stress,
     impose_temperature,
 )
@@ -447,11 +448,18 @@ class PointsView(View):
                 impose_stress(matter, chosen, flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
+        self._impose(impose_temperature, values)
+
+    def ignite(self, since: np.ndarray) -> None:
+        """Light explosives, times (n,) ago; below 0 later."""
+        self._impose(impose_lighting, since)
+
+    def _impose(self, kernel: Callable, values: np.ndarray) -> None:
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             points = arrays.known_to_laws(block.points)
-            T = np.ascontiguousarray(values[places], s.nodes.sums.dtype)
-            impose_temperature(s.kin, points, block.laws, np.asarray(rows), T)
+            numbers = np.ascontiguousarray(values[places], s.nodes.sums.dtype)
+            kernel(s.kin, points, block.laws, np.asarray(rows), numbers)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
         """Set a dump column (n,): position, velocity, stress, T, or a declared field."""

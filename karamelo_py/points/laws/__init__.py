@@ -65,6 +65,29 @@ def can(law: NamedTuple, function: Callable) -> bool:
     return any(function.defined(kind) for kind in kinds)
 
 
+def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None) -> None:
+    """Let the law in the field `part` of an `outer` law, with the state `kept`, answer functions.
+
+    They take (law), (law, like), or law, kinematics (or `kin` instead), state and others.
+    """
+
+    def register(function: Callable, changes: bool) -> None:
+        @function.on(outer)
+        def _of_law_within(law, *arguments):
+            within = getattr(law, part)
+            if len(arguments) < 2:
+                return function(within, *arguments)
+            given, state, *others = arguments
+            known = given if kin is None else kin
+            made = function(within, known, getattr(state, kept), *others)
+            return state._replace(**{kept: made}) if changes else made
+
+    for function in functions:
+        register(function, function in (with_temperature, warmed))
+    if shown_by in functions:
+        of_part.on(outer)(of_law_within)
+
+
 _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
@@ -89,6 +112,25 @@ def of_part(law, tag):
 @point_function()
 def shown(tag, law, kin, state):
     """Value of an output column for a point in `state`."""
+
+
+@point_function(otherwise=True)
+def shown_by(law, kin, state, tag):
+    """Value of the column of a law, or of the law within."""
+    return shown(tag, law, kin, state)
+
+
+class Within(NamedTuple):
+    column: Any
+
+
+@shown.on(Within)
+def _shown_within(tag, law, kin, state):
+    return shown_by(law, kin, state, tag.column)
+
+
+def of_law_within(law, tag):
+    return Within(tag)
 
 
 def number(function: Callable) -> Callable:
@@ -238,6 +280,12 @@ def with_temperature(law, kin, state, T):
 def heat_capacity(law, like):
     """Heat per mass and kelvin; 0 for laws without temperature."""
     return real(0, like)
+
+
+@point_function(otherwise=True)
+def lit(law, kin, state, since):
+    """State of an explosive that was lit so long ago; unchanged for other laws."""
+    return state
 
 
 @point_function(otherwise=True)

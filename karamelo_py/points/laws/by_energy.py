@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from hashlib import sha256
 from itertools import combinations
 from math import cos, cosh, isfinite, sin, sinh, sqrt, tan, tanh
+from operator import add, mul, neg, sub, truediv
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -75,36 +76,12 @@ class _ProgramWriter:
             made.append((operation, None))
 
 
-def applied(operation, a, b):
-    if operation == "+":
-        return a + b
-    if operation == "-":
-        return a - b
-    if operation == "*":
-        return a * b
-    if operation == "/":
-        return a / b
-    return power(a, b)
-
-
-def of_one(operation, a):
-    if operation == "neg":
-        return -a
-    if operation == "sqrt":
-        return sqrt(a)
-    if operation == "exp":
-        return exponential(a)
-    if operation == "log":
-        return logarithm(a)
-    if operation == "sin":
-        return sin(a)
-    if operation == "cos":
-        return cos(a)
-    if operation == "tan":
-        return tan(a)
-    if operation == "tanh":
-        return tanh(a)
-    return sinh(a) if operation == "sinh" else cosh(a)
+def operation_of(name):
+    return {
+        "+": add, "-": sub, "*": mul, "/": truediv, "^": power, "neg": neg, "sqrt": sqrt,
+        "exp": exponential, "log": logarithm, "sin": sin, "cos": cos, "tan": tan, "tanh": tanh,
+        "sinh": sinh, "cosh": cosh,
+    }[name]  # fmt: skip
 
 
 def whole_power(a, n):
@@ -127,9 +104,9 @@ def evaluated(code, law, arguments):
         elif operation == "whole power":
             stack = (whole_power(stack[0], operand), *stack[1:])
         elif operation in ("+", "-", "*", "/", "^"):
-            stack = (applied(operation, stack[1], stack[0]), *stack[2:])
+            stack = (operation_of(operation)(stack[1], stack[0]), *stack[2:])
         else:
-            stack = (of_one(operation, stack[0]), *stack[1:])
+            stack = (operation_of(operation)(stack[0]), *stack[1:])
     return stack[0]
 
 

@@ -330,7 +330,8 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     work = J * work * integrity_of(law, m.damage)
     viscous = viscous_after(law, J, m, tr(strain) / dt)
     viscous_work = sum(viscous) * (before - J)
-    energy = eos.compressed(law.eos, m.energy, before, J, work + viscous_work)
+    volumes = eos.VolumeStep(before, J, dt)
+    energy = eos.compressed(law.eos, m.energy, volumes, work + viscous_work)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
     now = m._replace(energy=energy, viscous=viscous, strength=memory)
@@ -470,24 +471,13 @@ def _dissipated_energy_eos_strength(law, kin, state):
     return sum(state.m.loss)
 
 
-@laws.specific_volume.on(EosStrength)
-def _specific_volume_eos_strength(law):
-    return laws.specific_volume(law.eos)
-
-
 @laws.temperature.on(EosStrength)
 def _temperature_eos_strength(law, kin, state):
     return sum(state.m.heat)
 
 
-@laws.heat_capacity.on(EosStrength)
-def _heat_capacity_eos_strength(law, like):
-    return laws.heat_capacity(law.temperature, like)
-
-
-@laws.conductivity.on(EosStrength)
-def _conductivity_eos_strength(law, like):
-    return laws.conductivity(law.temperature, like)
+laws.hand_on(EosStrength, "eos", "", (laws.specific_volume,))
+laws.hand_on(EosStrength, "temperature", "", (laws.heat_capacity, laws.conductivity))
 
 
 @laws.wave_speed_squared.on(EosStrength)
@@ -574,5 +564,12 @@ def _warmed_eos_strength(law, kin, state, heat):
     taken = eos.taken_heat(law.eos, m.energy, heat)
     if not len(taken):
         return state
-    energy, loss = (m.energy[0] + taken[0],), tuple([lost + taken[0] for lost in m.loss])
-    return state._replace(m=m._replace(energy=energy, loss=loss))
+    energy, loss = m.energy[0] + taken[0], tuple([lost + taken[0] for lost in m.loss])
+    return state._replace(m=m._replace(energy=(energy, *m.energy[1:]), loss=loss))
+
+
+@laws.lit.on(EosStrength)
+def _lit_eos_strength(law, kin, state, since):
+    for memory in eos.ignited(law.eos, state.m.energy, since):
+        state = state._replace(m=state.m._replace(energy=memory))
+    return state

@@ -98,16 +98,12 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
     return laws.kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
 
 
-def _of_elastic_law(function) -> None:
-    @function.on(Thermoelastic)
-    def _of_law_within(law, kin, state):
-        return function(law.elastic, kin, state.elastic)
-
-
-for _function in (
-    laws.jacobian, laws.deformation, laws.wave_speed_squared, laws.wave_speed_bound,
-):  # fmt: skip
-    _of_elastic_law(_function)
+laws.hand_on(
+    Thermoelastic, "elastic", "elastic", (
+        laws.jacobian, laws.deformation, laws.wave_speed_squared, laws.wave_speed_bound,
+        laws.by_rates, laws.specific_volume,
+    ),
+)  # fmt: skip
 
 
 @laws.energy_density.on(Thermoelastic)
@@ -127,16 +123,6 @@ def _elastic_strain_thermoelastic(law, kin, state):
 def _with_stress_thermoelastic(law, kin, state, stress):
     elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
-
-
-@laws.by_rates.on(Thermoelastic)
-def _by_rates_thermoelastic(law):
-    return laws.by_rates(law.elastic)
-
-
-@laws.specific_volume.on(Thermoelastic)
-def _specific_volume_thermoelastic(law):
-    return laws.specific_volume(law.elastic)
 
 
 @laws.temperature.on(Thermoelastic)

@@ -38,10 +38,6 @@ class State(NamedTuple):
     across: Any  # stretch across the body: thickness over initial thickness
 
 
-class Within(NamedTuple):
-    column: Any
-
-
 def with_strain_across(law, kin, dl, q):
     """The increment `dl` in the body, with q across it, for the wrapped law."""
     if isinstance(dl, LargeIncrement):
@@ -84,22 +80,14 @@ def _advance_thin(law, kin, state, dl, dt):
     return State(new, state.across * (1 + q))
 
 
-def _of_law_within(function):
-    """Apply a function of law and state, or of the law alone, to the wrapped law."""
-
-    @function.on(Thin)
-    def _within(law, *arguments):
-        if len(arguments) < 2:
-            return function(law.law, *arguments)
-        return function(law.law, WHOLE, arguments[1].whole)
-
-
-for _function in (
-    laws.jacobian, laws.energy_density, laws.dissipated_energy, laws.damage,
-    laws.damage_initiation, laws.temperature, laws.plastic_strain,
-    laws.specific_volume, laws.heat_capacity, laws.conductivity,
-):  # fmt: skip
-    _of_law_within(_function)
+laws.hand_on(
+    Thin, "law", "whole", (
+        laws.jacobian, laws.energy_density, laws.dissipated_energy, laws.damage,
+        laws.damage_initiation, laws.temperature, laws.plastic_strain,
+        laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.shown_by,
+        laws.with_temperature, laws.warmed,
+    ), WHOLE,
+)  # fmt: skip
 
 
 @laws.by_rates.on(Thin)
@@ -140,30 +128,10 @@ for _function in (laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain
     _in_body(_function)
 
 
-@laws.with_temperature.on(Thin)
-def _with_temperature_thin(law, kin, state, T):
-    return state._replace(whole=laws.with_temperature(law.law, WHOLE, state.whole, T))
-
-
-@laws.warmed.on(Thin)
-def _warmed_thin(law, kin, state, heat):
-    return state._replace(whole=laws.warmed(law.law, WHOLE, state.whole, heat))
-
-
 @laws.with_stress.on(Thin)
 def _with_stress_thin(law, kin, state, stress):
     s = WHOLE.Symmetric._make((*stress, *nothing(WHOLE)[len(stress) :]))
     return state._replace(whole=laws.with_stress(law.law, WHOLE, state.whole, s))
-
-
-@laws.shown.on(Within)
-def _shown_within(tag, law, kin, state):
-    return laws.shown(tag.column, law.law, WHOLE, state.whole)
-
-
-@laws.of_part.on(Thin)
-def _of_part_thin(law, tag):
-    return Within(tag)
 
 
 @laws.number

@@ -1,7 +1,8 @@
 """Material viscoelastic: an elastic law whose deviatoric stress partly relaxes (Prony series)."""
 
-from functools import reduce
 from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import exponential
@@ -21,8 +22,9 @@ from karamelo_py.points.kinematics import (
     symmetric_tensor,
     tensor,
     tr,
-)
+)  # fmt: skip
 from karamelo_py.points.laws import Absent, LawTraits, law_traits
+from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
 PROBE = 1e-6  # strain at which moduli are measured
@@ -44,19 +46,18 @@ class ElasticMaterial:
         return material
 
 
-def strained(law: Any, *gradient: float) -> Any:
-    """Stress over strain after a small strain from rest."""
+def strained(law: Any, component: int) -> Any:
+    """Stress over strain after a small increment of one component of F from rest."""
     space = Space()
-    dl = tensor(space, [PROBE * x for x in gradient])
+    dl = tensor(space, [PROBE * (component == k) for k in range(9)])
     state = laws.advance(law, space, laws.initial_state(law, space, 1.0), dl, 1.0)
     return laws.cauchy_stress(law, space, state) / PROBE
 
 
 def is_isotropic(law: Any) -> bool:
-    along = [strained(law, *[i == k for k in range(9)])[n] for n, i in enumerate((0, 4, 8))]
-    shears = [strained(law, *[i == k for k in range(9)])[n] for n, i in ((3, 1), (4, 2), (5, 5))]
-    close = 1e-3 * max(along)
-    return max(along) - min(along) < close and max(shears) - min(shears) < close
+    along = [strained(law, 4 * k)[k] for k in range(3)]
+    shears = [strained(law, component)[k] for k, component in ((3, 1), (4, 2), (5, 5))]
+    return max(map(np.ptp, (along, shears))) < 1e-3 * max(along)
 
 
 class Branch(NamedTuple):
@@ -104,39 +105,23 @@ class Viscoelastic(NamedTuple):
     in_lanes = True
     traits = LawTraits(wraps=True)
 
-    law: Any
+    elastic: Any
     branches: Any
 
     syntax = "elastic, g1, tau1[, g2, tau2, ...]"
 
     @classmethod
-    def given(cls, elastic: ElasticMaterial, *pairs: float):
+    def given(cls, elastic: ElasticMaterial, *pairs: AboveZero):
         if not pairs or len(pairs) % 2:
             raise ScriptError("the terms are pairs of g and tau", expected=cls.syntax)
-        for k, value in enumerate(pairs):
-            if k % 2 and not value > 0:
-                raise ScriptError(
-                    f"the relaxation time {value:g} is impossible",
-                    argument=1 + k,
-                    expected="a time above 0",
-                )
-            if not k % 2 and not 0 < value < 1:
-                raise ScriptError(
-                    f"the fraction {value:g} of the stiffness cannot relax",
-                    argument=1 + k,
-                    expected="a number between 0 and 1",
-                    hint="g and tau alternate: " + cls.syntax,
-                )
         if not sum(pairs[::2]) < 1:
-            raise ScriptError(
-                f"the fractions g sum to {sum(pairs[::2]):g}: nothing would remain",
-                argument=len(pairs) - 1,
-                expected="a sum below 1",
-            )
-        G = strained(elastic.whole, 0, 1, 0, 0, 0, 0, 0, 0, 0)[3]
-        terms = zip(pairs[::2], pairs[1::2], strict=True)
-        made = [(g, tau, 0.25 / (g * G)) for g, tau in terms]
-        return cls(elastic.whole, reduce(lambda rest, one: Branch(*one, rest), made, Absent()))
+            message = f"the fractions g sum to {sum(pairs[::2]):g}: no stiffness would remain"
+            hint = "g and tau alternate: " + cls.syntax
+            raise ScriptError(message, argument="pairs", expected="a sum below 1", hint=hint)
+        branches, G = Absent(), strained(elastic.whole, 1)[3]
+        for g, tau in zip(pairs[::2], pairs[1::2], strict=True):
+            branches = Branch(g, tau, 0.25 / (g * G), branches)
+        return cls(elastic.whole, branches)
 
 
 known_failure(
@@ -151,24 +136,13 @@ known_failure(
 
 class State(NamedTuple):
     elastic: Any
-    branches: Any  # internal stresses, from the last one
+    branches: Any  # internal stress h of the first branch, and those of the rest
     loss: Any  # dissipated energy per reference volume
     gone: Any  # energy of the elastic law that is not stored, per reference volume
 
 
-class Internal(NamedTuple):
-    h: Any
-    rest: Any
-
-
-class OfElastic(NamedTuple):
-    column: Any
-
-
 def at_rest(branches, kin):
-    return (
-        () if isinstance(branches, Absent) else Internal(nothing(kin), at_rest(branches.rest, kin))
-    )
+    return () if isinstance(branches, Absent) else (nothing(kin), at_rest(branches.rest, kin))
 
 
 def relaxed_part(branches):
@@ -177,7 +151,7 @@ def relaxed_part(branches):
 
 def internal_stress(memory, kin):
     """Sum of the internal stresses."""
-    return memory.h + internal_stress(memory.rest, kin) if len(memory) else nothing(kin)
+    return memory[0] + internal_stress(memory[1], kin) if len(memory) else nothing(kin)
 
 
 def lost_stress(law, kin, s, branches):
@@ -186,7 +160,7 @@ def lost_stress(law, kin, s, branches):
 
 
 def elastic_deviator(law, kin, elastic):
-    return dev(laws.kirchhoff_stress(law.law, kin, elastic))
+    return dev(laws.kirchhoff_stress(law.elastic, kin, elastic))
 
 
 def mean_decay(x):
@@ -210,12 +184,12 @@ def decayed(branches, memory, dl, added, dt):
     if isinstance(branches, Absent):
         return (), 0
     x = dt / branches.tau
-    h = exponential(-x) * memory.h.carried(dl) + branches.g * mean_decay(x) * added
-    squares = [inner(dev(one), dev(one)) for one in (memory.h, h)]
+    h = exponential(-x) * memory[0].carried(dl) + branches.g * mean_decay(x) * added
+    squares = [inner(dev(one), dev(one)) for one in (memory[0], h)]
     a = weight_before(x)
     loss = 2 * branches.softness * (a * squares[0] + (x - a) * squares[1])
-    rest, more = decayed(branches.rest, memory.rest, dl, added, dt)
-    return Internal(h, rest), loss + more
+    rest, more = decayed(branches.rest, memory[1], dl, added, dt)
+    return (h, rest), loss + more
 
 
 def strain_of(dl):
@@ -226,13 +200,13 @@ def strain_of(dl):
 
 @laws.initial_state.on(Viscoelastic)
 def _initial_state_viscoelastic(law, kin, like):
-    return State(laws.initial_state(law.law, kin, like), at_rest(law.branches, kin), 0.0, 0.0)
+    return State(laws.initial_state(law.elastic, kin, like), at_rest(law.branches, kin), 0.0, 0.0)
 
 
 @laws.advance.on(Viscoelastic)
 def _advance_viscoelastic(law, kin, state, dl, dt):
     plain = dl.dl if isinstance(dl, LargeIncrement) else dl
-    elastic = laws.advance(law.law, kin, state.elastic, dl, dt)
+    elastic = laws.advance(law.elastic, kin, state.elastic, dl, dt)
     before = elastic_deviator(law, kin, state.elastic)
     after = elastic_deviator(law, kin, elastic)
     branches, loss = decayed(law.branches, state.branches, plain, after - before.carried(plain), dt)
@@ -245,7 +219,7 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
 
 @laws.kirchhoff_stress.on(Viscoelastic)
 def _kirchhoff_stress_viscoelastic(law, kin, state):
-    tau = laws.kirchhoff_stress(law.law, kin, state.elastic)
+    tau = laws.kirchhoff_stress(law.elastic, kin, state.elastic)
     return tau - lost_stress(law, kin, dev(tau), state.branches)
 
 
@@ -256,14 +230,10 @@ def _cauchy_stress_viscoelastic(law, kin, state):
 
 @laws.energy_density.on(Viscoelastic)
 def _energy_density_viscoelastic(law, kin, state):
-    return laws.energy_density(law.law, kin, state.elastic) - state.gone
+    return laws.energy_density(law.elastic, kin, state.elastic) - state.gone
 
 
 @laws.dissipated_energy.on(Branch)
-def _dissipated_energy_branch(branch, kin, state):
-    return state.loss
-
-
 @laws.dissipated_energy.on(Viscoelastic)
 def _dissipated_energy_viscoelastic(law, kin, state):
     return state.loss
@@ -278,47 +248,26 @@ def _with_lost_stress(function):
         # The elastic stiffness, and the stress that the elastic law has and the body has not.
         s = elastic_deviator(law, kin, state.elastic)
         lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
-        return function(law.law, kin, state.elastic) + 2 * lost * laws.specific_volume(law)
+        return function(law.elastic, kin, state.elastic) + 2 * lost * laws.specific_volume(law)
 
 
 for _function in (laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part):
     _with_lost_stress(_function)
 
 
-def _of_law_within(function):
-    @function.on(Viscoelastic)
-    def _within(law, *arguments):
-        if len(arguments) < 2:
-            return function(law.law, *arguments)
-        return function(law.law, arguments[0], arguments[1].elastic)
-
-
-for _function in (
-    laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
-    laws.specific_volume, laws.heat_capacity, laws.conductivity,
-):  # fmt: skip
-    _of_law_within(_function)
-
-
-@laws.with_temperature.on(Viscoelastic)
-def _with_temperature_viscoelastic(law, kin, state, T):
-    return state._replace(elastic=laws.with_temperature(law.law, kin, state.elastic, T))
+laws.hand_on(
+    Viscoelastic, "elastic", "elastic", (
+        laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
+        laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.shown_by,
+        laws.with_temperature,
+    ),
+)  # fmt: skip
 
 
 @laws.with_stress.on(Viscoelastic)
 def _with_stress_viscoelastic(law, kin, state, stress):
     s = symmetric_tensor(kin, stress)
     left = 1 - relaxed_part(law.branches)
-    relaxed = laws.with_stress(law.law, kin, state.elastic, dev(s) / left + 1 / 3 * tr(s) * I)
-    stored = 0.5 * inner(dev(s), laws.elastic_strain(law.law, kin, relaxed))
+    relaxed = laws.with_stress(law.elastic, kin, state.elastic, dev(s) / left + 1 / 3 * tr(s) * I)
+    stored = 0.5 * inner(dev(s), laws.elastic_strain(law.elastic, kin, relaxed))
     return State(relaxed, at_rest(law.branches, kin), state.loss, stored * (1 - left) / left)
-
-
-@laws.shown.on(OfElastic)
-def _shown_within(tag, law, kin, state):
-    return laws.shown(tag.column, law.law, kin, state.elastic)
-
-
-@laws.of_part.on(Viscoelastic)
-def _of_part_viscoelastic(law, tag):
-    return OfElastic(tag)

@@ -20,6 +20,7 @@ from karamelo_py.points.laws import (
     specific_volume,
     with_stress,
 )
+from karamelo_py.points.laws.eos import ignited
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook
@@ -306,6 +307,45 @@ class InitialStress(Fix):
         named = zip(NAMES, self.formulas, strict=True)
         values = self.hub.values
         points.set_stress({n: f.evaluate_points(values, x, x0) for n, f in named if f is not None})
+
+
+class Detonation(Fix):
+    """Light the points of explosives, each at its time.
+
+    Parameters
+    ----------
+    t
+        Time at which a point is lit: a number or a formula of x, y, z, x0, y0, z0.
+
+    Example
+    -------
+    fix(plane, detonation, all, x0/6930)
+    fix(point, detonation, all, sqrt((x0 - 1)^2 + y0^2)/6930)
+
+    Notes
+    -----
+    The time is the distance from the detonator over the speed. Other materials are unaffected.
+
+    See Also
+    --------
+    eos jwl
+    """
+
+    published = ()
+    first_step_only = True
+    point_by_point = True
+
+    def __init__(self, hub: Hub, group: ParticleGroup, t: Expression):
+        super().__init__(hub, group)
+        self.formulas = (t,)
+        touched = [solid for solid in hub.solids.values() if group.touches(solid)]
+        if not any(can(solid.material.whole, ignited) for solid in touched):
+            hub.warn("no point of the group is explosive", hint="a group with eos jwl")
+
+    def initial_integrate(self, points: PointsView) -> None:
+        x, x0 = points.position, points.reference_position
+        times = self.formulas[0].evaluate_points(self.hub.values, x, x0)
+        points.ignite(self.hub.update.time - times)
 
 
 def _is_borne(law: Any, mean: float) -> bool:

@@ -6,7 +6,7 @@ the volume over the reference volume, `heat` the temperature (`Warm`), or () if 
 The memory is a tuple, empty for most. It has a `specific_volume`, like a law.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function
 from karamelo_py.points.laws.parameters import AboveZero
@@ -18,13 +18,22 @@ def initial_energy(eos, like):
     return ()
 
 
-@point_function(otherwise=True)
-def compressed(eos, memory, before, j, heating):
-    """Memory after the volume ratio changed from `before` to j.
+class VolumeStep(NamedTuple):
+    before: Any  # volume ratio
+    j: Any  # volume ratio after the step
+    dt: Any
 
-    `heating` is the plastic and viscous work per reference volume.
-    """
+
+@point_function(otherwise=True)
+def compressed(eos, memory, step, heating):
+    """Memory after a `VolumeStep`; `heating` is plastic and viscous work per reference volume."""
     return memory
+
+
+@point_function(otherwise=True)
+def ignited(eos, memory, since):
+    """(memory,) of an explosive that was lit so long ago; () of other materials."""
+    return ()
 
 
 @point_function(otherwise=True)
