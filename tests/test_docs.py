@@ -372,6 +372,7 @@ def _write_meshes(folder):
     (folder / "measured.csv").write_text("time, velocity\n0, 0\n1, 2\n", encoding="utf-8")
     rows = "0.1, 0.1, 0.1, 1e-3\n0.2, 0.2, 0.2, 1e-3\n"
     (folder / "grains.csv").write_text("x, y, z, volume\n" + rows, encoding="utf-8")
+    (folder / "packing.xyz").write_text("1\n\nX 0.5 0.5 0.5\n", encoding="utf-8")
     (folder / "exact.csv").write_text("x, s11\n0, 0\n1, 2\n", encoding="utf-8")
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) / 2
     part = meshio.Mesh(

@@ -5,6 +5,7 @@ import random
 import sys
 
 import h5py
+import meshio
 import numpy as np
 import pytest
 from hubs import SmallHub, arguments
@@ -18,6 +19,7 @@ from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.hdf5 import _opened_to_append
+from karamelo_py.styles.solids import PointsSolid
 
 RUN = block(2, "fix(v, initial_velocity_particles, all, 0.1, 0)", "set_dt(0.001)", "run(2)")
 DUMPS = RUN.replace(
@@ -192,3 +194,54 @@ def test_a_dump_begins_a_solid(tmp_path):
     assert sorted(columns) == ["volume", "vx", "x", "y"]
     np.testing.assert_allclose(columns["volume"], [5, 1.5])
     assert columns["vx"].tolist() == [3, 4]
+
+
+def made(hub, path, **options):
+    (argument,) = arguments(f'"{path}"')
+    table, steel = FileColumns.from_script(hub, argument), hub.materials["steel"]
+    return PointsSolid(hub, table, steel, hub.domain.h, **options)
+
+
+EXTENDED = 'Lattice="1 0 0 0 1 0 0 0 1" Properties=species:S:1:pos:R:3:forces:R:3:velo:R:3 Time=1'
+
+
+@pytest.mark.parametrize(
+    ("comment", "rest", "vx"), [("two atoms", "", None), (EXTENDED, " 0 0 0 5 6 0", 5)]
+)
+def test_the_last_frame_of_an_xyz_file(tmp_path, comment, rest, vx):
+    frame = f"2\n{comment}\nCu {{}} 0.1 0{rest}\nC 0.3 0.2 0{rest}\n"
+    (tmp_path / "a.xyz").write_text(frame.format(9) + frame.format(0.1) + "\n")
+    solid = made(SmallHub(), tmp_path / "a.xyz", volume=0.02)
+    np.testing.assert_allclose(solid.x0, [[0.1, 0.1], [0.3, 0.2]])
+    np.testing.assert_allclose(solid.mass, 1000 * 0.02)
+    assert solid.initial.get("vx", [None])[0] == vx
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("2\n\nCu 0 0 0\n", "line 1"), ("1\n\nCu 0 a 0\n", "line 3"), ("x\n", "line 1")],
+)
+def test_an_xyz_file_that_is_wrong(tmp_path, text, says):
+    (tmp_path / "a.xyz").write_text(text)
+    with pytest.raises(ScriptError, match=says):
+        made(SmallHub(), tmp_path / "a.xyz", volume=1)
+
+
+def test_points_of_vtk_have_volumes_masses_or_neither(tmp_path):
+    """Velocities in an array; mass over density; one volume for all points."""
+    x = np.array([[0.1, 0.1, 0], [0.3, 0.1, 0]])
+    cells = {"vertex": np.arange(2)[:, None]}
+    data = {"velocity": 7 + x}
+    for name, more in (("v", {"volume": [0.1, 0.2]}), ("m", {"mass": [100.0, 200.0]}), ("n", {})):
+        arrays = data | {key: np.array(of) for key, of in more.items()}
+        meshio.write(tmp_path / f"{name}.vtu", meshio.Mesh(x, cells, point_data=arrays))
+    for name in "vm":
+        solid = made(SmallHub(), tmp_path / f"{name}.vtu")
+        np.testing.assert_allclose(solid.mass, [100, 200])
+        np.testing.assert_allclose(solid.initial["vx"], [7.1, 7.3])
+    assert made(SmallHub(), tmp_path / "n.vtu", volume=0.3).mass.tolist() == [300, 300]
+    with pytest.raises(ScriptError) as caught:
+        made(SmallHub(), tmp_path / "n.vtu")
+    assert caught.value.hint == "volume=V, for all points, or a column mass"
+    with pytest.raises(ScriptError, match=r"has a column volume$"):
+        made(SmallHub(), tmp_path / "v.vtu", volume=0.3)

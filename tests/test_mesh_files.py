@@ -16,6 +16,7 @@ from karamelo_py.scene.meshes.by_gmsh import begin
 from karamelo_py.scene.meshes.elements import _MIDDLES as MIDDLES
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
+from karamelo_py.scene.solid import words_of_volumes
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import MeshRegion, MeshSolid
 
@@ -96,6 +97,9 @@ def test_instances_of_a_part_are_shifted_and_rotated(tmp_path):
     solid = MeshSolid(hub, tmp_path / "a.inp", hub.materials["steel"], 0.25)
     np.testing.assert_allclose(solid.volume0, 1)
     np.testing.assert_allclose(solid.x0, [[0.5, 0.5, 0.5], [-0.5, 2.5, 0.5]])
+    solid = MeshSolid(hub, tmp_path / "a.inp", hub.materials["steel"], 0.25, group="P-1")
+    hub.solids.add("s", solid)
+    assert words_of_volumes(hub) == "s 1 of 1 in its file (1 of 2 hexahedra)"
     for group, count in (("E", 2), ("SECOND", 1), ("P-2", 1), ("p-1.e", 1), ("EVERY", 2)):
         assert volume(tmp_path / "a.inp", 3, group) == pytest.approx(count, rel=1e-14), group
     top = MeshRegion(hub, tmp_path / "a.inp", "TOP")

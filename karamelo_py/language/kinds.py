@@ -91,7 +91,7 @@ class InputFile:
 class TableFile(InputFile):
     """Annotation: a file with numbers in columns."""
 
-    endings = ("", ".csv", ".dat", ".tsv", ".txt", ".h5", ".pvd", ".vtu", ".gz", ".lammps")
+    endings = ("", ".csv", ".dat", ".tsv", ".txt", ".h5", ".pvd", ".vtu", ".gz", ".lammps", ".xyz")
 
 
 class OutputFile:

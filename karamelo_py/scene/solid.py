@@ -41,6 +41,7 @@ class Solid(Named):
     source = "region"  # argument that gives the points, for messages
     # Volumes of points and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
+    elements = ""  # of a mesh: counts
     region: Region | None = None  # that it fills
     ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
     warm = False  # points have individual temperatures
@@ -185,10 +186,10 @@ def named(hub: Scene, number: int) -> str:
 
 
 def words_of_volumes(hub: Scene) -> str:
-    volumes = {s.id: s.volumes for s in hub.solids.values() if s.volumes}
     words = [
-        f"{name} {volume:.6g} of {whole:.6g} in its file"
-        for name, (volume, whole) in volumes.items()
+        f"{s.id} {s.volumes[0]:.6g} of {s.volumes[1]:.6g} in its file{s.elements}"
+        for s in hub.solids.values()
+        if s.volumes
     ]
     return ", ".join(words[:4]) + (f" and {len(words) - 4} more solids" if len(words) > 4 else "")
 

@@ -33,6 +33,8 @@ class FileColumns:
                 "the table", {str(name): np.asarray(of, float) for name, of in arrays.items()}
             )
         path = TableFile.from_script(hub, argument)
+        if path.suffix.lower() == ".xyz":
+            return cls(str(path), read_xyz(path))
         return cls(str(path), _of_dump(hub, path) if _is_dump(path) else read_table(path))
 
 
@@ -51,12 +53,54 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
     columns = {
         name: values.astype(float)
         for name, values in last.columns.items()
-        if name in axes or (re.fullmatch(f"v[{axes}]|s[123]{{2}}|T|volume", name) and values.any())
+        if name in axes
+        or (re.fullmatch(f"v[{axes}]|s[123]{{2}}|T|volume|mass", name) and values.any())
     }
+    velocity = last.columns.get("velocity", last.columns.get("Velocity"))  # of other programs
+    if velocity is not None and "vx" not in last.columns:
+        columns |= {f"v{axis}": velocity[:, k].astype(float) for k, axis in enumerate(axes)}
     if "volume" in columns:
         x = np.column_stack([columns[axis] for axis in axes])
         columns["volume"] = columns["volume"] / domain.depth(x)
     return columns
+
+
+def read_xyz(path: Path) -> dict[str, np.ndarray]:
+    """Read the last frame of an .xyz file: positions, velocities and masses.
+
+    Rows are an element, x, y, z, unless the second line has the Properties of extended XYZ.
+    """
+    lines = read_text(path).rstrip().splitlines()
+    first, count = 0, 0
+    while True:
+        word = lines[first].strip() if first < len(lines) else ""
+        if not word.isdigit() or len(lines) < first + 2 + int(word):
+            raise ScriptError(
+                f"line {first + 1} of {path}: {word}",
+                expected="the number of points, a line of text, and a line for each point",
+                argument="file",
+            )
+        count = int(word)
+        if len(lines) <= first + 2 + count:
+            break
+        first += 2 + count
+    stated = re.search(r'Properties="?([\w:]+)', lines[first + 1])
+    parts = (stated[1] if stated else "species:S:1:pos:R:3").split(":")
+    columns: dict[str, int] = {}
+    at = 0
+    for name, width in zip(parts[::3], map(int, parts[2::3]), strict=True):
+        names = {"pos": "xyz", "velo": ["vx", "vy", "vz"], "mass": ["mass"], "masses": ["mass"]}
+        columns |= {of: at + k for k, of in enumerate(names.get(name, ()))}
+        at += width
+    rows = [line.split() for line in lines[first + 2 :]]
+    for number, row in enumerate(rows, first + 3):
+        if any(k >= len(row) or number_of(row[k]) is None for k in columns.values()):
+            raise ScriptError(
+                f"line {number} of {path}: {' '.join(row)}",
+                expected="an element, and x, y, z" if not stated else f"columns {stated[1]}",
+                argument="file",
+            )
+    return {of: np.array([row[k] for row in rows], float) for of, k in columns.items()}
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:

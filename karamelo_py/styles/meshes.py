@@ -11,7 +11,7 @@ from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.meshes.data import Mesh
-from karamelo_py.scene.meshes.elements import elements_of, measured
+from karamelo_py.scene.meshes.elements import elements_of, in_order, measured
 from karamelo_py.scene.meshes.inside import Skin, flat_faces, outer_faces, skin_of, triangles_of
 from karamelo_py.scene.meshes.reading import MeshFile, read
 from karamelo_py.scene.placement import Placement
@@ -261,7 +261,14 @@ class MeshSolid(Solid):
         )
         _tell_of_units(hub, file, reach.min(axis=0), reach.max(axis=0))
         self.volumes = float(volume[kept].sum()), float(volume.sum())
-        mixed = len(measures) > 1
+        in_file = Counter[str]()
+        for cells in map(in_order, mesh.cells):
+            in_file[cells.family] += len(cells.nodes)
+        counts = ", ".join(
+            f"{np.count_nonzero(taken)} of {in_file[part.shape.name]} {part.shape.words}"
+            for part, taken in zip(parts, inside, strict=True)
+        )
+        self.elements = f" ({counts})"
         self.put(
             hub,
             Placement(

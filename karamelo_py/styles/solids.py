@@ -10,7 +10,7 @@ from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.signature import AtLeast, Positive
 from karamelo_py.output.point_table import AXES
 from karamelo_py.points.kinematics import KINEMATICS
-from karamelo_py.points.laws import initial_state
+from karamelo_py.points.laws import initial_state, specific_volume
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import room_for_points
@@ -173,16 +173,19 @@ class PointsSolid(Solid):
     table
         Name of a file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z``
         (one per dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains
-        the area in the plane xy). Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
-        stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump particle, vtk
-        or hdf5, or of LAMMPS), whose last snapshot gives these columns. In Python, a dictionary of
-        arrays or a DataFrame.
+        the area in the plane xy) or ``mass``. Optional: velocities (``vx`` ...), temperatures
+        (``T``), Cauchy stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump
+        particle, vtk or hdf5, or of LAMMPS), points in VTK (.vtu), or an .xyz file, whose last
+        snapshot gives these columns. In Python, a dictionary of arrays or a DataFrame.
+    volume
+        Volume of each point, if the file has none.
     GlueToSolid
         As in solid region.
 
     Example
     -------
     solid(grains, points, grains.csv, steel, 0.1)
+    solid(atoms, points, packing.xyz, steel, 0.1, volume=1e-3)
 
     Notes
     -----
@@ -197,7 +200,7 @@ class PointsSolid(Solid):
     region, mesh, fix initial_velocity_particles
     """
 
-    syntax = "file, material, h[, T0][, GlueToSolid=solidID]"
+    syntax = "file, material, h[, T0][, volume=V][, GlueToSolid=solidID]"
     source = "table"
 
     def __init__(
@@ -208,6 +211,7 @@ class PointsSolid(Solid):
         h: Annotated[float, Positive],
         T0: float | None = None,
         *,
+        volume: Annotated[float, Positive] | None = None,
         GlueToSolid: Solid | None = None,
     ):
         domain = require_domain(hub)
@@ -215,21 +219,31 @@ class PointsSolid(Solid):
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.table, d = table.name, domain.dimension
         columns, lengths = dict(table.columns), {np.shape(of) for of in table.columns.values()}
+        mass = columns.pop("mass", None)
+        if "volume" in columns and volume is not None:
+            message = f"{self.table} has a column volume"
+            raise ScriptError(message, argument="volume", expected="no volume=V, or no such column")
+        if volume is not None:
+            columns["volume"] = np.full(np.shape(next(iter(columns.values()))), volume)
+        elif "volume" not in columns and mass is not None and {*AXES[:d]} <= {*columns}:
+            depth = domain.depth(np.column_stack([columns[axis] for axis in AXES[:d]]))
+            columns["volume"] = mass * float(specific_volume(material.law)) / depth
         missing = [name for name in (*AXES[:d], "volume") if name not in columns]
         if missing or len(lengths) > 1 or len(next(iter(lengths), ())) != 1:
             problem = f"has no column {missing[0]}" if missing else "has columns of several lengths"
             message = f"{self.table} {problem}"
             expected = f"columns {', '.join(AXES[:d])}, volume, and perhaps vx ..., T, s11 ..."
-            raise ScriptError(message, argument="table", expected=expected)
+            hint = "volume=V, for all points, or a column mass" if missing == ["volume"] else None
+            raise ScriptError(message, argument="table", expected=expected, hint=hint)
         x = np.column_stack([columns.pop(axis) for axis in AXES[:d]])
-        volume = columns.pop("volume")
-        wrong = ~(np.isfinite(x).all(axis=1) & (volume > 0) & np.isfinite(volume))
+        volumes = columns.pop("volume")
+        wrong = ~(np.isfinite(x).all(axis=1) & (volumes > 0) & np.isfinite(volumes))
         if wrong.any():
             raise ScriptError(
                 f"point {np.argmax(wrong) + 1} of {self.table} has no place, or no volume above 0",
                 argument="table",
             )
-        half = volume[:, None] ** (1 / d) / 2 * np.ones(d)
+        half = volumes[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
         # Stress is given at the temperature of the point.
         order = sorted(columns, key=lambda name: name != "T")
@@ -239,7 +253,7 @@ class PointsSolid(Solid):
             hub,
             Placement(
                 x[kept],
-                volume[kept],
+                volumes[kept],
                 half[kept],
                 (near - size).min(axis=0, initial=np.inf),
                 (near + size).max(axis=0, initial=-np.inf),

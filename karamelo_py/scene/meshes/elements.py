@@ -103,7 +103,7 @@ def elements_of(
             argument="file" if group is None else "group",
             expected=_accepted(dimension),
         )
-    wanted = [_in_order(cells) for cells in chosen if cells.dimension in (-1, highest)]
+    wanted = [in_order(cells) for cells in chosen if cells.dimension in (-1, highest)]
     for cells in wanted:
         if cells.family not in SHAPES:
             raise ScriptError(
@@ -129,7 +129,7 @@ def elements_of(
     return groups
 
 
-def _in_order(cells: CellBlock) -> CellBlock:
+def in_order(cells: CellBlock) -> CellBlock:
     """Reorder pixels and voxels (row by row), and halve six-sided prisms."""
     order = {
         "pixel": ("quad", [[0, 1, 3, 2]]),
