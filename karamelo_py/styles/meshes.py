@@ -269,6 +269,7 @@ class MeshSolid(Solid):
             for part, taken in zip(parts, inside, strict=True)
         )
         self.elements = f" ({counts})"
+        mixed = len(measures) > 1
         self.put(
             hub,
             Placement(
