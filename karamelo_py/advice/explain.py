@@ -23,9 +23,9 @@ APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain the `status` of a failed step; `smaller`:
+    """Explain the `status` of a failed step.
 
-    the fix if it was too large from the start.
+    `smaller` is the step to suggest if it was too large from the start of the run.
     """
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)

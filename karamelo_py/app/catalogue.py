@@ -161,7 +161,6 @@ def _unknown(noun: str, name: str, names: Iterable[str]) -> ScriptError:
 
 
 def _summary(family: str, name: str) -> tuple[str, bool]:
-    """Return the summary of a style, and whether it is broken."""
     try:
         target = registry.find(family, name)
     except ScriptError as error:
@@ -217,7 +216,7 @@ def _about(word: str) -> list[tuple[str, str]]:
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
-    """Find arguments named by this word, else with this value, by style."""
+    """Find arguments of this name, else with this value, by style."""
     parameters = {}
     for family in families():
         for name in registry.names(family):
@@ -230,7 +229,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
 
 
 def _explain_argument(word: str, parameters: dict[str, Parameter]) -> None:
-    """Print the longest explanation of an argument, and other places."""
+    """Print the longest explanation of an argument, and where else it is used."""
     page = _Page()
     owner, parameter = max(parameters.items(), key=lambda item: len(item[1].description))
     page.say(word, "bold")
@@ -275,7 +274,6 @@ class _Page(Console):
             self.row(shown.ljust(widths[0]), origin.ljust(widths[1]), *_summary(family, name))
 
     def row(self, name: str, origin: str, summary: str, broken: bool) -> None:
-        """Write a line of a list, cut at the width of a terminal."""
         if not self.terminal:
             self.say(f"  {name}  {origin}  {summary}")
             return

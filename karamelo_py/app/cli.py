@@ -165,7 +165,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Choose the last of the files that a shell has put after -restart."""
+    """Select the last of the files that a shell has put after -restart."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -236,8 +236,6 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
 
 
 class CommandLine(argparse.ArgumentParser):
-    """A command line with errors in our format."""
-
     def __init__(self, **options: Any):
         usual = {"formatter_class": argparse.RawDescriptionHelpFormatter, "allow_abbrev": False}
         super().__init__(**(usual | options))
@@ -373,7 +371,7 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.lower.card import use_card
         from karamelo_py.scene.hub import Hub
     begun()
-    # The program reports errors instead of NumPy.
+    # Errors are reported by the program, not by NumPy.
     np.seterr(over="ignore", invalid="ignore", divide="ignore")
     hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads
@@ -451,7 +449,6 @@ def _direct(hub: Hub, options: argparse.Namespace) -> None:
 
 
 def _tell_of_no_run(hub: Hub, script: str) -> None:
-    """Report that a script has no run command."""
     message = f"{script} runs nothing: there is no run command in it"
     if hub.checking:
         if hub.solids:

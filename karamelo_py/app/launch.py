@@ -32,14 +32,13 @@ if TYPE_CHECKING:
 
 Message = dict[str, Any]  # a JSON object
 ERROR = 1
-# Errors of disks and permissions, no fault of the program.
+# Errors of disks and permissions, not of the program.
 OF_THE_SYSTEM = tuple(
     getattr(errno, name)
     for name in ("ENOSPC", "EDQUOT", "EROFS", "EFBIG", "EIO", "EACCES", "EPERM", "EMFILE", "ENFILE",
                  "ESTALE")
     if hasattr(errno, name)
 )  # fmt: skip
-# Name of the launcher's socket.
 SOCKET = "KARAMELO_PY_LAUNCHER"
 # Open MPI: more processes than cores, own threads, waiting processes yield, root in a container.
 OPEN_MPI = {
@@ -63,7 +62,7 @@ PATIENCE, LONGER = 2.0, 6.0
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
-    """Run a function; return its exit status, and a message to be printed."""
+    """Run a function; return its exit status and a message to print."""
     try:
         return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
@@ -75,7 +74,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
         return INTERRUPTED, render_message("error", "interrupted")
     # Rich makes it a SystemExit.
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-        # The reader of our output has gone.
+        # Our output's reader is gone.
         sys.stderr.close()
         return ERROR, ""
     if debugging:
@@ -103,7 +102,7 @@ def rendered(error: BaseException) -> str:
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
-    """Run a program on this number of processes; return the exit status."""
+    """Run a program on `ranks` processes; return the exit status."""
     cores = os.cpu_count() or 1
     if ranks > A_CORE * cores:
         raise ScriptError(
@@ -242,7 +241,6 @@ class Launcher:
         return render_message("error", who, hint=hint)
 
     def _words(self) -> str:
-        """Read the output of mpiexec, with messages of C libraries."""
         self.said.seek(0)
         return self.said.read().decode(errors="replace").strip()
 
@@ -269,7 +267,7 @@ _link: socket.socket | None = None  # to the launcher
 
 
 def keep_to_oneself() -> None:
-    """Silence all ranks but 0, and connect it to its launcher."""
+    """Silence all ranks but 0; connect to the launcher."""
     size, rank = mpi.launched()
     if size > 1:
         _report_to_launcher(rank)
@@ -305,7 +303,7 @@ def _stream(fd: int) -> TextIO:
 
 
 def _heed(link: socket.socket) -> None:
-    """Receive signals from the launcher; end the run if that is gone."""
+    """Receive signals from the launcher; end the run if it is gone."""
     with suppress(OSError):
         while number := link.recv(1):
             os.kill(os.getpid(), number[0])

@@ -1,6 +1,6 @@
 """Exit with a message if the program is interrupted during its imports.
 
-There, an interrupt may surface as any error; nothing is open yet.
+An interrupt there may surface as any error; nothing is open yet.
 """
 
 import os

@@ -11,8 +11,6 @@ LIVE = ("--live", "-live")
 
 
 class _Variable(argparse.Action):
-    """A variable and its value; each variable once."""
-
     def __call__(
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any,
         option_string: str | None = None,

@@ -301,7 +301,7 @@ class Simulation:
         folder = Path(out).absolute()
         make_folder(folder, 'out="{}"')
         if folder in _folders:
-            gc.collect()  # closes simulations that are no longer used
+            gc.collect()  # closes unused simulations
         if folder in _folders:
             raise ScriptError(
                 f"another simulation writes to {folder}",
@@ -621,6 +621,6 @@ def _as_script_text(value: Any) -> str:
     if isinstance(value, str):
         words = value.split()
         texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
-        # Words separated by blanks only are not a formula.
+        # Words separated only by blanks are no formula.
         return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
     raise TypeError(f"{value!r} is no number, text, True, False, None or function")

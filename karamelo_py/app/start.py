@@ -10,7 +10,7 @@ from karamelo_py.app.leaving import STUDY, end_with, leaving_at_once
 def main() -> int:
     """Run the command line; return the exit status.
 
-    Without the garbage collector, whose searches took half the time of a small scene.
+    Without the garbage collector, which took half the time of a small scene.
     """
     gc.disable()
     _open_what_is_closed()
@@ -24,7 +24,7 @@ def main() -> int:
 
 
 def _open_what_is_closed() -> None:
-    """Redirect closed standard streams to nowhere, or files would get their descriptors."""
+    """Open closed standard streams on nothing, or files would get their descriptors."""
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(handle)

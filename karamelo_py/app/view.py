@@ -75,7 +75,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def _pixels(text: str) -> int:
-    """Read a width or height, as in dump pyplot."""
     if not text.isdecimal() or not LEAST_PIXELS <= int(text) <= MOST_PIXELS:
         message = f"'{text}' is no number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
         raise argparse.ArgumentTypeError(message)
@@ -110,7 +109,6 @@ def run(options: argparse.Namespace) -> int:
                 look, picture = drawing.look, drawing.picture
             snapshot = drawing.chosen(snapshot)
             moment = title_of(snapshot.step, snapshot.time, snapshot.units.get("time", ""))
-            # In file order.
             snapshot.columns["id"] = np.arange(len(snapshot.columns["x"]))
             title = f"{look['title']}: " if look["title"] else ""
             tools = _tools(scene) if options.script and look["outlines"] else ()
@@ -188,7 +186,7 @@ def _log_beside(
 
 
 def _tools(scene: Hub) -> list[Any]:
-    """List walls and tools of all runs, at their present positions."""
+    """List walls and tools of all runs at their present positions."""
     fixes = [candidate for candidate in dict.fromkeys(scene.in_runs) if isinstance(candidate, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
@@ -241,7 +239,6 @@ def _number(path: Path) -> int:
 
 
 def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> Look:
-    """Parse the options of dump pyplot as in a script."""
     columns = list(first.columns)
     names = SimpleNamespace(
         particle_names=lambda: columns, shown_names=lambda: [*columns, *named_sets(scene)]
@@ -320,7 +317,6 @@ class Drawing:
         from karamelo_py.output import outlines, pictures
 
         look, scene, with_script = self.look, self.scene, self.options.script is not None
-        # Unused directions are 0.
         dimension = 3 if first.columns["z"].any() else 2 if first.columns["y"].any() else 1
         if with_script:
             has = [("dimension", scene.domain.dimension, dimension)]

@@ -58,7 +58,6 @@ def measured(job: Measurement) -> Measured | Solved:
 
 
 def measured_apart(job: Measurement) -> Measured | Solved | int:
-    """Measure a workload in a separate process; return its exit status if it failed."""
     status, results = _found_apart(job)
     if results:
         return Solved(**results) if "stages" in results else Measured(**results)
@@ -69,7 +68,7 @@ def measured_apart(job: Measurement) -> Measured | Solved | int:
 
 
 def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
-    """Measure in separate processes; return exit status and results."""
+    """Return exit status and results of separate processes."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(job._replace(file=str(file)))]
@@ -164,7 +163,7 @@ def main() -> int:
     keep_to_oneself()
     if job.ranks > 1:
         return together(job.ranks, lambda comm: _measure(job, comm))
-    # The input closes when the parent no longer waits.
+    # The input closes when the parent stops waiting.
     threading.Thread(target=lambda: (os.read(0, 1), os._exit(0)), daemon=True).start()
     status, text = outcome_of(lambda: _measure(job), debugging=job.debug)
     if text:

@@ -108,7 +108,6 @@ def run(options: Namespace) -> int:
 
 
 def _ended(record: Record, earlier: Record | None, out: Path | None) -> int:
-    """Compare with an earlier bench, and name the file."""
     if earlier:
         print("\n" + "\n".join(comparison(record, earlier)))
     if out:
@@ -146,7 +145,6 @@ def _counts(text: str) -> list[int]:
 
 
 def _scaling(job: apart.Measurement, ranks: list[int], available: int) -> dict:
-    """Measure and print the scaling of a workload; return its record."""
     rows: list[apart.Scaled] = []
     print(f"\n{job.workload}: {WORKLOADS[job.workload].title}\n{apart.HEADING}")
     for row in apart.scaled(job, ranks, available):

@@ -27,11 +27,11 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-MOST_STEPS = 2500  # nothing leaves the domain before
-ARRAYS = 3 * 256 * 2**20  # bytes, far larger than caches
+MOST_STEPS = 2500  # within which nothing leaves the domain
+ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
 ALONE = 0.5  # fraction of a step that limits it
-APART = 1.5  # trusted ratio of separate sweeps to a compiled step
+APART = 1.5  # largest trusted ratio of separate sweeps to a compiled step
 
 
 class Workload(NamedTuple):
@@ -39,7 +39,7 @@ class Workload(NamedTuple):
     script: str
     # Steps before the measurement.
     lead: int = 3
-    # Published, in million particle-steps/s of one core of a small AMD EPYC.
+    # Published: million particle-steps/s of one core of a small AMD EPYC.
     karamelo: float | None = None
 
 
@@ -78,7 +78,7 @@ class Measured(NamedTuple):
     bytes_per_particle: int
     bytes_per_particle_step: float  # without caches
     roofline: float  # fraction of the memory bandwidth at the best speed
-    roofline_in_place: float  # of arrays as large as the scene, which may be cached
+    roofline_in_place: float  # likewise, of arrays as large as the scene, which may be cached
     # Seconds per step, without call overhead.
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
@@ -191,7 +191,7 @@ def build(
     workload: Workload, threads: int | None, presets: Mapping[str, str],
     comm: MpiComm | None = None, card: Any = None,
 ) -> Simulation:  # fmt: skip
-    """Build a workload's simulation; `presets` set variables, steps run on a `card` if given."""
+    """Build a workload's simulation; `presets` set variables, a `card` runs the steps."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
     if card is not None:
@@ -278,7 +278,7 @@ def timed_steps(simulation: Simulation, count: int) -> float:
 
 
 def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Return seconds per step of each sweep over points, and over nodes.
+    """Seconds per step of each sweep over points, and over nodes.
 
     Sweeps are called separately; medians of repeated ones are summed.
     """
@@ -348,7 +348,7 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Return bytes per particle-step without caches, bytes of the scene, and parallel regions.
+    """Bytes per particle-step without caches, bytes of the scene, and parallel regions.
 
     Point fields count per sweep that reads and that writes them; node fields in node loops; tile
     buffers when written and summed.

@@ -1,4 +1,4 @@
-"""The live page of a folder: dumps and log of a run that continues elsewhere, or has ended."""
+"""Live page of a folder: dumps and log of a run that continues elsewhere, or has ended."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 class FolderPage:
     """The page of a folder and its updates.
 
-    ScriptError if there is no such folder, or neither log nor particle dump in it.
+    ScriptError if the folder is missing, or has neither log nor particle dump.
     """
 
     def __init__(self, folder: Path):
@@ -58,7 +58,6 @@ class FolderPage:
                 time.sleep(PAUSE)
 
     def look(self) -> bool:
-        """Read the folder; return True if anything is new."""
         log, before = read_log(self.folder), len(self._states)
         grown = len(next(iter(log.values()), ())) != len(next(iter(self._log.values()), ()))
         self._log, files = log, 0

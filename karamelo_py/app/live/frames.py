@@ -1,4 +1,4 @@
-"""States of points available to a page: thinned, in single precision, as many as fit."""
+"""States of points for a page: thinned, in single precision, as many as fit."""
 
 from __future__ import annotations
 
@@ -84,7 +84,6 @@ class KeptFrames:
             self._new[-1] = (self._next - 1, time.perf_counter())
 
     def listed(self) -> list[list]:
-        """List number, step, time, column and count of the frames."""
         with self._lock:
             return [[k, f.step, plain(f.time), f.column, f.of] for k, f in self._kept.items()]
 

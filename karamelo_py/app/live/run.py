@@ -40,7 +40,7 @@ class Row(NamedTuple):
 
 
 class RunPage(Rhythmic, Listener):
-    """The page of a run: updated with the log; it can pause the run."""
+    """The page of a run: updated with the log; can pause the run."""
 
     remembers = ()
     id, place = "live", None

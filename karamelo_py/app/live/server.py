@@ -20,7 +20,7 @@ PATIENCE = 1.0  # seconds for the last news at the end
 BEAT = 2.0  # seconds between messages that reveal closed pages
 STUCK = 30.0  # seconds until a page that receives nothing counts as closed
 UNKNOWN = 5.0  # seconds to send the secret word
-MOST = 64  # connections; file descriptors remain for the run
+MOST = 64  # connections; leaves file descriptors for the run
 LARGEST = 1 << 16  # bytes of a request's body, which is ignored
 # Names of this machine; a site could resolve another name to it.
 HERE = ("127.0.0.1", "localhost", "::1")
@@ -65,7 +65,7 @@ class Server:
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
-        # A short poll interval: closing does not wait.
+        # Short poll interval: closing does not wait.
         threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
@@ -79,7 +79,6 @@ class Server:
         return bool(self._shown)
 
     def flush(self) -> None:
-        """Wait briefly until open pages have the last news."""
         with self._changed:
             self._changed.wait_for(
                 lambda: all(shown >= self.version for shown in self._shown.values()), PATIENCE
@@ -96,7 +95,6 @@ class Server:
         self._http.server_close()
 
     def events(self, write: Callable[[bytes], object]) -> None:
-        """Write news as they come until the page is closed."""
         key, seen, version = threading.get_ident(), 0, -1
         try:
             while True:
@@ -193,7 +191,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             name, words = self._asked()
             length = self.headers.get("Content-Length", "0")
             if length.isdecimal() and len(length) < 9 and int(length) <= LARGEST:
-                self.rfile.read(int(length))  # or it would be read as the next request
+                self.rfile.read(int(length))  # else it would be read as the next request
             else:
                 self.close_connection = True
             if not self._is_from_here():

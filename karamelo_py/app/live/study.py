@@ -66,7 +66,6 @@ class StudyPage:
         running: Sequence[tuple[Mapping[str, str], Path, float]],
         **progress: Any,
     ) -> None:
-        """Update rows of finished runs, and cases with their folders."""
         for row in rows[len(self._rows) :]:
             case = {name: row[name] for name in self._names}
             self._rows.append({**self._judged(row), "title": worded(case)})
@@ -80,7 +79,7 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """Return new rows and cases; those without a row that do not run are waiting."""
+        """Return new rows and cases; cases that neither run nor have a row are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         news = {
@@ -93,7 +92,6 @@ class StudyPage:
         return (first_row + len(rows), first_case + len(cases)), news
 
     def _run(self, words: Mapping[str, str]) -> dict | None:
-        """Return the last lines of a run's output, and its log."""
         folder = self._folders.get(words.get("title", ""))
         if folder is None:
             return None

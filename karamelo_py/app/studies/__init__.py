@@ -1,4 +1,4 @@
 """Studies: many runs of one script, and what they show together.
 
-They use what every user has: the script, its variables, the command line, log and run.json.
+They use the public interface only: script, variables, command line, log and run.json.
 """

@@ -54,7 +54,7 @@ the basis, or a finer run is worse; finer runs are made to check. With -run the 
 checked against the target."""
 
 
-# Bases with gradients that jump between cells, and methods whose points cross them.
+# Bases whose gradients jump between cells, and methods whose points cross them.
 JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
 ALONE = "no finer run is known"
 UNFOLLOWED = f"{ALONE}, whose points may cross cells"
@@ -90,15 +90,15 @@ def forecast(
         return None
     xs, error, signed_size = xs[good], error[good], np.abs(signed[good])
     rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
-    # Positive towards finer runs. An error that counts for more than it is would make the next one
-    # fall too steeply.
+    # Positive towards finer runs. An error counted too large would make the next one fall too
+    # steeply.
     way, ways = abs(np.log(x / xs[-1])), np.abs(np.diff(np.log(xs)))
     fall = np.fmax(np.diff(np.log(error)), np.fmin(np.diff(np.log(signed_size)), 0.0)) / ways
     if fall[-1] >= 0:
         return None
     expected = -fall[-1]
     rates = [-f for f in fall if f < 0]
-    # A decreasing order may decrease further.
+    # A falling order may fall further.
     drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
     slow = max(min(*rates, expected / 2, expected - drop), 0.0)
     fast = max(*rates, 4 / 3 * expected, min(highest, SECOND) if drop == 0 else 0.0)
@@ -150,7 +150,6 @@ class ChoiceRuns:
         return reached(self.kind)
 
     def look(self, folder: Path) -> None:
-        """Read method and warnings of the finest run."""
         source = folder / self.rows[-1]["folder"]
         record = record_of(source)
         self.words = frozenset(record["runs"][0]["method"].split() if record.get("runs") else ())
@@ -205,7 +204,6 @@ class Adviser:
                 self.go_on(choice)
 
     def _met(self, choice: ChoiceRuns) -> list[Candidate]:
-        """List a choice's runs that meet the target."""
         signed = errors(choice.rows, self.accuracy)
         costs = column(choice.rows, self.cost)
         chances = by_chance(self.xs[: len(signed)], signed, choice.highest)
@@ -256,7 +254,6 @@ class Adviser:
         return min(candidates, key=lambda c: c.cost, default=None)
 
     def candidates(self, hope: bool = False) -> list[Candidate]:
-        """Return the candidates of all choices, the cheapest first."""
         chosen = filter(None, (self.candidate(choice, hope) for choice in self.choices))
         return sorted(chosen, key=lambda c: c.cost)
 
@@ -454,7 +451,7 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     if best.forecast is None:
         alone = ", and whether finer runs are as good is not known" * (len(adviser.values) == 1)
         return f"sure: it was run ({numbers}){alone}"
-    # These may end the fall: the orders give no bound then.
+    # The orders give no bound: these may end the fall.
     if doubts := adviser.doubts(best):
         return "\n  ".join(
             [f"not sure: expected {numbers}, if the error continues to fall", *doubts]
@@ -471,7 +468,6 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
 
 
 def _nothing(adviser: Adviser) -> int:
-    """Print that no variant meets the target, and the nearest one."""
     lucky = adviser.lucky()
     luck = ", unless by chance" * (lucky is not None)
     print(f"\nno variant is expected to reach {adviser.accuracy} <= {adviser.target:g}{luck}")
@@ -497,7 +493,7 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised until the target is met, or what may meet it."""
+    """Run what is advised, or what may meet the target, until it is met."""
     best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)

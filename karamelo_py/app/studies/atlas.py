@@ -1,4 +1,4 @@
-"""karamelo-py atlas: makes the pictures and tables of a page again, by commands of the program."""
+"""karamelo-py atlas: regenerates the pictures and tables of a page with commands of the program."""
 
 import hashlib
 import json
@@ -56,7 +56,7 @@ PICTURES = (".png", ".svg")
 class Entry:
     """A picture or table, with its commands."""
 
-    name: str  # its folder; a part before a slash is its group
+    name: str  # its folder; the part before a slash is its group
     text: str = ""  # what it shows
     commands: list[str] = field(default_factory=list)  # without the word karamelo-py
     # Values of the words in braces.
@@ -191,7 +191,6 @@ def make(entry: Entry, folder: Path, inputs: Path, *, small: bool, again: bool) 
 
 
 def key_of(lines: list[str]) -> str:
-    """Hash commands, the scripts they name, and the version."""
     parts = [karamelo_py.__version__, *lines]
     for word in {word for line in lines for word in shlex.split(line)}:
         if os.path.isabs(word) and Path(word).is_file():

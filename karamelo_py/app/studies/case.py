@@ -1,4 +1,4 @@
-"""A run of a study: a separate process in a separate folder, and the facts in its run.json."""
+"""A run of a study: a separate process and folder, and the facts in its run.json."""
 
 import hashlib
 import json
@@ -30,8 +30,8 @@ Record = Mapping[str, Any]  # a JSON object
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Codes of errors before the first step that are no mistake of the script: larger scenes, longer
-# steps; a fault of the program, another run in the folder.
+# Codes of errors before the first step. No mistake of the script: larger scenes, longer steps. No
+# fault of the run: of the program, another run in the folder.
 _NOT_OF_SCRIPT = ("memory", "step-above-limit")
 _NOT_OF_RUN = ("internal", "busy")
 
@@ -40,8 +40,8 @@ _NOT_OF_RUN = ("internal", "busy")
 class CaseOutcome:
     """Outcome of a run.
 
-    Status: ``done``, ``failed``, ``refused`` (by a mistake of the script, before any step),
-    ``too long`` or ``killed``.
+    Status: ``done``, ``failed``, ``refused`` (by a mistake of the script, before any step), ``too
+    long`` or ``killed``.
     """
 
     status: str
@@ -81,7 +81,6 @@ def worded(case: Row) -> str:
 
 
 def said_in(file: Path) -> str:
-    """Read a file of output; empty if that fails."""
     try:
         return file.read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -124,14 +123,14 @@ class Launch:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """Return this case's outcome from an earlier study, None if it has to be run again."""
+        """Return this case's outcome from an earlier study, or None to run it again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
-        # These outcomes may differ next time.
+        # These outcomes may change.
         if stored["status"] in ("killed", "refused") or stored.get("code") in _NOT_OF_RUN:
             return None
-        # A stopped run is repeated if it may take longer now.
+        # Repeat a stopped run if it may take longer now.
         if stored["status"] == "too long" and (self.limit or 1e300) > stored["facts"]["wall_s"]:
             return None
         status, reason, facts = (stored[name] for name in ("status", "reason", "facts"))
@@ -231,7 +230,6 @@ def options_of(case: Mapping[str, str]) -> list[str]:
 
 
 def command_of(script: str | Path, case: Mapping[str, str]) -> str:
-    """Format the shell command of a case, with values quoted."""
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
 
@@ -247,7 +245,7 @@ def record_of(folder: Path) -> Record:
 
 
 def facts_of(record: Record) -> dict[str, float]:
-    """Return numbers of all runs of a script, or of the first, see `COLUMNS`."""
+    """Return numbers of all runs of a script, or of the first: `COLUMNS`."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
     names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")

@@ -129,7 +129,6 @@ def run(options: Namespace) -> int:
 
 
 def read(path: Path, where: Sequence[str]) -> Table:
-    """Read the rows of a table that fulfil the conditions."""
     rows, made = records.read(path), read_json(path.with_suffix(".json"))
     if "folder" not in rows[0] and "variables" not in made:
         raise ScriptError(
@@ -146,7 +145,6 @@ def read(path: Path, where: Sequence[str]) -> Table:
 
 
 def side_by_side(options: Namespace) -> int:
-    """Draw two values of a variable, for the scenes of all tables."""
     if not options.accuracy:
         raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
     out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
@@ -363,7 +361,6 @@ def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> Row:
 
 
 def _picture(folder: Path) -> str | None:
-    """Return the newest picture of a run as a data URL."""
     pictures = sorted(folder.glob("*.png"), key=lambda p: p.stat().st_mtime)
     if not pictures:
         return None

@@ -130,7 +130,6 @@ class Table(NamedTuple):
         return Path(self.made.get("script", "")).name
 
     def label(self, name: str) -> str:
-        """Return the axis title of a column of the table or of the logs."""
         path = Path(self.made.get("script", ""))
         return labelled(look.label(name), ScriptFiles(path).unit(name) if path.is_file() else "")
 
@@ -151,12 +150,11 @@ class GroupedRuns:
 
     @property
     def lucky(self) -> np.ndarray:
-        """Mask of errors that are small by chance."""
         return np.array([*map(bool, self.chance)], bool)
 
     @property
     def rises(self) -> bool:
-        """True if the variable grows with refinement, measured in particle-steps where known."""
+        """True if the variable grows with refinement, measured in particle-steps if known."""
         done = column(self.rows, "particle_steps")
         return not order(self.x, done if np.isfinite(done).all() else self.cost).exponent < 0
 
@@ -172,7 +170,7 @@ class GroupedRuns:
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Format a choice; a value that means nothing alone has its name."""
+    """Format a choice; values that mean nothing alone have their name."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -227,7 +225,7 @@ class Family:
         return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
 
     def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
-        """Find chance in a line with ever more or ever fewer points."""
+        """Find chance in a line whose points only increase or only decrease."""
         points = column(rows, "points")
         rise = np.diff(points[np.isfinite(points)])
         if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):

@@ -1,4 +1,4 @@
-"""Runs judged by a log column, such as an energy, that should stay: a cell for each."""
+"""Runs judged by a log column that should stay, such as an energy: a cell for each."""
 
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
@@ -31,7 +31,6 @@ class Kept(NamedTuple):
 
     @property
     def silent(self) -> bool:
-        """True if no message says why the run went wrong."""
         return self.word in WRONG and not self.warned
 
 
@@ -82,7 +81,7 @@ def _general(note: Mapping[str, str]) -> str:
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Write a Markdown table with rows by the variables `by`, and list silent failures.
 
-    Messages follow, by numbers. Variables in step with row variables are left out.
+    Messages follow, by numbers. Variables in step with row variables are omitted.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

@@ -126,7 +126,6 @@ def log_ticks(low: float, high: float) -> list[float]:
 
 
 def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
-    """Select ascending ticks at least `PART` of the axis apart."""
     chosen: list[float] = []
     for tick in ticks:
         if not chosen or tick >= chosen[-1] * (high / low) ** PART:
@@ -180,11 +179,11 @@ def slope(axes: "Axes", lines: Sequence[tuple[np.ndarray, np.ndarray]], exponent
 
 
 def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:
-    """Move values to distances of at least `gap`, in order, within `low` and `high`."""
+    """Move values at least `gap` apart, in order, within `low` and `high`."""
     rank = np.argsort(wanted, kind="stable")
     count = max(len(rank) - 1, 1)
     steps = min(gap, (high - low) / count) * np.arange(len(rank))
-    # With the least distances subtracted, positions only have to rise.
+    # Minus the least distances, positions only have to rise.
     shifted = np.maximum.accumulate(np.asarray(wanted, float)[rank] - steps)
     shifted = np.maximum(np.minimum(shifted, high - steps[-1]), low)
     result = np.empty(len(shifted))
@@ -193,7 +192,7 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: "Axes", ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names at line ends (x, y, name, colour); equal ends share a label."""
+    """Write names at line ends (x, y, name, colour); equal ends have one label."""
     if not ends:
         return
     axes.autoscale_view()  # limits are final from here on

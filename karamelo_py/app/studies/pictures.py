@@ -50,7 +50,7 @@ class Sheet(NamedTuple):
         savefig(figure, self.path)
 
 
-DECADES = 1e4  # ratio of values from which a curve gets a logarithmic axis
+DECADES = 1e4  # ratio of values above which a curve gets a logarithmic axis
 
 
 def lines(family: Family, sheet: Sheet) -> None:
@@ -105,7 +105,6 @@ def _bars(family: Family, line: GroupedRuns) -> np.ndarray:
 
 
 def _gone(axes: "Axes", marks: Sequence[tuple[float, str]]) -> None:
-    """Draw a cross at the top for each run without a value."""
     for at in {x for x, _ in marks}:
         colours = [colour for x, colour in marks if x == at]
         for k, colour in enumerate(colours):
@@ -257,7 +256,6 @@ def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
 
 
 def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | None = None) -> None:
-    """Draw curves, with a cross where a run was stopped."""
     figure = blank_figure(7.2, 4.0)
     axes = figure.subplots()
     ys = np.concatenate([each.y for each in curves])

@@ -102,7 +102,7 @@ class Recorded:
             self.parts[name] = Reduction("last", name, None, word)
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
-        """List the log columns that it reads; `variables` are none."""
+        """List the log columns it reads, which are not among `variables`."""
         return [reduction.column for name, reduction in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Row) -> float:
@@ -124,7 +124,7 @@ class Recorded:
 def recorded(
     text: str, script: ScriptFiles, variables: Container[str] = (), option: str = "-record"
 ) -> list[Recorded]:
-    """Read the numbers that an option asks for."""
+    """Read the numbers that an option requests."""
     items = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     headings = script.logged()
     for item in items:
@@ -204,7 +204,6 @@ def read(path: Path) -> list[dict[str, str]]:
 
 
 def value(each: Row, name: str) -> float | None:
-    """Return the number in a column, or None."""
     cell = each.get(name)
     if cell is None or isinstance(cell, float):
         return cell

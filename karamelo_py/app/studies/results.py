@@ -46,7 +46,7 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
 
 
 def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) -> list[History]:
-    """Return a line for each result and each group of runs that differ in `x` alone."""
+    """Return a line for each result and each group of runs that differ only in `x`."""
     differing = [
         name
         for name in by or table.variables
@@ -120,7 +120,6 @@ def _picture(
 
 
 def _tell(lines: Sequence[History], law: Law | None, options: Namespace) -> None:
-    """Print the results with their deviation from the law."""
     for line in lines:
         table = plain_table([], [options.x, line.label, *([law.text, "%"] if law else [])])
         for at, y in zip(line.x, line.y, strict=True):

@@ -52,14 +52,13 @@ BORNE = ("stable", "damped")  # classes of stable steps
 UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program measures energies often enough
-SURE = 3 * watch.LOOKS * watch.LOOK  # steps from which slow growth is recognised
+SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
 FIRST = 0.1  # fraction of the rows of a log over which energies are averaged
-FEW = 9  # values of a variable that all get a tick
+FEW = 9  # up to as many values of a variable all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
     "short": "#e4e4e4", "failed": "#7d2a3a",
 }  # fmt: skip
-# Short reasons by code.
 REASONS = {
     "inside-out": "det F <= 0",
     "not-a-number": "NaN",
@@ -231,7 +230,6 @@ class Map:
         return [self.results[cell]["class"] for cell in cells]
 
     def judged(self, row: Row) -> Row:
-        """Add class and reason to the row of a run."""
         folder = self.study.out.parent / row["folder"]
         record = record_of(folder)
         runs, code = record.get("runs", []), error_of(record).get("code", "")
@@ -289,8 +287,7 @@ class Map:
     def line(self, step: str) -> list[float | None]:
         """Return each row's x where the first step equals the column `step`, or None.
 
-        Extrapolates the ratio of the steps as a power of x, and interpolates rows with too few
-        runs.
+        Extrapolates the ratio of the steps as a power of x; interpolates rows with too few runs.
         """
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.results.items()):
@@ -467,9 +464,9 @@ def explore(
     """Return the classes of the cells that were run, and of the others, which are inferred.
 
     Lines and columns about `stride` cells apart are run first. Cells between two of one class in a
-    row or column get that class, the nearest first; between unlike ones the middle is run, longest
-    gaps first. Along an edge, one in three cells is run, so that no bow is cut off. Islands between
-    runs are missed. Nothing is inferred along a direction of words (`apart`).
+    row or column get that class, the nearest first; between different ones the middle is run,
+    longest gaps first. Along an edge, one in three cells is run, so that no bow is cut off. Islands
+    between runs are missed. Nothing is inferred along a direction of words (`apart`).
     """
     classes: list[Hashable] = []  # of the numbers in planes
     plane = np.full(shape, UNKNOWN)
@@ -498,12 +495,11 @@ def _cuts(count: int, stride: int) -> list[int]:
 
 
 def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Yield known neighbours with a gap between them."""
     return ((a, b) for a, b in pairwise(np.flatnonzero(line != UNKNOWN)) if b - a > 1)
 
 
 def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill in cells between like ones unless row and column disagree."""
+    """Fill in cells between equal ones unless row and column disagree."""
     filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
@@ -517,7 +513,7 @@ def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray
 
 
 def _between(plane: np.ndarray, reach: int) -> np.ndarray:
-    """Fill each row between like cells at most `reach` apart."""
+    """Fill each row between equal cells at most `reach` apart."""
     said = np.full(plane.shape, UNKNOWN)
     for line, out in zip(plane, said, strict=True):
         for a, b in _gaps(line):
@@ -527,7 +523,6 @@ def _between(plane: np.ndarray, reach: int) -> np.ndarray:
 
 
 def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cell]]:
-    """Yield the length and middle of each gap."""
     for i, line in enumerate(plane if not apart[1] else ()):
         yield from ((b - a, (i, (a + b) // 2)) for a, b in _gaps(line))
     for j, line in enumerate(plane.T if not apart[0] else ()):
@@ -557,7 +552,7 @@ def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) 
 
 
 def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
-    """Return cells of the longest gaps, at least half a gap apart."""
+    """Select cells of the longest gaps, at least half a gap apart."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
         if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):

@@ -50,7 +50,7 @@ class Study:
     """A family of runs of one script."""
 
     launch: Launch
-    out: Path  # table or picture; runs have their folders in a folder of that name
+    out: Path  # table or picture; runs have folders in a folder of that name
     names: list[str]  # variables
     items: Sequence[Recorded]  # values recorded from the logs
     jobs: int  # runs at once
@@ -80,7 +80,6 @@ class Study:
         write_whole(self.out.with_suffix(".json"), text)
 
     def claim_folder(self) -> None:
-        """Lock the folder of the runs against other studies."""
         if self.folder.exists() and not self.folder.is_dir():
             expected = "a free name for the folder of the runs"
             raise ScriptError(f"{self.folder} is a file", expected=expected)
@@ -288,7 +287,6 @@ def ended(result: Row) -> str:
 
 
 def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None = None) -> Table:
-    """Make an empty table with columns of words and of numbers."""
     from rich.table import Table
 
     table = Table(box=None, pad_edge=False, title=title, title_justify="left")
@@ -300,7 +298,7 @@ def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None 
 
 
 def results_table(rows: Sequence[Row], study: Study, console: Console) -> Table:
-    """Make a table of runs; facts are left out before values are cut."""
+    """Make a table of runs; facts are omitted before values are cut."""
     from rich.text import Text
 
     words, facts = [item.word for item in study.items], list(_FACTS)

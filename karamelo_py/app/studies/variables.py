@@ -1,4 +1,4 @@
-"""Variables of a study, their values, and the options that studies have in common."""
+"""Variables of a study, their values, and common options of studies."""
 
 import csv
 import os
@@ -106,8 +106,6 @@ def cases(
 
 
 class NamesOfCase:
-    """Names in a formula: `values`, and unquoted `words`."""
-
     def __init__(self, option: str, values: Mapping[str, Any], words: Iterable[str] = ()):
         self.option, self.values, self.words = option, {**CONSTANTS, **values}, words
 
@@ -133,7 +131,6 @@ class NamesOfCase:
 
 
 def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) -> bool:
-    """Evaluate a condition in the script language for a case."""
     raw, node = parse_text(condition, "-where")
     value = evaluate(node, raw, NamesOfCase("-where", case, words))
     if not isinstance(value, float):
@@ -205,7 +202,6 @@ class ScriptFiles:
         return [words for words in arguments if words]
 
     def unit(self, name: str) -> str:
-        """Return the unit of a log column, or ""."""
         reduction, _, column = name.rpartition(":")
         if reduction not in ("", "max", "min", "mean", "first", "last"):
             return ""

@@ -27,10 +27,10 @@ from karamelo_py.app.leaving import STUDY
 MOST = 8  # kinds with a process
 TRIES = 3  # to start the first process
 PATIENCE = 20.0  # seconds for an answer: a start takes about 0.01, the import 2
-SUBREAPER = 36  # of Linux's prctl: adopts processes whose parents have ended
+SUBREAPER = 36  # of Linux's prctl: adopt processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
-# Functions of a script in Python may change what the next run finds.
+# Functions of a script in Python may affect the next run.
 NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
@@ -62,7 +62,7 @@ class WarmProcess:
 
 
 class WarmProcesses:
-    """Warm processes by kind, which end with the study."""
+    """Warm processes by kind; they end with the study."""
 
     def __init__(self, environment: Mapping[str, str]):
         self.environment = environment
@@ -74,7 +74,7 @@ class WarmProcesses:
     def start(
         self, kind: tuple[str, ...], words: list[str], folder: Path, files: Sequence[BinaryIO]
     ) -> int | None:
-        """Start a run with output and error in `files`; return the pid of this child, or None."""
+        """Start a run with output and error in `files`; return the child's pid, or None."""
         with self.lock:
             while self.tries:
                 key: tuple[str, ...] = ()
@@ -94,7 +94,6 @@ class WarmProcesses:
         return None
 
     def _chosen(self, key: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the key of the process to copy."""
         process = self.keepers.get(key)
         if process is not None:
             try:
@@ -119,7 +118,7 @@ class WarmProcesses:
         self.keepers[()] = WarmProcess(mine, process.pid)
 
     def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
-        """Make the socket for the process that a run is to leave, if none is there."""
+        """Make the socket for the process that a run is to leave, if none exists."""
         if key in self.keepers:
             return None
         if len(self.keepers) > MOST:
@@ -177,7 +176,7 @@ def keep(link: socket.socket) -> NoReturn:
             for end in (link, read, write):
                 end.close() if end is link else os.close(end)
             _run(json.loads(request), *files)
-        os.waitpid(between, 0)  # from here on the run is a child of the study
+        os.waitpid(between, 0)  # now the run is a child of the study
         os.close(write)
         link.send(os.read(read, 32))
         for file in (read, *files):
