@@ -17,9 +17,9 @@ class Hertz(NamedTuple):
 
 
 class MinimizePenetration(NamedTuple):
-    """Force that removes the overlap of two free points within a step, with friction."""
+    """Removes the overlap of two free points within a step, with friction."""
 
-    friction: float  # coefficient of Coulomb friction
+    friction: float  # Coulomb's
 
 
 def face(kin, volume, x):
@@ -45,7 +45,7 @@ def radius(kin, volume, x):
 
 class TouchingPair(NamedTuple):
     dx: Any  # x2 - x1
-    r: Any  # |dx|, less than the sum of the radii
+    r: Any  # |dx|, below the sum of the radii
     radii: tuple
     masses: tuple
     dt: Any
@@ -75,7 +75,7 @@ def _force_between_minimize_penetration(law, kin, pair):
 
 
 class FrictionMemory(NamedTuple):
-    hold: Any  # force of the spring along the surface, a vector
+    hold: Any  # of the spring along the surface, a vector
     mean: Any  # running mean of the load
     unused: Any  # friction left from earlier steps
 
@@ -83,19 +83,19 @@ class FrictionMemory(NamedTuple):
 def rub(mu, load, memory, stop):
     """Coulomb friction with memory: the force, and the memory after the step.
 
-    `stop`, m v/dt, stops a free point. A point that carries others, loaded again in each step,
-    would creep. Therefore a spring along the surface, as stiff as the normal contact, is stretched
-    by the slip; its force `hold` is returned to the friction cone (Wriggers 2006, "Computational
+    `stop` = m v/dt stops a free point. Alone, it would let a point creep that carries others,
+    loaded again in each step. Therefore slip stretches a spring along the surface, as stiff as the
+    normal contact; its force `hold` is returned to the friction cone (Wriggers 2006, "Computational
     Contact Mechanics", chapter 5). The load comes in pulses, because points bounce on a stiff
-    contact: a step may use friction left `unused` in earlier steps, up to mu times the `mean` load.
-    A point that slides all the time has mu times the load of each step.
+    contact: a step may use friction `unused` in earlier steps, up to mu times the `mean` load. A
+    point that always slides has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)
     unused = (1 - NEW) * unused + mu * load
     bound = mu * max(mean, load)
     force = _shortened(hold + stop, min(bound, unused))
-    # Clipped at 0: with round-off below it, friction would accelerate the slip.
+    # At least 0: negative by rounding, friction would accelerate the slip.
     left = max(unused - sqrt(force.squared()), 0.0)
     return force, FrictionMemory(_shortened(hold, bound), mean, left)
 

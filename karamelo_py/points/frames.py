@@ -1,7 +1,7 @@
 """Frames: weights and gradients at present (``Updated``) or reference positions (``Total``).
 
-``Updated`` has spatial gradients and the Kirchhoff stress; ``Total`` reference gradients, the first
-Piola-Kirchhoff stress and the deformation gradient F.
+``Updated``: spatial gradients and Kirchhoff stress. ``Total``: reference gradients, first Piola-
+Kirchhoff stress and deformation gradient F.
 """
 
 from typing import Any, NamedTuple
@@ -34,15 +34,15 @@ class Total(NamedTuple):
 
 
 def spatial_increment(frame, kin, dl, f):
-    """dt grad v in space from `dl` of the frame and the old F."""
+    """Spatial dt grad v from `dl` of the frame and the old F."""
     # F + dt Fdot = (I + dt Fdot F^-1) F exactly
     return dl if frame.moves else dl @ inv(f)
 
 
 def of_places_before(frame, kin, dl):
-    """`dl` for positions before a motion, from `dl` for positions after it."""
-    # grad v there is grad v here (I - dl)^-1, so that F grows by (I - dl)^-1 exactly. As a product
-    # it is accurate for small dl. Gradients of the total frame belong to the reference.
+    """`dl` at the positions before a motion, from `dl` after it."""
+    # grad v there is grad v here (I - dl)^-1, so F grows by (I - dl)^-1 exactly. As a product it is
+    # accurate for small dl. Gradients of the total frame belong to the reference.
     return dl @ inv(I - dl) if frame.moves else dl
 
 
@@ -56,12 +56,12 @@ def force_stress(frame, kin, tau, f):
 
 
 def pulled_back(frame, kin, g, f):
-    """Flux direction C^-1 g = F^-1 F^-T g for reference positions; the gradient g in space."""
+    """Flux direction C^-1 g = F^-1 F^-T g at reference positions; the gradient g in space."""
     return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 
 def scaled_increment(frame, kin, dl, f, ratio):
-    """`dl` scaled so that it gives `ratio` times the volume."""
+    """`dl` scaled to `ratio` times the volume."""
     # (I + dl) s - I in space, (F + dl) s - F for reference positions
     s = power(ratio, 1 / len(dl.axes))
     return s * dl + (s - 1) * (I if frame.moves else f)

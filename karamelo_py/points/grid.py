@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
-Length = Any  # of one grid, and counts; in the setup of a scene they are arrays of all grids
+Length = Any  # of one grid; in the setup of a scene, arrays of all grids
 Count = Any
 
 
 class Grid(NamedTuple):
-    """One of the grids of a scene. Lengths are in the units of the scene, counts in cells."""
+    """One grid of a scene. Lengths in units of the scene, counts in cells."""
 
     x0: Length  # lower corner
     y0: Length
@@ -24,8 +24,8 @@ class Grid(NamedTuple):
     lx: Length  # size in cells, not always an integer
     ly: Length
     lz: Length
-    slack: Length  # distance outside at which a point still counts as on it, in cells
-    step_x: Count  # difference of node numbers of neighbours along x
+    slack: Length  # distance outside at which points count as on it, in cells
+    step_x: Count  # difference of node numbers along x
     step_y: Count
     first: Count  # number of the first node
     first_cell: Count  # number of the first cell
@@ -36,7 +36,7 @@ def renumbered(grid, first, step_x, step_y):
 
 
 def pick(direction, a, b, c):
-    """Select by direction; resolved at compile time if that is a literal."""
+    """Select by direction; at compile time if it is a literal."""
     return a if direction == 0 else (b if direction == 1 else c)
 
 
@@ -53,7 +53,7 @@ def inside(grid, kin, x):
     for k in range(kin.dimension):
         a = in_cells(grid, k, x[k])
         end = pick(k, grid.lx, grid.ly, grid.lz)
-        # In this form, NaN lies outside.
+        # NaN lies outside in this form.
         within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within
 
@@ -69,7 +69,7 @@ def node_position(grid, n):
 
 
 class Bounces(Field):
-    """Number of reflections of a point at the edge of the domain, in each direction."""
+    """Number of reflections of a point at the edge of the domain, per direction."""
 
     shape = vector
 
@@ -81,7 +81,7 @@ class ReflectingGrid(Grid):
 
 @point_function(otherwise=True)
 def reflected(grid, kin, y, v, moment):
-    """Position, velocity and moment after reflection, and 1 for each direction reflected in."""
+    """Position, velocity, moment after reflection; 1 for each reflecting direction."""
     return y, v, moment, ()
 
 

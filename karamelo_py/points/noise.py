@@ -1,7 +1,7 @@
 """Limits of drift and rotation through the grid, which amplify null-space noise.
 
-Measured with disks of rubber and metal, 4 to 16 cells across the radius, vibrating with 0.01 to 2 %
-of strain while they drift or rotate (docs/energy-measurements.md).
+From disks of rubber and metal, 4 to 16 cells across the radius, vibrating with 0.01 to 2 % of
+strain while they drift or rotate (docs/energy-measurements.md).
 """
 
 from math import inf
@@ -13,23 +13,23 @@ from karamelo_py.language.rules import known_failure
 class DriftLimits(NamedTuple):
     """Bounds of cells crossed times c dt/h for conserved energy, two points per cell or one."""
 
-    drift: tuple[float, float]  # by the centre of mass in 2D and in 3D, musl and usf
-    line: float  # the same in 1D
-    averaged: tuple[float, float]  # the same as `drift` with usavg
-    rim: tuple[float, float]  # by the rim of a rotating body, with musl and usf
-    rim_averaged: tuple[float, float]  # the same with usavg
-    fastest: float = inf  # times the wave speed, above which a drift adds no noise
-    damps: bool = False  # whether a faster drift damps vibrations in 3D
+    drift: tuple[float, float]  # by the centre of mass, in 2D and 3D, musl and usf
+    line: float  # in 1D
+    averaged: tuple[float, float]  # as `drift`, with usavg
+    rim: tuple[float, float]  # by the rim of a rotating body, musl and usf
+    rim_averaged: tuple[float, float]  # with usavg
+    fastest: float = inf  # times the wave speed; a faster drift adds no noise
+    damps: bool = False  # a faster drift damps vibrations in 3D
 
 
-JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # bases with jumps of the gradient
+JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # bases with gradient jumps
 BOXES = DriftLimits((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
 QUADRATIC = DriftLimits((54, 20), 6, (inf, inf), (inf, 25), (inf, inf))
 CUBIC = DriftLimits((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1, damps=True)
 
 
 def drift_limits(basis: Any) -> DriftLimits:
-    """Limits of a basis: its own, or those of similar bases."""
+    """Limits of a basis, or those of similar bases."""
     traits = basis.traits
     usual = BOXES if traits.steep_edge else QUADRATIC
     return traits.drift_limits or (JUMPS if traits.gradient_jumps else usual)

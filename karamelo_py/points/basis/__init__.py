@@ -1,9 +1,9 @@
 """Bases: the nodes in a point's stencil, with weights and gradients. One file each.
 
 A basis is a NamedTuple of parameters (its class is the tag), with `traits` and the point functions
-declared here. `grid` is the :class:`~karamelo_py.points.grid.Grid` of the point; `place` a flat
-tuple of its position and the stored shape of its domain (nothing, half sizes, corners ...);
-`stencil` the result of `locate`. A product of one function per direction only needs `along` and
+declared here. `grid` is the point's :class:`~karamelo_py.points.grid.Grid`; `place` a flat tuple of
+its position and the stored shape of its domain (nothing, half sizes, corners ...); `stencil` the
+result of `locate`. A product of one function per direction only needs `along` and
 :func:`karamelo_py.points.basis.product.register`. A basis with corners has an `element`
 (:class:`~karamelo_py.points.basis.cpdi.Element`).
 """
@@ -16,36 +16,35 @@ from karamelo_py.points.noise import DriftLimits
 
 
 class BasisTraits(NamedTuple):
-    cells: int  # that the nodes of all points of a cell span; 1: the corners of the cell only
+    cells: int  # spanned by the nodes of all points of a cell; 1: the cell's corners only
     least_nodes: int  # of the grid per direction
-    steady_moment: bool  # D of the affine transfers stays away from zero everywhere
-    # |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes. usl then limits the
-    # effect of light nodes on the strain.
+    steady_moment: bool  # D of the affine transfers is nowhere near zero
+    # |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes: usl limits the effect of
+    # light nodes on the strain.
     steep_edge: bool
-    nodes_per_cell: int = 1  # 2 if there are nodes between the corners of cells
-    # Gradients jump at cell faces. Points that cross cells then add energy to a body, less with a
-    # smaller step.
+    nodes_per_cell: int = 1  # 2 with nodes between the corners of cells
+    # At cell faces. Points that cross cells then add energy to a body, less with a smaller step.
     gradient_jumps: bool = False
-    # Stable step over h/c while points stay at their positions: in the updated frame, and its bound
-    # if the strain comes before the forces, as in usf; in the total frame.
+    # Stable step over h/c while points stay at their positions: in the updated frame, its bound if
+    # the strain comes before the forces (usf), in the total frame.
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
-    # Stiffness of a point with no other point at its nodes, for smooth gradients: h^2 / D, and the
-    # largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls.
+    # Stiffness of a point alone at its nodes, for smooth gradients: h^2 / D, and the largest h^2
+    # sum_I |grad N_I|^2 / N_I per direction, away from walls.
     lone: tuple[float, float] | None = None
     bears_drift: bool = False  # drifting bodies conserve energy with the step of bodies at rest
     drift_limits: DriftLimits | None = (
-        None  # how far they may drift and rotate; None: as for similar functions
+        None  # limits of drift and rotation; None: as similar functions
     )
-    # Stored parts of the domain of a point, in order: ``half_size`` (d numbers), ``half_edges`` (d
-    # vectors), ``deformation`` (F in 2D or in 3D), ``corners`` (of the `element` of the basis).
+    # Stored parts of a point's domain, in order: ``half_size`` (d numbers), ``half_edges`` (d
+    # vectors), ``deformation`` (F in 2D or 3D), ``corners`` (of the basis's `element`).
     shape: tuple[str, ...] = ()
 
 
 @point_function()
 def locate(basis, kin, grid, place):
-    """The stencil of a point: what the functions below need, computed once per point."""
+    """Stencil of a point: what the functions below need, computed once per point."""
 
 
 @point_function()
@@ -74,18 +73,18 @@ def affine_weight(basis, kin, grid, stencil, k):
 
 @point_function(otherwise=True)
 def walled(basis, faces):
-    """The basis, also modified at walls inside the grid (see `splines.AtWalls`)."""
+    """The basis, modified at walls inside the grid, too (`splines.AtWalls`)."""
     return basis
 
 
 @point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
-    """The part of the affine moment that MUSL maps to the nodes the second time."""
+    """The part of the affine moment in MUSL's second mapping to the nodes."""
     return moment
 
 
 def without_moment(basis, grid, moment):
-    """No moment the second time: B D^-1 is unbounded where D vanishes.
+    """No moment in the second mapping: B D^-1 is unbounded where D vanishes.
 
     The velocity that deforms the points omits it; the points retain B.
     """
@@ -94,7 +93,7 @@ def without_moment(basis, grid, moment):
 
 @point_function(otherwise=True)
 def first_node(basis, like):
-    """Offset to a position in cells, whose integer part is then its first node."""
+    """Offset to a position in cells whose integer part is then the first node."""
     return 0
 
 
@@ -102,7 +101,7 @@ def first_node(basis, like):
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Count of numbers of a place after the position, in `d` dimensions."""
+    """Count of numbers in a place after the position, in `d` dimensions."""
     shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
@@ -115,13 +114,13 @@ def blank(basis, kin, x):
 
 @point_function(otherwise=True)
 def deformed(basis, kin, place, dl):
-    """`place` after the increment dl = dt grad v: its shape changes, not its position."""
+    """`place` after dl = dt grad v: its shape changes, not its position."""
     return place
 
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """Reach of the domain's corners, or of the nodes they scatter to, in cells; or 0."""
+    """Reach in cells of the domain's corners, or of the nodes they scatter to; or 0."""
     return grid.h - grid.h
 
 
@@ -133,7 +132,7 @@ def carried(basis, kin):
 
 @point_function(otherwise=True)
 def placed(basis, kin):
-    """Count of corners stored by position, directly after the point's position."""
+    """Count of corners stored by position, right after the point's."""
     return 0
 
 

@@ -1,4 +1,4 @@
-"""GIMP: hat functions averaged over the box of a point, which may deform with it."""
+"""GIMP: hat functions averaged over a point's box, which may deform with it."""
 
 from types import MappingProxyType
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 # Range of half sizes for weights, in cells.
 LEAST = 1e-3
 MOST = 1.0
-STRETCHED = "half_size", "half_size", "deformation"  # present and initial half sizes, F
+STRETCHED = "half_size", "half_size", "deformation"  # present and initial, F
 
 
 class _Box(NamedTuple):
@@ -97,7 +97,7 @@ class CPGIMPStretch(_Following):
 
 
 class CPGIMPCorners(_Following):
-    """Boxes as warn_of_many_nodes as the mean distance of their corners, which the grid moves.
+    """Boxes as wide as the mean distance of their corners, which the grid moves.
 
     l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c and their
     sides s_ci = -1 or 1 in direction i (after Coombs et al. 2020, "On Lagrangian mechanics and the
@@ -148,7 +148,7 @@ class CPGIMP(_Box):
 def box(grid, kin, place, direction, halves):
     """Centre and ends of a domain along one direction, in cells, before cuts at walls.
 
-    `halves` are bounds of its half size.
+    `halves` bound its half size.
     """
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
@@ -157,7 +157,7 @@ def box(grid, kin, place, direction, halves):
 
 
 def in_cell(lo, hi, j):
-    """Integrals of 1 and of the hat of node j + 1 over [lo, hi] in the cell from node j."""
+    """Integrals of 1 and of node j + 1's hat over [lo, hi], in the cell from node j."""
     p = max(lo - j, 0)
     q = min(hi - j, 1)
     length = max(q - p, 0)
@@ -167,7 +167,7 @@ def in_cell(lo, hi, j):
 def averaged_hats(cells, grid, first, lo, hi):
     """Hats from node `first`, averaged over [lo, hi].
 
-    Lengths are in cells from that node; the domain lies within this number of `cells` from it.
+    Lengths are in cells from that node; the domain lies within `cells` from it.
     """
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
@@ -210,21 +210,21 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
 
 
 def _end(at, first, top):
-    """Cell from node `first` that contains an end of a box, and the position in it.
+    """Cell, from node `first`, of an end of a box, and the position in it.
 
-    For an end beyond a wall the cell at the wall, at most the `top`-th.
+    Beyond a wall: the cell at the wall, at most the `top`-th.
     """
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i
 
 
-# As for the linear basis, which is the limit of a vanishing box.
+# As in the linear basis, the limit of a vanishing box.
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
 # --- boxes ------------------------------------------------------------------------------------
-# F in 2D is enough for boxes: axisymmetric points need no part around the axis.
+# F in 2D is enough: axisymmetric points need no part around the axis.
 
 
 @bases.deformed.on(CPGIMPDet)
@@ -245,8 +245,8 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
 
 
 # --- corners ----------------------------------------------------------------------------------
-# Bit k of a corner's number gives its side of the point in direction k; bit k of the number of a
-# carrying node, its side of the cell.
+# Bit k of a corner's number: its side of the point in direction k; of a carrying node's number: its
+# side of the cell.
 
 
 @bases.carried.on(CPGIMPCorners)

@@ -9,9 +9,9 @@ from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.transfers import flip_coefficient
 
 STRETCH = 0.3  # strain beyond which points a cell apart separate
-SMALL_SHARE = 0.3  # of the stable step, with which impacts conserve energy
-PER_CELL = 0.17  # P falls by exp(-0.17 N), about, if stressed material moves through N cells
-TOLD = 0.03  # of the stress: a larger loss gives a warning
+SMALL_SHARE = 0.3  # fraction of the stable step at which impacts conserve energy
+PER_CELL = 0.17  # P falls by about exp(-0.17 N) if stressed material moves through N cells
+TOLD = 0.03  # loss of stress that gives a warning
 
 
 class Linear(NamedTuple):
@@ -102,7 +102,7 @@ known_failure(
 @along.on(Linear)
 def _along_linear(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
-    i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
+    i = min(int(a), cells_along(grid, direction) - 1)  # the last face is in the last cell
     r = a - i
     gradients = (-grid.inv_h, grid.inv_h)
     # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere

@@ -11,17 +11,17 @@ from karamelo_py.points.kinematics import gradient, product, vector
 
 
 class Along(NamedTuple):
-    first: int  # number of the first of them in this direction
-    r: float  # distance of the point from it, in cells
-    weights: tuple[float, ...]  # N of each
-    gradients: tuple[float, ...]  # dN/dx of each
-    affine: tuple[float, ...]  # N D^-1 (X_I - x) of each, D the mean of (X_I - x)^2 under N
-    ends: tuple[tuple[int, float], ...] = ()  # box ends: cell from `first`, and position in it
+    first: int  # number of the first node in this direction
+    r: float  # distance from it, in cells
+    weights: tuple[float, ...]  # N
+    gradients: tuple[float, ...]  # dN/dx
+    affine: tuple[float, ...]  # N D^-1 (X_I - x), D the mean of (X_I - x)^2 under N
+    ends: tuple[tuple[int, float], ...] = ()  # box ends: cell from `first`, position in it
 
 
 class Stencil(NamedTuple):
-    lines: tuple[Along, ...]  # along each direction
-    inv_r: float  # 1 / r of a point around an axis or centre
+    lines: tuple[Along, ...]
+    inv_r: float  # 1 / r around an axis or centre
 
 
 def sees_same_nodes(stencil):
@@ -43,13 +43,13 @@ def along(basis, kin, grid, place, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """N D^-1 (X_I - x) of each node of a line, if `along` does not compute it."""
+    """N D^-1 (X_I - x) of a line's nodes, if `along` does not compute it."""
     return line.affine
 
 
 @point_function(otherwise=True)
 def spacing(basis):
-    """Distance of neighbouring nodes, in cells."""
+    """Distance of adjacent nodes, in cells."""
     return 1
 
 
@@ -73,12 +73,12 @@ def with_hoop(kin, weight, slopes, inv_r):
 
 
 def inverse_radius(r):
-    """1 / r, or 0 on the axis and so close to it that 1 / r would overflow."""
+    """1 / r, or 0 where r is so small that 1 / r would overflow."""
     return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
 def radius(basis, grid, line):
-    """Radius that the weights reproduce: the point's, except for domains cut at a wall."""
+    """Radius reproduced by the weights: the point's, unless a wall cuts its domain."""
     r = line.r - line.r
     for k in range(len(line.weights)):
         node = real(line.first + k, r) * spacing(basis)
@@ -87,7 +87,6 @@ def radius(basis, grid, line):
 
 
 def node_number(grid, first, steps):
-    """Number of the node `steps` along each direction from node `first`."""
     *others, last = steps
     for step, far in zip(others, (grid.step_x, grid.step_y), strict=False):
         first = first + step * far
@@ -116,7 +115,7 @@ def item(values, k):
 
 
 def with_each_replaced(weights, others):
-    """Products of weights; for each direction, its factor is replaced by the one in `others`."""
+    """Products of weights with one direction's factor replaced by `others`, per direction."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
 
@@ -163,7 +162,7 @@ def _affine_weight_product(basis, kin, grid, stencil, k):
 
 
 def register(basis: type, width: int) -> None:
-    """Give `basis` (a class with `along`, `width` nodes per direction) every point function."""
+    """Give `basis` (a class with `along`, `width` nodes per direction) all point functions."""
     basis.line_nodes = width
     locate.on(basis)(_locate_product)
     support.on(basis)(_support_product)

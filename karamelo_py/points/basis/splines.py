@@ -1,7 +1,7 @@
 """B-splines, modified at the walls of the grid: three or four nodes per direction.
 
-Nodes held inside the grid also make walls (:class:`AtWalls`), by a separate class: scenes without
-such walls pay nothing.
+Nodes held inside the grid make walls, too (:class:`AtWalls`, a separate class: without such walls
+there is no cost).
 """
 
 from typing import NamedTuple
@@ -24,7 +24,7 @@ class AtWalls(NamedTuple):
 
 @point_function(otherwise=True)
 def walls_of_cell(basis, kin, grid, place, direction):
-    """(lower face of the point's cell is a wall, upper face is), or ()."""
+    """(the lower face of the point's cell is a wall, the upper face is), or ()."""
     return ()
 
 
@@ -34,7 +34,7 @@ def _walls_of_cell_at_walls(basis, kin, grid, place, direction):
 
 
 def hats(grid, a, cell, first, count):
-    """Hat functions of a cell, for `count` nodes from the `first`."""
+    """Hat functions of a cell, for `count` nodes from `first`."""
     t, number = a - cell, cell - first
     weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
     slope = grid.inv_h
@@ -55,8 +55,8 @@ class QuadraticSpline(NamedTuple):
     """
 
     in_lanes = True
-    # courant_still is from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5
-    # in 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
+    # courant_still from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5 in
+    # 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
     traits = BasisTraits(
         cells=3,
         least_nodes=3,
@@ -85,7 +85,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     line = product.Along(nearest - 1, 1 + t, weights, gradients, ())
     if all_lanes(bulk):
         return line
-    # At a wall the third node, on the side of the material, has no weight.
+    # At a wall the third node, on the material's side, has no weight.
     first = max(min(where(behind, cell - 1, cell), last - 2), 0)
     return where(bulk, line, hats(grid, a, cell, first, 3))
 
@@ -130,7 +130,7 @@ class QuadraticSplineAtWalls(AtWalls):
 
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
-    """Give `of`, a basis with walls inside the grid, the functions of the one without."""
+    """Give `of`, a basis with walls inside the grid, the functions of `basis` without them."""
     of.traits = basis.traits
 
     @walled.on(basis)
@@ -168,8 +168,8 @@ class CubicSpline(NamedTuple):
     # ratio 0.45 and 0). courant_still, from the highest frequency of a free block: 1.9 to 2.7, 1.84
     # to 2.6 and 1.46 to 2.7, over positions, spacings, walls and ratios up to 0.49.
     # courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the longer
-    # step, 1 % with 0.9 h/c. This is no instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at
-    # 0.03, none at 0.001): strains lacked (dt grad v)^2 then. Not measured since.
+    # step, 1 % with 0.9 h/c. No instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at 0.03,
+    # none at 0.001), but strains then lacked (dt grad v)^2. Not measured since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,
@@ -249,7 +249,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
 
 
 def next_to_wall(grid, t):
-    """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall, at `t` cells from it.
+    """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall, `t` cells away.
 
     The ghost node changes D to h^2 t (1 - t + t^2/3), which vanishes at the wall, but t cancels out
     of N D^-1 (X - x).

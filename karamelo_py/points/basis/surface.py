@@ -1,4 +1,4 @@
-"""Distance of a body's surface from a node, from sums over the body's points at the node."""
+"""Distance of a body's surface from a node, from sums over its points at the node."""
 
 from typing import NamedTuple
 
@@ -8,15 +8,15 @@ from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import Line
 
-CELLS = 16  # of the line for sampling the functions
-ENTRIES = 256  # of a table, over a cell
+CELLS = 16  # sampled along a line
+ENTRIES = 256  # of a table, per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positions, in cells from a node, and the weights of the node there.
+    """Positions, in cells from a node, and the node's weights there.
 
-    `half` is half the size of a point, in cells. For bases with point domains, the hat functions
-    are averaged over a domain.
+    `half`: half a point's size in cells. For bases with point domains, hats are averaged over a
+    domain.
     """
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
@@ -37,16 +37,16 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Distance of a plane surface from a node, for mean positions of the body's points there.
+    """Distance of a plane surface from a node, by the mean position of the body's points there.
 
-    Points of equal mass lie in layers below the surface, the first half of their size from it; both
-    distances are in cells, along the outward normal. Row k belongs to a mean of k / ENTRIES - 3
+    Points of equal mass lie in layers below the surface, the first at half their size; both
+    distances are in cells along the outward normal. Row k belongs to a mean of k / ENTRIES - 3
     (after Nairn 2013, "Modeling imperfect interfaces in the material point method using
     multimaterial methods", CMES 92(3), section 4, who uses a power law). `half` as in `profile`.
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:
-        # The basis functions differ between nodes: the gap is unknown, and fields touch on contact.
+        # Basis functions differ between nodes: the gap is unknown, fields touch on contact.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)
@@ -56,6 +56,6 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     near = seen.sum(axis=1) > 0
     mean = (seen * places).sum(axis=1)[near] / seen.sum(axis=1)[near]
     mean = np.maximum.accumulate(mean)
-    # Once a body fills the reach of a node its mean is constant: the first such surface.
+    # Once a body fills a node's reach the mean is constant: the first such surface.
     mean, first = np.unique(np.round(mean, 9), return_index=True)
     return np.interp(means, mean, surfaces[near][first])

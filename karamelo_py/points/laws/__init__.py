@@ -1,18 +1,17 @@
-"""Constitutive laws of one point, one file each: the style for scripts, and the point functions.
+"""Constitutive laws of one point, one file each: the script style and the point functions.
 
 A law is a NamedTuple of parameters (its class is the tag), perhaps with parts, NamedTuples among
 its parameters (`eos_strength`). Its state is a NamedTuple of numbers and tensors with the
 components of the kinematics `kin` (`karamelo_py.points.kinematics`). `j` = det F is the volume over
 the reference volume.
 
-The docstring of the class is the manual, its annotated fields are the arguments of the style, or
-the parameters of a classmethod `given`, which returns the law. `checked` refuses values that
+The class docstring is the manual. The arguments of the style are the annotated fields, or the
+parameters of a classmethod `given`, which returns the law. `checked` refuses values that
 annotations cannot, and returns the law or an equivalent simpler one. Unusual traits are a class
 attribute ``traits`` (:class:`LawTraits`). `column` declares output columns.
 
 A law with ``in_lanes``, which all its parts need, is computed for several points at once. Its point
-functions branch on numbers of a point only with `where`; those that do otherwise are listed in
-``scalarised``.
+functions branch on numbers of a point only with `where`; exceptions are listed in ``scalarised``.
 """
 
 from __future__ import annotations
@@ -26,12 +25,12 @@ from karamelo_py.compiler import point_function, real
 
 
 class LawTraits(NamedTuple):
-    rebounds: bool = False  # sustains tension and returns all the work done on it
-    flows: bool = False  # holds no shape, as liquids and soils
+    rebounds: bool = False  # sustains tension and returns all work done on it
+    flows: bool = False  # holds no shape: liquids, soils
     rings: bool = True  # vibrates, unless it has no shear modulus
-    any_speed: bool = False  # may move many times faster than its waves, as gases
-    least_density: float = 10.0  # kg/m^3, below which units are likely wrong
-    wraps: bool = False  # can what the law within can
+    any_speed: bool = False  # may move many times faster than its waves: gases
+    least_density: float = 10.0  # kg/m^3; lower values are likely in wrong units
+    wraps: bool = False  # supports what the inner law does
 
 
 def law_traits(part: Any) -> LawTraits:
@@ -97,7 +96,7 @@ def column(part: type, name: str, source: Callable | NamedTuple) -> None:
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """Output columns of a law, those of its parts first: name, and tag for `shown`."""
+    """Output columns of a law, its parts' first: name, and tag for `shown`."""
     kinds = reversed(law_kind(law)[1:])
     tags = {name: tag for kind in kinds for name, tag in _columns.get(kind, {}).items()}
     return {name: of_part(law, tag) for name, tag in tags.items()} | _columns.get(type(law), {})
@@ -105,7 +104,7 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def of_part(law, tag):
-    """Tag by which `law` shows a column of one of its parts, which has `tag`."""
+    """Tag by which `law` shows the column `tag` of one of its parts."""
     return tag
 
 
@@ -136,7 +135,7 @@ def of_law_within(law, tag):
 def number(function: Callable) -> Callable:
     """Make a point function of (law, kin, state) an output column.
 
-    The class of its tag is stored in the module of the function: cached kernels import it.
+    The function's module stores the class of its tag: cached kernels import it.
     """
     name = f"{function.__name__}_tag"
     tag_class = namedtuple(name, (), module=function.__module__)
@@ -157,13 +156,13 @@ def initial_state(law, kin, like):
 
 @point_function()
 def advance(law, kin, state, dl, dt):
-    """State after the increment dl = dt grad v of a step dt."""
+    """State after a step dt with the increment dl = dt grad v."""
 
 
 class FbarStep(NamedTuple):
     dl: Any
     dt: Any
-    extra: Any  # pressure that forces have beyond the point's own
+    extra: Any  # pressure in forces beyond the point's (F-bar)
 
 
 @point_function(otherwise=True)
@@ -174,7 +173,7 @@ def advance_fbar(law, kin, state, step):
 
 @point_function()
 def kirchhoff_stress(law, kin, state):
-    """det F times the Cauchy stress; times the reference volume, it gives nodal forces."""
+    """det F times the Cauchy stress; times the reference volume: nodal forces."""
 
 
 @point_function()
@@ -195,7 +194,7 @@ def deformation(law, kin, state):
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """Check whether a law sums strains, so that load steps need their logarithm: a constant."""
+    """Check whether a law sums strains, so load steps need their logarithm: a constant."""
     return True
 
 
@@ -206,19 +205,19 @@ def wave_speed_squared(law, kin, state):
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """Upper bound of `wave_speed_squared`, if that is cheaper: most points are slower."""
+    """Upper bound of `wave_speed_squared`, if cheaper: most points are slower."""
     return wave_speed_squared(law, kin, state)
 
 
 @point_function(otherwise=True)
 def stretch_across(law, state):
-    """Stretch across a thin body, thickness over initial thickness; 1 for other laws."""
+    """Thickness of a thin body over initial thickness; 1 for other laws."""
     return 1
 
 
 @point_function(otherwise=True)
 def is_round(law):
-    """Check whether a bar along x that is pulled contracts equally in y and z."""
+    """Check whether a bar pulled along x contracts equally in y and z."""
     return True
 
 
@@ -236,7 +235,7 @@ def energy_density(law, kin, state):
 
 @point_function(otherwise=True)
 def constrained_velocity(law, v, v_grid):
-    """Velocity of a point after a step: `v_grid` from the grid; rigid bodies retain v."""
+    """Velocity of a point after a step: `v_grid`; rigid bodies retain v."""
     return v_grid
 
 
@@ -247,7 +246,7 @@ def is_rigid(law: tuple) -> bool:
 @number
 @point_function(otherwise=True)
 def dissipated_energy(law, kin, state):
-    """Dissipated energy per reference volume; undefined for laws without dissipation."""
+    """Dissipated energy per reference volume; undefined for laws without."""
     return specific_volume(law) - specific_volume(law)
 
 
@@ -272,7 +271,7 @@ def temperature(law, kin, state):
 
 @point_function(otherwise=True)
 def with_temperature(law, kin, state, T):
-    """State at the temperature `T`; unchanged for laws without one."""
+    """State at temperature `T`; unchanged for laws without one."""
     return state
 
 

@@ -180,7 +180,7 @@ def newton_step(law, trial, y, w, errors):
     return k * (fw * g - gw * f), k * (gy * f - fy * g)
 
 
-_BISECTIONS = 14  # then Newton's method squares the error
+_BISECTIONS = 14  # after which Newton's method squares the error
 _NEWTON = 4
 
 
@@ -189,7 +189,7 @@ def plastic_flow(law, q, p, pc):
     """y and w that return a trial with q and p to the surface; 0 inside it.
 
     With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution lies
-    between y = 0, or p = pc if the trial has more, and the critical state, 2 p = pc.
+    between y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
     q = where(yields, q, law.M * pc)  # outside the surface, for unused lanes
@@ -220,7 +220,7 @@ def plastic_flow(law, q, p, pc):
 
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
-    # The residual stays 0: a Newton correction with its slopes gives the slopes of y and w.
+    # The residual stays 0: a Newton correction with its slopes gives those of y and w.
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0

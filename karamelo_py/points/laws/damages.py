@@ -1,4 +1,4 @@
-"""Damages: the fraction D of the strength of a point that is lost.
+"""Damages: the lost fraction D of a point's strength.
 
 A damage is a NamedTuple of parameters (its class is the tag) and a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). It scales stress and tension, not compression, by 1 - D;
@@ -22,7 +22,7 @@ def initial_damage(damage, like):
 
 
 class FlowStep(NamedTuple):
-    strain: Any  # increment of the equivalent plastic strain
+    strain: Any  # of the equivalent plastic strain
     triaxiality: Any  # mean stress over von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any
@@ -46,7 +46,7 @@ def initiation(damage, memory):
 # Below this triaxiality, most metals have no finite failure strain.
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
-# Damage grows from 0 to 1 while the sum of strain over failure strain grows from 1 to 1 + 1/this.
+# Damage grows from 0 to 1 while sum(strain over failure strain) grows from 1 to 1 + 1/this.
 _BRITTLENESS = 10.0
 
 

@@ -19,13 +19,13 @@ from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
 
 SLOW = 0.01  # wave speed with density and modulus exchanged, in m/s or mm/ms
-SMALL = 2.0  # degrees: friction angles are larger, unless given in radians
+SMALL = 2.0  # degrees; smaller friction angles are likely radians
 EXPANSION = 1e-10, 1e-3  # per kelvin, far beyond quartz and polymers
-TOUGH = 50.0  # failure strain in shear, if given in percent
+TOUGH = 50.0  # failure strain in shear, if in percent
 APART = 100.0  # kelvin between reference temperatures on the same scale
-MELTS = 0.1  # plastic strain whose heat melts nothing real
+MELTS = 0.1  # plastic strain whose heat melts no real metal
 COEFFICIENT = 2.0  # friction between grains, far above real values
-STEEP, THICK = 10.0, 20.0  # Hugoniot slopes and viscosity coefficients, far above real values
+STEEP, THICK = 10.0, 20.0  # Hugoniot slopes, viscosity coefficients: far above real values
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
@@ -33,7 +33,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     if can(law, constrained_velocity):
         return
     if hasattr(parameter(law, "strength"), "cell_size"):
-        # Viscosity damps waves by the cell size, which is not known yet.
+        # Viscosity damps waves by the cell size, not known yet.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)

@@ -1,7 +1,7 @@
-"""Further parts of a composed law, of kinds that plug-ins may define: any number of them.
+"""Further parts of a composed law, of kinds that plug-ins may define.
 
 A part is a NamedTuple of parameters (its class is the tag). It may have a memory, and add a
-pressure. Lowering adds one itself on request: the plastic strain rate, for output.
+pressure. Lowering adds one on request: the plastic strain rate, for output.
 """
 
 from functools import reduce
@@ -68,7 +68,7 @@ def further_pressure(parts, memory, p):
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, first)))
 
 
-# Karamelo smooths over the time in which sound crosses this many cells.
+# Karamelo smooths over the sound crossing time of this many cells.
 CELLS = 1000
 
 
@@ -87,7 +87,7 @@ laws.column(PlasticRate, "epdot", Smoothed())
 
 class RateMemory(NamedTuple):
     rate: Any
-    ep: Any  # plastic strain, -1 if not known yet
+    ep: Any  # plastic strain, -1 if unknown
 
 
 @initial_part.on(PlasticRate)
@@ -118,7 +118,7 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """A law that also stores its rate, after its other memory; `h` is the cell size."""
+    """A law that also stores its rate, after its other memory; `h`: cell size."""
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))

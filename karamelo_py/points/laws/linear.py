@@ -115,7 +115,7 @@ def _kirchhoff_stress_linear_elastic(law, kin, state):
 
 @laws.wave_speed_squared.on(LinearElastic)
 def _wave_speed_squared_linear_elastic(law, kin, state):
-    # (lam + 2 G) / rho: constant moduli, and a volume per mass that has grown by det F
+    # (lam + 2 G) / rho: constant moduli; volume per mass has grown by det F
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
@@ -126,7 +126,7 @@ def _shear_part_linear_elastic(law, kin, state):
 
 @laws.elastic_strain.on(LinearElastic)
 def _elastic_strain_linear_elastic(law, kin, state):
-    # Hooke's law is isotropic and rotates with the point, so the strain follows from the stress.
+    # Hooke's law is isotropic and rotates with the point: strain follows from stress.
     mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
     return 0.5 / law.G * (state.sigma - mean * I)
 

@@ -17,12 +17,12 @@ from karamelo_py.script.errors import ScriptError
 
 # Voigt's order.
 VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
-INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of a component in it
+INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of a component in Voigt's order
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
 STIFFNESS = tuple(
     tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)
 )
-COUPLED = 1e-9  # of the largest stiffness: shear out of the plane
+COUPLED = 1e-9  # of the largest stiffness: shear out of plane
 
 _Fields = namedtuple(
     "_Fields", ("specific_volume", "fastest", *(f"c{a + 1}{b + 1}" for a, b in PAIRS))
@@ -157,7 +157,7 @@ class Transverse(NamedTuple):
 
 
 def axes(angle: float, tilt: float, spin: float) -> np.ndarray:
-    """Rotation (3, 3) whose columns are the axes of the material; angles in degrees."""
+    """Rotation (3, 3) with the material's axes as columns; angles in degrees."""
 
     def about(axis: int, degrees: float) -> np.ndarray:
         i, j = [k for k in range(3) if k != axis]
@@ -184,7 +184,7 @@ def fastest(C: np.ndarray) -> float:
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
     acoustic = np.einsum("ijkl,nj,nl->nik", C, n, n)
-    # Between the directions that are tried, which are 3 degrees apart, it may be a little larger.
+    # Directions tried are 3 degrees apart; between them it may be a little larger.
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 

@@ -66,10 +66,10 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 
 @dataclass(frozen=True)
 class Numbers:
-    """Constant sequence of numbers, a curve or a formula; kernels see an array.
+    """Constant sequence of numbers, a curve or a formula; an array in kernels.
 
-    Laws of one kind may have sequences of different lengths, which are padded with their last
-    number: a law that needs the length stores it separately.
+    Sequences of laws of one kind are padded with their last number: a law that needs the length
+    stores it separately.
     """
 
     values: tuple[float, ...]

@@ -1,8 +1,8 @@
-"""Temperature of one point, as changed by the law itself.
+"""Temperature of a point, as changed by the law itself.
 
 A temperature is a NamedTuple of parameters (its class is the tag) and a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). Its memory is the temperature (`Warm`), `heat` for other
-parts: () if the law has none.
+parts: () without one.
 """
 
 from typing import Annotated, NamedTuple

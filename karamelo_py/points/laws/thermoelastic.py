@@ -19,11 +19,11 @@ class Expansion(NamedTuple):
     kappa: float
     alpha: float  # coefficient of linear expansion
     pressure: float  # 3 K alpha, pressure per kelvin
-    initial_temperature: float  # T0 of the solid, known when the scene is lowered
+    initial_temperature: float  # T0 of the solid, set when the scene is lowered
 
 
 class Thermoelastic(NamedTuple):
-    """An elastic law and its temperature; the state is the state of the elastic law, then T."""
+    """An elastic law and its temperature; state: the elastic law's, then T."""
 
     in_lanes = True
     traits = LawTraits(rebounds=True)

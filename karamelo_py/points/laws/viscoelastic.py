@@ -28,7 +28,7 @@ from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
 PROBE = 1e-6  # strain at which moduli are measured
-SMALL = 0.01  # step over relaxation time below which series are exact
+SMALL = 0.01  # step over relaxation time, below which series are exact
 
 
 class ElasticMaterial:
@@ -65,7 +65,7 @@ class Branch(NamedTuple):
 
     g: float  # fraction of the stiffness that relaxes
     tau: float  # relaxation time
-    softness: float  # 1/(4 g G), stored energy over the square of its stress
+    softness: float  # 1/(4 g G): stored energy over stress squared
     rest: Any  # further branches
 
 
@@ -138,7 +138,7 @@ class State(NamedTuple):
     elastic: Any
     branches: Any  # internal stress h of the first branch, and those of the rest
     loss: Any  # dissipated energy per reference volume
-    gone: Any  # energy of the elastic law that is not stored, per reference volume
+    gone: Any  # elastic law's energy that is not stored, per reference volume
 
 
 def at_rest(branches, kin):
@@ -155,7 +155,7 @@ def internal_stress(memory, kin):
 
 
 def lost_stress(law, kin, s, branches):
-    """Deviatoric Kirchhoff stress that has relaxed, from the elastic deviator s."""
+    """Relaxed deviatoric Kirchhoff stress, from the elastic deviator s."""
     return relaxed_part(law.branches) * s - dev(internal_stress(branches, kin))
 
 
@@ -170,16 +170,16 @@ def mean_decay(x):
 
 
 def weight_before(x):
-    """Weight a of |h|^2 before in the integral of |h|^2 dt/tau, x - a after; exact in decay."""
+    """Weight a of the old |h|^2 in the integral of |h|^2 dt/tau, x - a after; exact in decay."""
     few = x * (1 / 2 + x * (-1 / 6 + x * x * (1 / 90)))
     left = exponential(-2 * max(x, SMALL))
     return where(x < SMALL, few, 0.5 - x * left / (1 - left))
 
 
 def decayed(branches, memory, dl, added, dt):
-    """Internal stresses after a step, and the energy that they lose.
+    """Internal stresses after a step, and the energy they lose.
 
-    `added` is s after the step less the convected s before.
+    `added`: s after the step minus the convected s before.
     """
     if isinstance(branches, Absent):
         return (), 0
@@ -193,7 +193,7 @@ def decayed(branches, memory, dl, added, dt):
 
 
 def strain_of(dl):
-    """Almansi's strain of I + dl: it does work with Kirchhoff stresses at the end of the step."""
+    """Almansi's strain of I + dl: works with Kirchhoff stresses at the end of the step."""
     back = dl @ inv(I + dl)
     return sym(back) - 0.5 * sym(back.transposed() @ back)
 
@@ -245,7 +245,7 @@ laws.column(Viscoelastic, "dissipated", laws.dissipated_energy)
 def _with_lost_stress(function):
     @function.on(Viscoelastic)
     def _speed_viscoelastic(law, kin, state):
-        # The elastic stiffness, and the stress that the elastic law has and the body has not.
+        # Elastic stiffness, and the stress that the elastic law has and the body has not.
         s = elastic_deviator(law, kin, state.elastic)
         lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
         return function(law.elastic, kin, state.elastic) + 2 * lost * laws.specific_volume(law)

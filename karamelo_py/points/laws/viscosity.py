@@ -1,4 +1,4 @@
-"""Artificial viscosity of one point, which spreads shocks over a few cells.
+"""Artificial viscosity of a point: spreads shocks over a few cells.
 
 A part of a composed law (`karamelo_py.points.laws.eos_strength`), added by an equation of state;
 its memory is (q,), the viscous pressure.
@@ -15,7 +15,7 @@ class ArtificialViscosity(NamedTuple):
 
     Q1: float
     Q2: float
-    cell_size: float  # h, known when the scene is lowered
+    cell_size: float  # h, set when the scene is lowered
 
 
 def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
@@ -38,8 +38,8 @@ def viscous_speed(viscosity, q, density, sound):
 def damped(squared, a):
     """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
 
-    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h), which reduces c dt / h to
-    sqrt(1 + xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10), as if c were c'.
+    Viscosity nu damps the shortest wave of a cell by xi = nu / (c h): c dt / h falls to sqrt(1 +
+    xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10), as if c were c'.
     """
     speed = sqrt(squared + a * a) + a
     return speed * speed

@@ -1,9 +1,9 @@
-"""Transfers: mapping of velocity from points to nodes and back. One file for each family.
+"""Transfers: mapping of velocity from points to nodes and back. One file per family.
 
-A transfer is a NamedTuple of parameters (its class is the tag). It defines what a point stores in
-addition to its velocity (nothing, or a tensor such as the affine moment B, in `point_fields`), and
-the velocity update from v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node
-get a view: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin`
+A transfer is a NamedTuple of parameters (its class is the tag). It defines what a point stores
+besides velocity (nothing, or a tensor such as the affine moment B, in `point_fields`), and the
+velocity update from v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get
+a view: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin`
 (:mod:`karamelo_py.kernels.views`). The default is PIC: nothing is stored, only v is mapped.
 """
 
@@ -17,19 +17,19 @@ from karamelo_py.points import noise
 
 class TransferTraits(NamedTuple):
     inverts_spread: bool = False  # divides by D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
-    retains: bool = False  # points retain a fraction of their velocity: `alpha`, a parameter
-    per_time: bool = False  # alpha holds for a stable step, not for each
-    keeps_gradient: bool = False  # the `Moment` of a point is its velocity gradient
+    retains: bool = False  # points retain the fraction `alpha` of their velocity
+    per_time: bool = False  # alpha is for a stable step, not each step
+    keeps_gradient: bool = False  # a point's `Moment` is its velocity gradient
 
 
 class Moment(Field):
-    """Tensor that points store in addition to velocity: their moment B or gradient L."""
+    """Tensor stored by points besides velocity: moment B or gradient L."""
 
     shape = planar
 
 
 def flip_coefficient(transfer) -> float:
-    """Fraction of its velocity that a point retains in a step; 0 as in PIC."""
+    """Fraction of its velocity that a point retains in a step; 0 for PIC."""
     return transfer.alpha if transfer.traits.retains else 0.0
 
 
@@ -44,7 +44,7 @@ def updated_velocity(transfer, v, v_pic, dv):
 
 @point_function(otherwise=True)
 def in_step(transfer, kept):
-    """The transfer with its coefficients for the present step, with the fraction `kept`."""
+    """The transfer with coefficients for the present step, with the fraction `kept`."""
     return transfer
 
 
@@ -59,7 +59,7 @@ def lost_fractions(transfer, like):
 
 @point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
-    """Velocity that moves a point; `v` is its velocity after the step, `j` `known_volume`."""
+    """Velocity that moves a point; `v`: after the step, `j`: `known_volume`."""
     return v_pic
 
 
@@ -71,13 +71,13 @@ def known_volume(transfer, law, kin, state):
 
 @point_function(otherwise=True)
 def nodal_momentum(transfer, pt, node):
-    """Momentum that a point gives to a node. `pt` has `mass`, `v` and `moment`."""
+    """Momentum that a point gives to a node. `pt` has `mass`, `v`, `moment`."""
     return node.N * pt.mass * pt.v
 
 
 @point_function(otherwise=True)
 def affine_velocity(transfer, moment, inverse_d):
-    """C, if a point gives the node X the velocity v + C (X - x) with its weight; otherwise ().
+    """C, if a point gives node X the velocity v + C (X - x) with its weight; otherwise ().
 
     `inverse_d` is (D^-1,), or () if D is not constant.
     """
@@ -86,7 +86,7 @@ def affine_velocity(transfer, moment, inverse_d):
 
 @point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
-    """Moment of a point at rest, as a tuple: empty for transfers that store none."""
+    """Moment of a point at rest, as a tuple: empty if none is stored."""
     return ()
 
 
@@ -125,7 +125,7 @@ def straining(transfer, kin, gradient):
 
 @point_function(otherwise=True)
 def terms(transfer):
-    """Number of terms of the series that XPIC sums on the nodes; 1: only the first."""
+    """Number of terms of XPIC's series on the nodes; 1: only the first."""
     return 1
 
 
@@ -141,7 +141,7 @@ def _left_out(moment, scene):
 
 
 WITH = "{scene.transfer_name} with the basis {scene.basis_name}"
-TURNS = 1.5  # revolutions from which a body gains a relevant fraction of energy
+TURNS = 1.5  # revolutions with a relevant energy gain
 SMOOTH = "quadratic-spline, or method tlmpm"
 known_failure(
     Moment,

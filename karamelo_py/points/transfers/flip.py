@@ -12,9 +12,9 @@ from karamelo_py.points.transfers import TransferTraits, in_step, lost_fractions
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
-LAG = 0.03  # of the angular velocity of a free body
-BRAKED = 0.05  # of the energy of its rotation
-TURNS = 1.5  # revolutions of a free body, from which FLIP has taken a relevant fraction
+LAG = 0.03  # of a free body's angular velocity
+BRAKED = 0.05  # of its rotational energy
+TURNS = 1.5  # revolutions of a free body with a relevant loss by FLIP
 
 
 class PIC(NamedTuple):
@@ -147,8 +147,8 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
     """Register the warning for bodies that rotate many times.
 
     Points move with the grid velocity u, and store v: each step changes the angular momentum by the
-    sum of m u x v dt, for any step (disks in 2D, E 100 times the rotational energy, 4 and 8 cells
-    across the radius; R4, splines and linear basis).
+    sum of m u x v dt (disks in 2D, E 100 times the rotational energy, 4 and 8 cells across the
+    radius; R4, splines and linear basis).
     """
     known_failure(
         transfer,
@@ -176,7 +176,7 @@ def _lags(transfer, scene):
 
 
 def _brakes(transfer, scene):
-    """Energy loss of a free rotation: (1 - alpha) of the lag in each step, twice."""
+    """Energy loss of a free rotation: (1 - alpha) of the lag per step, twice."""
     lag, simulation = scene.lag, scene.simulation
     if not lag.share > 0:
         return None

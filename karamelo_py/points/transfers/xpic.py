@@ -14,7 +14,7 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass that XPIC has removed from a point; velocity not in the series yet."""
+    """Energy per mass removed by XPIC from a point; velocity not yet in the series."""
 
     @staticmethod
     def shape(kin: Any) -> int:

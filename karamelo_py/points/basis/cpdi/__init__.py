@@ -1,14 +1,14 @@
 """Convected particle domain interpolation: the nodes around the corners of a point's domain.
 
-Over the domain, each basis function is replaced by a simple function through its values at the
-corners x_c (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
+Over the domain, a simple function through its values at the corners x_c replaces each basis
+function (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
 
      N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
 
 with w_c and g_c the domain means of the function of corner c and of its gradient. Domains tile the
-body however far it stretches, so it does not fracture numerically. A family derives from
-`ConvectedDomain` and defines :func:`domain`; one with stored corners that the grid moves derives
-from `CarriedDomain` and also defines `upright`.
+body at any stretch, so it does not fracture numerically. A family derives from `ConvectedDomain`
+and defines :func:`domain`; with stored corners that the grid moves, it derives from `CarriedDomain`
+and also defines `upright`.
 """
 
 from math import inf
@@ -27,10 +27,10 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 
 
 class Element(NamedTuple):
-    kind: str  # its name in meshes
+    kind: str  # name in meshes
     corners: int
-    edges: tuple[tuple[int, int], ...]  # between corners; their determinant must be positive
-    mirrored: tuple[int, ...]  # the order of corners for elements with a negative determinant
+    edges: tuple[tuple[int, int], ...]  # between corners; with positive determinant
+    mirrored: tuple[int, ...]  # corners reordered, for elements with negative determinant
     box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, if it is one
 
 
@@ -38,9 +38,9 @@ class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; they add `dimension` and `shape`.
 
     Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I, which differs from
-    the point if corners lie beyond the grid, or in quadrilaterals and hexahedra that are not
-    parallelograms. Linear momentum stays exact, and angular momentum belongs to the centres: that
-    of the points varies by 0.1 % of its variation with FLIP (a spinning square, Q4).
+    the point if corners lie beyond the grid, or the domain is no parallelogram or parallelepiped.
+    Linear momentum stays exact; angular momentum belongs to the centres: about the points it varies
+    by 0.1 % of its variation with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -56,7 +56,7 @@ class CarriedDomain(ConvectedDomain):
     traits = ConvectedDomain.traits._replace(shape=("corners",))
 
 
-BENT, SMALL = 0.2, 0.15  # a strain; a fraction of the stable step
+BENT, SMALL = 0.2, 0.15  # strain; fraction of the stable step
 
 
 def _torn_by_bending(basis, scene):
@@ -77,37 +77,37 @@ known_failure(
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
-# By dimension, the minimum reach of domains in cells: in 2D points scatter to the nodes next to
-# them at once.
+# By dimension, the minimum reach of domains in cells: in 2D points scatter to all adjacent nodes at
+# once.
 LEAST = (0.0, 0.0, 0.5, 0.0)
-# Corners in the order of a mesh: around the square; around the lower face of the cube and the upper
+# In the order of a mesh: around the square; around the cube's lower face, then the upper
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
 
 @point_function()
 def domain(basis, kin, place):
-    """Corners x_c, weights w_c and gradients g_c of the domain of a point, a tuple each."""
+    """Corners x_c, weights w_c and gradients g_c of a point's domain, a tuple each."""
 
 
 @point_function()
 def upright(basis, kin, place):
-    """Check that the domain is not folded: the Jacobian is positive at every corner."""
+    """Check that no domain is folded: the Jacobian is positive at every corner."""
 
 
 class Corner(NamedTuple):
     cell: tuple[int, ...]  # along each direction
-    fractions: tuple[float, ...]  # of the cell, along each direction
-    at: Any  # their sum, in cells from the corner of the grid, a vector
+    fractions: tuple[float, ...]  # of the cell
+    at: Any  # cell + fractions, from the corner of the grid, a vector
 
 
 class CornerStencil(NamedTuple):
     """Corners of a domain. Unused fields cost nothing."""
 
     corners: tuple[Corner, ...]
-    weights: tuple[float, ...]  # of the corners, and their gradients
+    weights: tuple[float, ...]  # of the corners; then their gradients
     gradients: tuple[Any, ...]
-    point: tuple[float, ...]  # where the point lies, in cells
+    point: tuple[float, ...]  # position in cells
     centre: Any  # sum_I N_I X_I, in cells, a vector
     spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
     inv_r: float  # 1 / r of an axisymmetric point
@@ -128,11 +128,11 @@ class AtCorners(NamedTuple):
 def along_cell(grid, direction, x):
     """Cell of a corner in one direction, position in it (0 to 1), and their sum.
 
-    A corner beyond the grid is moved to its face, so weights still sum to one.
+    Corners beyond the grid are moved to its face, so weights still sum to one.
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
+    a = min(max(real(0, a), a), real(cells, a))  # NaN becomes 0 in this order
     i = min(int(a), cells - 1)
     return i, a - i, a
 
@@ -159,7 +159,7 @@ def around(grid, corner):
 
 
 def arm(grid, first, far, centre):
-    """Vector from the weighted centre to the node `far` from the `first` along a direction."""
+    """Vector from the weighted centre to the node `far` steps from the `first`."""
     return (real(first + far, centre) - centre) * grid.h
 
 
@@ -171,7 +171,7 @@ def pairs_of_spread(kin):
 
 
 def spread_of(kin, grid, weight, corner, centre):
-    """Contribution of one corner to D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    """One corner's contribution to D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):

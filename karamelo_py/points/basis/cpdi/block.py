@@ -1,7 +1,7 @@
 """The nodes around a domain in 2D, each once: three by three.
 
-Most nodes are seen from several corners, so contributions are summed over the corners before they
-are added to the nodes. In 3D this costs more than it saves: 27 nodes, eight corners.
+Several corners share most nodes, so contributions are summed over the corners first. In 3D this
+costs more than it saves: 27 nodes, eight corners.
 """
 
 from collections.abc import Iterable
@@ -21,10 +21,10 @@ WIDTH = 3  # nodes along each direction
 class NodeBlock(NamedTuple):
     """Nodes next to a point, with weights and gradients. Unused fields cost nothing."""
 
-    first: tuple[int, ...]  # number of the first of them, along each direction
+    first: tuple[int, ...]  # number of the first node, along each direction
     weights: tuple[float, ...]
-    gradients: tuple[Any, ...]  # from the gradients of the corners, without N / r
-    holds: bool  # whether it contains the corners, and no node is missing at a wall
+    gradients: tuple[Any, ...]  # from the corners' gradients, without N / r
+    holds: bool  # contains the corners, and no node is missing at a wall
     seen: CornerStencil
 
 
@@ -72,7 +72,7 @@ def of_one(block):
 
 
 def _spread_out(hats: Iterable, values: Iterable) -> tuple:
-    """Values of corners at the nodes, by products of the functions along both directions."""
+    """Values of corners at the nodes, by products of the functions of both directions."""
     totals: tuple = ()
     for (rows, line), value in zip(hats, values, strict=True):
         pairs = [(value * row, hat) for row in rows for hat in line]

@@ -1,4 +1,4 @@
-"""Domains: parallelograms that deform with the point; elements whose corners move with the grid."""
+"""Domains: parallelograms that deform with the point; elements with corners moved by the grid."""
 
 from karamelo_py.compiler import real
 from karamelo_py.points import basis as bases
@@ -63,7 +63,7 @@ def _domain_parallel(basis, kin, place):
     corners: list = []
     gradients: list = []
     # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
-    # In 3D, nine products with k before the sums are fewer than twelve after them.
+    # In 3D, nine products with k before the sums beat twelve after them.
     A = reciprocals(kin, edges, k if d == 3 else 1)
     for signs in cpdi.SQUARE if d == 2 else cpdi.CUBE:
         corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
@@ -88,7 +88,7 @@ def _deformed_parallel(basis, kin, place, dl):
 def _extent_parallel(basis, kin, grid, place):
     away = [total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, place), strict=True)]
     far = away[0]
-    for other in away[1:]:  # in this form, NaN is passed on
+    for other in away[1:]:  # this form passes NaN on
         far = far + max(other - far, 0)
     return max(far * grid.inv_h, cpdi.LEAST[kin.dimension])
 
@@ -229,7 +229,7 @@ def _cross(a, b):
 def _at_gauss(a, b, c, d):
     """Bilinear interpolation of values at (-,-), (+,-), (-,+), (+,+) to the Gauss points.
 
-    By symmetry of the weights, also distributes values at the Gauss points to the corners.
+    The weights are symmetric: it also distributes values from the Gauss points to the corners.
     """
     e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
     g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
@@ -250,13 +250,13 @@ def _add(a, b):
 
 
 def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
-    """Signs of a corner: `s` in direction e, `a` and `b` in the other directions."""
+    """Signs of a corner: `s` in direction e, `a` and `b` in the others."""
     others = (a, b)
     return (*others[:e], s, *others[e:])
 
 
 def _edges(place):
-    """Half of the edges along each direction; the other two directions as in `_at_gauss`."""
+    """Half edges along each direction; the other two directions as in `_at_gauss`."""
     at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
 
     def half(e, a, b):
@@ -269,14 +269,14 @@ def _edges(place):
 @cpdi.domain.on(H8)
 def _domain_h8(basis, kin, place):
     # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
-    # zeta; numbers say at which points of the other two directions.
+    # zeta; the numbers are Gauss points of the other two directions.
     u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(place)]
     # Cofactors along xi by xi, eta, zeta; summed over the Gauss points of xi, and so on.
     first = {(a, b, c): _cross(v[a, c], w[a, b]) for a in (0, 1) for b, c in PAIRS}
     p = _at_gauss(*[_add(first[0, b, c], first[1, b, c]) for b, c in PAIRS])
     q = _at_gauss(*[_add(_cross(w[a, 0], u[0, c]), _cross(w[a, 1], u[1, c])) for a, c in PAIRS])
     r = _at_gauss(*[_add(_cross(u[b, 0], v[a, 0]), _cross(u[b, 1], v[a, 1])) for a, b in PAIRS])
-    # det J, two Gauss points of xi in each tuple; spread over the corners.
+    # det J, two Gauss points of xi per tuple; spread over the corners.
     d = _at_gauss(*[tuple([dot(u[b, c], first[a, b, c]) for a in (0, 1)]) for b, c in PAIRS])
     return _means(place, d, p, q, r)
 

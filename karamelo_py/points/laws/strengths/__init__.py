@@ -1,9 +1,9 @@
 """Strengths: deviatoric stress of a point from its strain. One file each.
 
 A strength is a NamedTuple of parameters (its class is the tag) and a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). `heat` is the temperature (`Warm`), or () if the law has
-none. Strengths that depend on pressure and change the volume define `pressure_response` instead of
-`shear_response`. The defaults are for an elastic strength with a shear modulus ``G`` and no memory.
+(`karamelo_py.points.laws.eos_strength`). `heat` is the temperature (`Warm`), or () without one.
+Strengths that depend on pressure and change the volume define `pressure_response` instead of
+`shear_response`. Defaults are for an elastic strength with a shear modulus ``G`` and no memory.
 """
 
 import sys
@@ -20,7 +20,7 @@ class StrainStep(NamedTuple):
     strain: Any  # increment, not deviatoric
     j: Any  # volume ratio after the step
     dt: Any
-    extra: Any  # pressure that forces have beyond the point's own (F-bar)
+    extra: Any  # pressure in forces beyond the point's (F-bar)
 
 
 class FrictionTrial(NamedTuple):
@@ -45,7 +45,7 @@ def remembers(strength: type, **numbers: float | str) -> None:
     """
     name = f"{strength.__name__}Memory"
     memory_class = namedtuple(name, numbers, module=strength.__module__)
-    setattr(sys.modules[strength.__module__], name, memory_class)  # cached kernels refer to it
+    setattr(sys.modules[strength.__module__], name, memory_class)  # for cached kernels
     starts = tuple(numbers.values())
     parameters = tuple(start if isinstance(start, str) else "" for start in starts)
 
@@ -63,7 +63,6 @@ def remembers(strength: type, **numbers: float | str) -> None:
 
 @point_function(otherwise=True)
 def initial_memory(strength, like):
-    """Initial memory of a point."""
     return ()
 
 
@@ -93,7 +92,7 @@ def pressure_response(strength, kin, trial, strain):
 def fbar_fraction(strength, memory):
     """Fraction of the averaged pressure that the yield surface uses, with F-bar.
 
-    Undefined for strengths that do not depend on pressure.
+    Undefined for strengths independent of pressure.
     """
 
 
@@ -121,7 +120,7 @@ def shear_modulus(strength):
 
 @point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
-    """Squared wave speed, increased by viscosity, which reduces the stable step."""
+    """Squared wave speed, increased by viscosity: reduces the stable step."""
     return squared
 
 

@@ -125,7 +125,7 @@ DEPTH = 8  # of the stack, a tuple
 class FlowFormula:
     """For signatures: a formula of plastic strain, its rate and temperature, as numbers.
 
-    Two numbers per instruction: the operation, and a constant or the index of an input.
+    Two numbers per instruction: the operation; a constant or the index of an input.
     """
 
     script_kind: ClassVar[str] = "a formula of ep, epdot and T"
@@ -214,7 +214,7 @@ def _check_formula(law: FlowStress) -> None:
 
 def value(strength, ep, epdot, T):
     """The formula at a plastic strain, rate and temperature, in double precision."""
-    stack = (0.0,) * DEPTH  # the top first
+    stack = (0.0,) * DEPTH  # top first
     for k in range(int(strength.count)):
         op = int(strength.program[2 * k])
         operand = real(strength.program[2 * k + 1], 1.0)
@@ -240,7 +240,7 @@ shear_response.on(FlowStress)(radial_return)
 def _flow_stress_flow_stress(strength, before, increment, dt):
     T = temperature_or(before.heat, strength.initial_temperature)
     near = 1e-6 * (increment + 1e-4)
-    # In double precision: the difference of the two is small.
+    # In double precision: a small difference.
     here = real(before.memory.ep, 1.0) + increment
     stress = max(value(strength, here, increment / dt, T), 0.0)
     beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)

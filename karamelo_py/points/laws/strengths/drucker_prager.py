@@ -85,7 +85,7 @@ class DruckerPrager(NamedTuple):
     friction: float
     dilation: float
     tension: float
-    residual_cohesion: float  # at the end of softening
+    residual_cohesion: float  # after softening
     residual_friction: float
     softening: float  # per unit of plastic strain; or 0
 
@@ -119,8 +119,8 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # In plastic flow of plane strain s_zz = -2/3 dilation sqrt(J2), so half the difference of the
-    # in-plane principal stresses is sqrt(J2) times:
+    # In plastic flow in plane strain s_zz = -2/3 dilation sqrt(J2): half the difference of the in-
+    # plane principal stresses is sqrt(J2) times:
     in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
@@ -138,7 +138,7 @@ def _pressure_response_drucker_prager(strength, kin, trial, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # Beyond the apex of the cone: the trial pressure counts again, see below.
+            # Beyond the apex of the cone the trial pressure counts again, see below.
             p -= K * dilation * x
     if p < lowest:
         p = lowest

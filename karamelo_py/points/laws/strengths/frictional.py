@@ -34,7 +34,7 @@ from karamelo_py.script.errors import ScriptError
 def surface(strength, strain):
     """Cohesion, friction and dilation of the yield surface after a plastic strain.
 
-    They change linearly from the peak to the residual; a step uses the values at its beginning.
+    Linear from the peak to the residual; a step uses the values at its beginning.
     """
     weakened = min(strain * strength.softening, 1)
     intact = 1 - weakened
@@ -58,11 +58,10 @@ def tension_bound(strength, lowest):
 def fraction_by_dilatancy(strength, memory):
     """The fraction b of the averaged pressure that the yield surface uses, with F-bar.
 
-    Averaging multiplies waves by a factor a (1 for long waves, 0.1 to 0.5 for waves of two or three
-    cells). Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive
-    number, with the sines f of friction and d of dilatancy. With b = 0 it is negative for a between
-    d and f: pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a
-    square.
+    Averaging multiplies waves by a factor a (1 for long waves, 0.1 to 0.5 for two or three cells).
+    Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with
+    the sines f of friction and d of dilatancy. With b = 0 it is negative for a between d and f:
+    pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a square.
     """
     f, d = sines_after(strength, memory.ep)
     # The sine of a steep cone in plane strain may be above 1.
@@ -106,7 +105,7 @@ def respond_by_friction(strength, law, kin, step, memories):
     memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
     work = inner(new, plastic)
     if reached != p:
-        # The volume that carries the new pressure is elastic; the rest is plastic.
+        # The volume that carries the new pressure is elastic, the rest plastic.
         after = ratio_at_pressure(law.eos, p_point + (reached - p) - warm, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=step.j / (memory.Jp * after))
@@ -151,9 +150,9 @@ def frictional(strength: type) -> None:
     )
 
 
-ENOUGH = 1 / 3  # dilatancy over friction, as sines, from which neither occurred
+ENOUGH = 1 / 3  # sine of dilatancy over sine of friction, from which neither occurred
 # f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
-# latter need steep friction and no cohesion, too.
+# latter also need steep friction and no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
 
 
@@ -162,7 +161,7 @@ def _locks(strength, scene):
 
 
 def little_dilatancy(strength):
-    """The sine of friction in plane strain, or 0 if there is enough dilatancy."""
+    """Sine of friction in plane strain, or 0 with enough dilatancy."""
     f, d = sines_after(strength, 0.0)
     return f if d < ENOUGH * f * (1 - 1e-9) else 0.0
 
@@ -170,7 +169,7 @@ def little_dilatancy(strength):
 def _vibrates(strength, scene):
     """Check whether a strain cycle of a point at its limit releases more work than it takes.
 
-    Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
+    Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, f the sine of friction.
     """
     f = little_dilatancy(strength)
     averaged = scene.hub.update.anti_locking
@@ -217,8 +216,7 @@ class Soil(NamedTuple):
 def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
     """Cohesion, friction, dilation at the peak; residual cohesion and friction; softening.
 
-    `surface_of` gives cohesion and friction of the yield surface from cohesion and friction angle
-    (radians).
+    `surface_of` maps cohesion and friction angle (radians) to those of the yield surface.
     """
     cohesion, phi, psi, residual_cohesion, residual_phi, softening = soil
     if not 0 <= phi < 90:

@@ -19,7 +19,7 @@ from karamelo_py.points.laws.strengths import remembers, shear_response
 
 
 def elastic_trial(G, s, strain):
-    """Deviatoric stress after a strain increment that is assumed to be elastic."""
+    """Deviatoric stress after a strain increment assumed elastic."""
     # The deviator of the sum: rounding over many steps would give s a trace.
     return dev(s + 2 * G * strain)
 
@@ -100,13 +100,13 @@ def before_flow(strength, memory, heat):
 def flow_stress(strength, before, increment, dt):
     """Flow stress, and its slope, after a plastic strain `increment` in a step dt.
 
-    `before` is the `FlowState` at the beginning of the step.
+    `before` is the `FlowState` at the beginning.
     """
 
 
 @point_function(otherwise=True)
 def precompute(strength, memory, heat):
-    """The part of the flow stress that does not depend on the increment of a step."""
+    """The part of the flow stress that does not depend on the step's increment."""
     return ()
 
 
@@ -114,7 +114,7 @@ def precompute(strength, memory, heat):
 def first_guess(strength, before, q, slope):
     """First guess of the plastic strain, 0 for q below the flow stress, and a bound k.
 
-    `slope` is 3 G. In Newton's method a change c is followed by about k c^2, or less the further
+    `slope` is 3 G. A change c in Newton's method is followed by about k c^2, or less the further
     the flow stress has hardened.
     """
     return real(0, q), real(0, q)
@@ -122,7 +122,7 @@ def first_guess(strength, before, q, slope):
 
 @point_function(otherwise=True)
 def updated_memory(strength, memory, increment, dt):
-    """The memory after a step; the increment of plastic strain may be 0."""
+    """Memory after a step; the plastic strain increment may be 0."""
     return memory._replace(ep=memory.ep + increment)
 
 
@@ -135,8 +135,8 @@ def onto_yield_surface(trial, q, flow, x):
 def radial_return(strength, kin, step, memory, heat):
     """Radial return: scale the trial deviatoric stress by flow/q (Wilkins 1964).
 
-    The `shear_response` of strengths with a field ``G``, a `flow_stress` and the plastic strain
-    ``ep`` in the memory; q is the von Mises stress of the elastic trial.
+    The `shear_response` of strengths with a field ``G``, a `flow_stress`, and ``ep`` in the memory;
+    q is the von Mises stress of the elastic trial.
     """
     trial = elastic_trial(strength.G, step.s, step.strain)
     q = von_mises(trial)
@@ -154,8 +154,8 @@ _MOST_ITERATIONS = 80
 def plastic_increment(strength, q, memory, heat, dt):
     """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x and the flow stress does not: the solution is unique for any step
-    size. Newton's method from a first guess, with bisection as safeguard.
+    The left side falls with x, the flow stress does not: unique for any step size. Newton's method
+    from a first guess, safeguarded by bisection.
     """
     slope = 3 * strength.G
     enough = 4 * round_off(q) * q  # rounding of the three terms
@@ -174,7 +174,7 @@ def plastic_increment(strength, q, memory, heat, dt):
         change = excess / (slope + hardening)
         new = x + change
         # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. Next to a kink of the
-        # curve it is larger, so the excess has to be small, too.
+        # curve it is larger, so the excess must be small, too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))

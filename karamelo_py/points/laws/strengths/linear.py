@@ -70,18 +70,18 @@ class Viscous(NamedTuple):
     traits = LawTraits(flows=True)
 
     mu: float  # dynamic viscosity
-    cell_size: float  # h, known when the scene is lowered
+    cell_size: float  # h, set when the scene is lowered
 
     @classmethod
     def given(cls, mu: FromZero):
         return cls(mu, 0.0)
 
 
-SIGNIFICANT = 0.05  # of the viscosity of the fluid
+SIGNIFICANT = 0.05  # of the fluid's viscosity
 
 
 def _viscosity(strength, scene):
-    """The kinematic viscosity; 0 if shear spreads over less than a cell in the run."""
+    """Kinematic viscosity; 0 if shear spreads over less than a cell in the run."""
     laws = [solid.material.whole for solid in scene.hub.solids.values()]
     viscous = [law for law in laws if parameter(law, "strength") is strength]
     nu = max((float(strength.mu * specific_volume(law)) for law in viscous), default=0.0)

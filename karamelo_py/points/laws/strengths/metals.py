@@ -82,7 +82,7 @@ class JohnsonCook(NamedTuple):
         Tr: float,
         Tm: float,
     ):
-        """Leave out factors that are 1: they would cost a logarithm or a power."""
+        """Leave out factors of 1: each costs a logarithm or a power."""
         check_temperatures(Tr, Tm)
         epsdot0 = reference_rate(epsdot0, C, "C")
         rate = RateFactor(epsdot0, C) if C > 0 else Absent()
@@ -116,7 +116,7 @@ remembers(JohnsonCook, ep=0.0)
 shear_response.on(JohnsonCook)(radial_return)
 
 
-# Strain increments up to this fraction of the strain use a series with this number of terms.
+# Increments up to this fraction of the strain use a series of this many terms.
 _NEAR, _TERMS = 1 / 32, 9
 
 
@@ -127,7 +127,7 @@ def power_of_strain(factor, exponent, strain):
 
 
 def power_law(factor, exponent, strain, value, increment):
-    """factor (strain + increment)^exponent and its slope, which is 0 at zero strain.
+    """factor (strain + increment)^exponent and its slope, 0 at zero strain.
 
     `value` is the power without the increment; times (1 + x)^n as a short series for small x.
     """
@@ -144,7 +144,7 @@ def power_law(factor, exponent, strain, value, increment):
 
 
 def power_law_guess(exponent, strain, hard, excess, slope):
-    """`first_guess` from the first two derivatives of the power law `hard` (Chebyshev's method).
+    """`first_guess` from two derivatives of the power law `hard` (Chebyshev's method).
 
     `excess`, stress minus flow stress, falls by `slope` with the strain.
     """

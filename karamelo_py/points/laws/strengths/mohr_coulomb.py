@@ -62,7 +62,7 @@ class MohrCoulomb(NamedTuple):
     cohesion: float  # c cos(phi)
     friction: float  # sin(phi)
     dilation: float  # sin(psi)
-    residual_cohesion: float  # at the end of softening
+    residual_cohesion: float  # after softening
     residual_friction: float
     softening: float  # per unit of plastic strain; or 0
 
@@ -88,7 +88,7 @@ frictional(MohrCoulomb)
 def returned_to_plane(s, yield_surface, G, K):
     """Return principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    To a plane; if that changes their order, to an edge of two planes; if it still does, to the apex
+    To a plane; if that changes their order, to an edge of two planes; failing that, to the apex
     (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
     sin(phi), sin(psi).
     """
@@ -101,7 +101,7 @@ def returned_to_plane(s, yield_surface, G, K):
     f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - 2 * k
     volume = 2 * lam * sin_psi  # lam tr(m)
     rise = 2 * G * (1 + sin_psi) + volume  # C m for the largest
-    fall = volume - 2 * G * (1 - sin_psi)  # for the smallest; `volume` for the other
+    fall = volume - 2 * G * (1 - sin_psi)  # smallest; `volume` for the other
     x = f / (up + down + mean)
     s1, s2, s3 = s[0] - x * rise, s[1] - x * volume, s[2] - x * fall
     if s1 >= s2 and s2 >= s3:
@@ -121,7 +121,7 @@ def returned_to_plane(s, yield_surface, G, K):
     if s2 > s1:
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
-        # Equal by construction, except for rounding: on both planes.
+        # Equal but for rounding: on both planes.
         t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3
@@ -138,7 +138,7 @@ def returned_to_plane(s, yield_surface, G, K):
 def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
     s, p, K = trial
     k, sin_phi, _ = yield_surface = surface(strength, strain)
-    # Principal stresses are needed only above this bound of the yield function.
+    # Only needed above this bound of the yield function.
     root = sqrt(0.5 * inner(s, s))
     bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:

@@ -90,11 +90,11 @@ known_failure(
 )
 
 
-SLOW = 0.05  # of the viscosity of the grains, above which a warning is given
+SLOW = 0.05  # fraction of the grains' viscosity that gives a warning
 
 
 def _slows(strength, scene):
-    """Compare the viscosity of the PIC fraction with the grain viscosity, mu p/(rho gamma').
+    """Compare the viscosity of the PIC fraction with the grains', mu p/(rho gamma').
 
     For p at half the height of a body, and half of I0.
     """
