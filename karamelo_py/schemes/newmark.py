@@ -26,9 +26,9 @@ def _damping(scheme: "Newmark") -> str:
 class Newmark(NamedTuple):
     """Implicit time steps with inertia, not limited by waves (Newmark 1959).
 
-    `set_dt` sets the step. Vibrations that it does not resolve are undamped, unless `gamma` is
-    above 1/2, `rho` is below 1, or the rule is euler. The acceleration at the beginning of a step
-    follows from the forces there; with `rho` from the rule.
+    `set_dt` sets the step. Unresolved vibrations are undamped, unless `gamma` is above 1/2, `rho`
+    below 1, or the rule euler. The acceleration at the beginning of a step follows from the forces
+    there; with `rho` from the rule.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Newmark(NamedTuple):
     rule
         ``newmark``, or ``euler``: backward Euler, which damps all vibrations.
     rho
-        Spectral radius at high frequency: the fraction of vibrations much faster than the step that
-        remains after a step, by generalized-alpha (Chung & Hulbert 1993), which hardly damps slow
-        vibrations. 1: no damping; 0: they vanish in one step.
+        Spectral radius at high frequency: fraction of vibrations much faster than the step that
+        remains after a step, by generalized-alpha (Chung & Hulbert 1993). Slow vibrations are
+        hardly damped. 1: no damping; 0: fast ones vanish in one step.
     tolerance, iterations, solver, stabilisation
         As in quasi-static.
 

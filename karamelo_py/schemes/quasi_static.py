@@ -40,8 +40,7 @@ class QuasiStatic(NamedTuple):
     Parameters
     ----------
     tolerance
-        Residual nodal forces at the end of a step, as a fraction of the nodal forces: from 1e-14 to
-        0.01.
+        Residual over nodal forces at the end of a step: from 1e-14 to 0.01.
     iterations
         Number of corrections before a step is halved.
     solver
@@ -49,12 +48,11 @@ class QuasiStatic(NamedTuple):
         ``auto``: amg from 5000 unknowns in 2D if the matrix is symmetric, and from 2000 in 3D.
     stabilisation
         Ghost stabilisation (Coombs 2023): penalises gradient jumps at the border of a body with
-        this fraction of Young's modulus, and stabilises nodes that overlap only a sliver of the
-        body. 0: none.
+        this fraction of Young's modulus, for nodes that overlap only a sliver of it. 0: none.
     limit
-        What to do without equilibrium even with 1/1024 of a step: raise an ``error``, or end the
-        run (``stop``). With ``stop`` the script continues, and `time` belongs to the last
-        equilibrium: loads as formulas of it are the limit load.
+        Without equilibrium even in 1/1024 of a step: raise an ``error``, or end the run (``stop``).
+        After ``stop`` the script continues, with `time` of the last equilibrium: loads as formulas
+        of it are the limit load.
 
     Example
     -------

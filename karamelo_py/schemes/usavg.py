@@ -11,7 +11,7 @@ class USAVG(NamedTuple):
     """Half of the stress update before the forces, and half after them as in musl.
 
     Best energy conservation, for two stress updates per step (Nairn 2003, "Material point method
-    calculations with explicit cracks"). The two halves make up the whole increment of F.
+    calculations with explicit cracks"). The halves add up to the whole increment of F.
 
     Example
     -------

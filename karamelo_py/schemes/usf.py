@@ -10,9 +10,8 @@ from karamelo_py.schemes.traits import SchemeTraits
 class USF(NamedTuple):
     """Update the stress before the forces, with the nodal velocity at the start of the step.
 
-    This velocity has already moved the points to their positions. With weights at present
-    positions, F therefore grows by (I - dt grad v)^-1. The published increment I + dt grad v gains
-    energy and shrinks rotating bodies.
+    This velocity has already moved the points, so with weights at present positions F grows by (I -
+    dt grad v)^-1. The published increment I + dt grad v gains energy and shrinks rotating bodies.
 
     The log shows stress, volume and strain of the positions at the beginning of a step (with usavg,
     half of the increment). With a law in rate form, a rotation by w dt in a step compresses by

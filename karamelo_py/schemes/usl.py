@@ -15,15 +15,15 @@ from karamelo_py.schemes.traits import SchemeTraits
 class USL(NamedTuple):
     """Update the stress after the forces, with the gradient of the updated nodal velocity.
 
-    The fastest scheme, with one pass over the points per step. It dissipates a little.
+    The fastest scheme: one pass over the points per step. Slightly dissipative.
 
     The stable step is 0.65 h/c, 0.4 h/c with one point per cell, and 0.7 times that with
     bernstein-quadratic. The points average some nodal modes away; only the strain of such a mode
     responds to forces: e <- (1 - (w dt)^2) e, stable for w dt < sqrt(2) instead of 2.
 
-    A node with almost no mass gets a large velocity. Its mass limit is the mean mass of the points
-    around it times d (c dt / h)^2, at most 1. Below it, the velocity change that enters the
-    gradient is scaled by nodal mass / limit. Momentum is conserved.
+    A node with almost no mass gets a large velocity. Below a mass limit, the mean mass of the
+    points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
+    scaled by mass / limit. Momentum is conserved.
 
     Example
     -------

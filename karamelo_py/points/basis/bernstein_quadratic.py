@@ -11,9 +11,9 @@ from karamelo_py.points.grid import cells_along, in_cells
 class BernsteinQuadratic(NamedTuple):
     """Quadratic Bernstein polynomials (de Vaucorbeil, Nguyen & Hutchinson 2020).
 
-    Nodes every h/2, so four times as many in 2D; a point sees only the nodes of its cell. Weights
-    are not negative, but gradients jump at cell faces, as with a linear basis. Meant for method
-    tlmpm, where no point crosses a face.
+    Nodes every h/2: four times as many in 2D. The stencil is the point's cell. Weights are not
+    negative, but gradients jump at cell faces, as in a linear basis. Meant for method tlmpm, where
+    no point crosses a face.
 
     Example
     -------

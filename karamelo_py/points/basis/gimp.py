@@ -29,9 +29,9 @@ class _Box(NamedTuple):
 class UGIMP(_Box):
     """Uniform GIMP: each point has a box of constant size (Bardenhagen & Kober 2004).
 
-    Weights are the averages of the linear basis over [x - l, x + l] in each direction. l is the
-    initial half size of the point. At large stretch gaps open between boxes, unlike with cpgimp. A
-    wall cuts the box; the point then acts from the centre of the rest.
+    Weights are averages of the linear basis over [x - l, x + l] per direction, l the initial half
+    size. At large stretch gaps open between boxes, unlike with cpgimp. A wall cuts the box; the
+    point then acts from the centre of the rest.
 
     Example
     -------
@@ -46,7 +46,7 @@ class _Following(_Box):
 class CPGIMPDet(_Following):
     """Boxes of constant shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
 
-    Rotation does not change them; a stretch in one direction is distributed to all equally.
+    Unchanged by rotation; a stretch in one direction is distributed to all equally.
 
     Example
     -------
@@ -59,7 +59,7 @@ class CPGIMPDet(_Following):
 class CPGIMPDiagonal(_Following):
     """Boxes with the half sizes l0 |F_ii|, for bodies that do not rotate.
 
-    A rotation by 90 degrees makes the boxes vanish, which gives the basis `linear`.
+    Rotated by 90 degrees, the boxes vanish: the basis `linear`.
 
     Example
     -------
@@ -84,8 +84,8 @@ known_failure(
 class CPGIMPStretch(_Following):
     """Boxes with the half sizes l0 U_ii, with the right stretch U = sqrt(F^T F).
 
-    Rotation does not change them (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit
-    generalised interpolation material point method for large deformations").
+    Unchanged by rotation (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit generalised
+    interpolation material point method for large deformations").
 
     Example
     -------

@@ -17,8 +17,8 @@ TOLD = 0.03  # loss of stress that gives a warning
 class Linear(NamedTuple):
     """Linear hat functions on the nodes: the basis of the original MPM (Sulsky et al. 1994).
 
-    The cheapest basis. Its gradient jumps at cell faces. A stressed point that crosses one changes
-    the nodal forces by the order of its stress (cell-crossing error).
+    The cheapest basis. Its gradient jumps at cell faces: a stressed point that crosses one changes
+    nodal forces by the order of its stress (cell-crossing error).
 
     Example
     -------

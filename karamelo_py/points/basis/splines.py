@@ -45,9 +45,9 @@ def hats(grid, a, cell, first, count):
 class QuadraticSpline(NamedTuple):
     """Quadratic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    Continuous gradients: no cell-crossing error. Nine nodes in 2D, linear has four. At a wall,
-    values are extrapolated linearly to the node beyond: phi(-1) = 2 phi(0) - phi(1). Within half a
-    cell of a wall this gives linear hats.
+    Continuous gradients: no cell-crossing error. Nine nodes in 2D (linear: four). Linear
+    extrapolation to the node beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives linear hats within
+    half a cell of it.
 
     Example
     -------
@@ -153,9 +153,8 @@ of_splines(
 class CubicSpline(NamedTuple):
     """Cubic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    The smoothest of the splines and the most costly: 16 nodes in 2D, 64 in 3D. Beyond a wall, nodal
-    values are extrapolated linearly: phi(-1) = 2 phi(0) - phi(1). This gives their four types of
-    boundary functions.
+    The smoothest and most costly spline: 16 nodes in 2D, 64 in 3D. Linear extrapolation of nodal
+    values beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives their four types of boundary functions.
 
     Example
     -------

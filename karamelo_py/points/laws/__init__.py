@@ -46,7 +46,7 @@ class Absent(NamedTuple):
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """Classes of a law and its parts, or of a table of laws: one kind shares kernels and arrays."""
+    """Classes of a law (or table of laws) and its parts, which select kernels and arrays."""
     parts = [law_kind(part) for part in law if isinstance(part, tuple)]
     return type(law), *(kind for part in parts for kind in part)
 

@@ -40,7 +40,7 @@ class CamClay(NamedTuple):
     kappa
         The same slope in swelling, below lam.
     p0
-        Initial pressure, present without any load.
+        Initial pressure, without any load.
     pc
         Initial preconsolidation pressure, at least p0; default p0.
 
@@ -52,19 +52,19 @@ class CamClay(NamedTuple):
     Notes
     -----
     Stresses are Kirchhoff stresses, J times Cauchy: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with
-    the logarithmic elastic strain e. The yield surface is q^2/M^2 + p (p - pc) = 0, with associated
-    flow. pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in
+    the logarithmic elastic strain e. Yield surface: q^2/M^2 + p (p - pc) = 0, with associated flow.
+    pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in
     logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III", Comput.
     Methods Appl. Mech. Eng. 155). A step ends on the surface, whatever its size.
 
     Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
     q/p. At the critical state this is p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic
-    strain ep, and pc. A stress from fix initial_stress outside the surface raises pc. There is no
+    strain ep, and pc. A stress outside the surface from fix initial_stress raises pc. There is no
     tension.
 
     At a free surface a load must balance p0, or the first step releases it. Hold the other sides
     and write ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or
-    ``fix(cell, edge_pressure, all, b, 100e3)`` all around. b is the region of the solid. With fix
+    ``fix(cell, edge_pressure, all, b, 100e3)`` all around, with the solid's region b. With fix
     initial_stress, the load is its normal component.
 
     See Also

@@ -74,13 +74,13 @@ class JohnsonCookDamage(NamedTuple):
     Notes
     -----
     The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
-    Tr) / (Tm - Tr) (Johnson & Cook 1985). At and below the reference rate the second factor is 1.
-    Without a temperature the third factor is 1. w is the sum of plastic strain over failure strain
-    (dump column damage_init). From w = 1, the damage D (dump column damage) grows to 1 as 10 (w -
-    1). Nothing fails for t below -3. d1 may be negative. Failure strains are at least 1e-6.
+    Tr) / (Tm - Tr) (Johnson & Cook 1985). The second factor is 1 up to the reference rate, the
+    third without a temperature. w is the sum of plastic strain over failure strain (dump column
+    damage_init). From w = 1, the damage D (dump column damage) grows to 1 as 10 (w - 1). Nothing
+    fails for t below -3. d1 may be negative. Failure strains are at least 1e-6.
 
-    sigma = (1 - D) s - p I, with p times 1 - D in tension. The intact material continues to flow
-    plastically. The lost stored energy counts as dissipated.
+    sigma = (1 - D) s - p I, with p times 1 - D in tension. The intact material still flows
+    plastically. Lost stored energy counts as dissipated.
 
     See Also
     --------

@@ -19,8 +19,8 @@ class Hencky(Hyperelastic):
     nu
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. With them points have a
-        temperature, initially the temperature of their solid.
+        Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
+        initially that of the solid.
     alpha
         Coefficient of linear expansion.
 
@@ -30,14 +30,13 @@ class Hencky(Hyperelastic):
 
     Notes
     -----
-    Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I with the left stretch V, ln V = 1/2 ln F
-    F^T. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
-    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). It
-    is Hooke's law in additive strains, and the elastic part of most soil plasticity at large
-    strain.
+    Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I, with ln V = 1/2 ln F F^T of the left
+    stretch V. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
+    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46).
+    Hooke's law in additive strains; the elastic part of most soil plasticity at large strain.
 
-    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the initial
-    temperature T0. The elastic strain does not contain the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with bulk modulus K and initial temperature
+    T0. The elastic strain excludes the expansion alpha (T - T0).
 
     See Also
     --------

@@ -22,13 +22,13 @@ class LinearElastic(ElasticLaw):
     nu
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. With them points have a
-        temperature, initially the temperature of their solid.
+        Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
+        initially that of the solid.
     alpha
         Coefficient of linear expansion.
     rate
-        ``jaumann``: the stress rotates with the point. ``none``: it does not, as in Karamelo; only
-        to reproduce such results.
+        ``jaumann``: the stress rotates with the point. ``none``: it does not (only to reproduce
+        results of Karamelo).
 
     Example
     -------
@@ -37,12 +37,12 @@ class LinearElastic(ElasticLaw):
 
     Notes
     -----
-    sigma' = R sigma R^T + 2 G d + lambda tr(d) I (Jaumann rate; Hughes & Winget 1980). d is the
-    strain increment and R the rotation increment of the step. For strains above ten per cent a
-    hyperelastic law such as neo-hookean is the better model. In 1D, strain is uniaxial.
+    sigma' = R sigma R^T + 2 G d + lambda tr(d) I (Jaumann rate; Hughes & Winget 1980). d and R are
+    the strain and rotation increments of the step. Above 10 % strain, prefer a hyperelastic law
+    such as neo-hookean. In 1D, strain is uniaxial.
 
-    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the initial
-    temperature T0. The elastic strain does not contain the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with bulk modulus K and initial temperature
+    T0. The elastic strain excludes the expansion alpha (T - T0).
 
     See Also
     --------

@@ -20,8 +20,8 @@ class NeoHookean(Hyperelastic):
     nu
         Poisson's ratio at small strain, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. With them points have a
-        temperature, initially the temperature of their solid.
+        Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
+        initially that of the solid.
     alpha
         Coefficient of linear expansion.
 
@@ -35,8 +35,8 @@ class NeoHookean(Hyperelastic):
     First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T. Stored energy W = G/2 (tr
     F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
 
-    A temperature T adds the stress -3 K alpha (T - T0), with the bulk modulus K and the initial
-    temperature T0. The elastic strain does not contain the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0), with bulk modulus K and initial temperature
+    T0. The elastic strain excludes the expansion alpha (T - T0).
 
     See Also
     --------

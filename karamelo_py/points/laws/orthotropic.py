@@ -60,10 +60,9 @@ class Orthotropic(NamedTuple):
     Notes
     -----
     The second Piola-Kirchhoff stress is linear in the Green-Lagrange strain, S = C:E, with the
-    stiffness C of Lekhnitskii (1963, section 5). The axes belong to the undeformed body and rotate
-    with it. In axisymmetry, x, y and z are the directions of the radius, of the axis, and around
-    it. In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0), or the body would shear out of
-    its plane.
+    stiffness C of Lekhnitskii (1963, section 5). The axes are those of the undeformed body and
+    rotate with it. In axisymmetry, x, y and z are the radial, axial and hoop directions. In 2D, one
+    axis should be z (`tilt` 0 or 90 with `spin` 0), or the body shears out of its plane.
 
     See Also
     --------
@@ -114,7 +113,7 @@ class Transverse(NamedTuple):
     E, nu
         Young's modulus and Poisson's ratio across the direction.
     E3, nu3
-        Young's modulus along the direction, and the contraction across over the stretch along it.
+        Young's modulus along the direction, and contraction across over stretch along it.
     G3
         Shear modulus of planes with the direction.
     angle, tilt

@@ -58,8 +58,7 @@ class PlasticWork(NamedTuple):
     cp
         Heat capacity per mass.
     kappa
-        Conductivity, for heat flow with ``method(..., thermo-mechanical)``; otherwise heat stays in
-        place.
+        Conductivity, for ``method(..., thermo-mechanical)``; otherwise heat stays in place.
     alpha
         Pressure per kelvin: 3 K times the coefficient of linear expansion, with the bulk modulus K.
     T0

@@ -77,8 +77,8 @@ class Viscoelastic(NamedTuple):
     elastic
         ID of an isotropic elastic material: the instantaneous response.
     pairs
-        g and tau of each term: the fraction of the instantaneous shear stiffness that relaxes, and
-        its relaxation time.
+        g and tau of each term: relaxing fraction of the instantaneous shear stiffness, and its
+        relaxation time.
 
     Example
     -------
@@ -93,9 +93,9 @@ class Viscoelastic(NamedTuple):
     step is exact for a constant rate of s, however long it is. The relaxation modulus is G(t) = G
     (1 - sum g (1 - exp(-t/tau))); the volume response is elastic.
 
-    The strain energy contains the branches, |h|^2/(4 g G) each. The column ``dissipated`` is the
-    energy that they have lost, at the rate |h|^2/(2 g G tau), with the shear modulus G at rest. A
-    relaxed body has 1 - sum g of the stiffness. Fix initial_stress starts from a relaxed body.
+    The strain energy contains the branches, |h|^2/(4 g G) each. Column ``dissipated``: the energy
+    they have lost, at the rate |h|^2/(2 g G tau), with the shear modulus G at rest. A relaxed body
+    has 1 - sum g of the stiffness; fix initial_stress starts from one.
 
     See Also
     --------

@@ -28,7 +28,7 @@ class APIC(NamedTuple):
     et al. 2015).
 
     With bases whose D vanishes at nodes (linear, Bernstein-quadratic) in the updated frame, the
-    velocity that deforms the points omits the moments. This needs musl. usl and usf are refused.
+    velocity that deforms the points omits the moments. This needs musl; usl and usf are refused.
 
     Example
     -------
@@ -66,17 +66,16 @@ class AFLIP(NamedTuple):
 class ASFLIP(NamedTuple):
     """AFLIP with point velocities that differ from the grid where the material separates.
 
-    For granular flow and splashes: points separate sooner (Fei et al. 2021, section 5). If the
-    material is compressed by more than 0.1 % of its volume, points move with the grid and retain
-    their order.
+    For granular flow and splashes: points separate sooner (Fei et al. 2021, section 5). Compressed
+    by more than 0.1 % of their volume, they move with the grid and retain their order.
 
     Parameters
     ----------
     alpha
         FLIP coefficient.
     beta
-        Strength of separation: fraction of a point's velocity relative to the grid that also moves
-        it, unless compressed. 0 is AFLIP.
+        Strength of separation: fraction of the velocity relative to the grid that also moves
+        points, unless compressed. 0: AFLIP.
 
     Example
     -------

@@ -60,8 +60,8 @@ class FLIP(NamedTuple):
 class FLIPPerTime(NamedTuple):
     """FLIP with damping per time: alpha applies to a stable step.
 
-    A shorter step uses alpha^(dt / stable dt). Plain FLIP removes the fraction 1 - alpha in each
-    step of any size, so half the step damps vibrations twice as much in the same time.
+    A shorter step uses alpha^(dt / stable dt). Plain FLIP removes 1 - alpha in each step of any
+    size: half the step damps vibrations twice as much per time.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 class TPIC(NamedTuple):
     """v_p = v_pic, and the point stores the velocity gradient L_p.
 
-    A Taylor expansion of the velocity around the point. It damps less than PIC and inverts no D
+    A Taylor expansion of the velocity around the point. Damps less than PIC, inverts no D
     (Nakamura, Matsumura & Mizutani 2023, "Taylor particle-in-cell transfer and kernel correction
     for material point method"). With bases whose D vanishes at nodes (linear, Bernstein-quadratic),
     a drifting body in the updated frame gains energy without bounds.

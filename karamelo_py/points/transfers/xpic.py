@@ -39,8 +39,8 @@ class XPIC(NamedTuple):
     S maps nodes to points and S+ points to nodes by mass. A low order removes noise in the null
     space and retains the motion that the grid resolves (Hammerquist & Nairn 2017, "A new method for
     material point method particle updates that reduces noise and enhances stability", eq. 24). The
-    terms w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Each order beyond the
-    first costs one extra pass over the points per step.
+    terms w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Each further order costs
+    one pass over the points per step.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The nodes around a domain in 2D, each once: three by three.
 
-Several corners share most nodes, so contributions are summed over the corners first. In 3D this
+Most nodes belong to several corners, so contributions are summed over the corners first. In 3D this
 costs more than it saves: 27 nodes, eight corners.
 """
 

@@ -14,7 +14,7 @@ class _Parallel(cpdi.ConvectedDomain):
 class R4(_Parallel):
     """Parallelograms: x and two half edges r, which rotate and stretch with the point.
 
-    Neighbouring domains may overlap or separate slightly if the strain is not uniform (Sadeghirad,
+    In non-uniform strain, neighbouring domains may slightly overlap or separate (Sadeghirad,
     Brannon & Burghardt 2011).
 
     Example
@@ -207,8 +207,8 @@ PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 class H8(cpdi.CarriedDomain):
     """Trilinear hexahedra whose eight corners move with those of neighbouring points.
 
-    Weights and gradients are the exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
-    cubic functions along each direction. N det J is cubic, grad N det J of lower order.
+    Weights and gradients are exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
+    cubics along each direction; N det J is cubic, grad N det J of lower order.
 
     Example
     -------

@@ -28,8 +28,8 @@ class Tabulated(NamedTuple):
     G
         Shear modulus.
     curve
-        Pairs of plastic strain and flow stress, from strain 0. Or a file with two numbers per line,
-        separated by blanks or a comma; # begins a comment line.
+        Pairs of plastic strain and flow stress, from strain 0; or a file with two numbers per line,
+        separated by blanks or a comma (# begins a comment line).
 
     Example
     -------
@@ -37,9 +37,9 @@ class Tabulated(NamedTuple):
 
     Notes
     -----
-    Beyond the last point the flow stress is constant. It may fall by less than 3 G per unit of
-    plastic strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves
-    for the plastic strain with the flow stress at its end.
+    Constant beyond the last point. The flow stress may fall by less than 3 G per unit of plastic
+    strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves for the
+    plastic strain with the flow stress at its end.
 
     See Also
     --------
@@ -175,8 +175,8 @@ class FlowStress(NamedTuple):
     Notes
     -----
     Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
-    with finite-difference slopes. Y may fall with plastic strain, but by less than 3 G per unit. A
-    negative Y counts as 0. Formulas are interpreted: no compilation, but ten times the time of a
+    with finite-difference slopes. Y may fall by less than 3 G per unit of plastic strain. A
+    negative Y counts as 0. Formulas are interpreted: no compilation, but ten times slower than a
     compiled law.
 
     See Also

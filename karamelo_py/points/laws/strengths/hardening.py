@@ -43,9 +43,9 @@ class LinearHardening(NamedTuple):
 
     Notes
     -----
-    If the von Mises stress q = sqrt(3/2 s:s) of an elastic step exceeds the yield stress Y, the
-    equivalent plastic strain (dump column ep) grows by (q - Y)/(3 G + H), and s is scaled to the
-    yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008, section 7.3).
+    If q = sqrt(3/2 s:s) (von Mises) of an elastic step exceeds the yield stress Y, the equivalent
+    plastic strain (dump column ep) grows by (q - Y)/(3 G + H), and s is scaled to the yield stress
+    (radial return; Wilkins 1964; de Souza Neto et al. 2008, section 7.3).
 
     See Also
     --------

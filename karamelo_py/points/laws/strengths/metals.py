@@ -51,9 +51,9 @@ class JohnsonCook(NamedTuple):
     Notes
     -----
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
-    1983). At and below the reference rate the second factor is 1; without a temperature the third
-    factor is 1. Each step solves for the plastic strain with the flow stress at its end and the
-    rate of the step: one solution for any step size. The temperature is that at its beginning.
+    1983). The second factor is 1 up to the reference rate, the third without a temperature. Each
+    step solves for the plastic strain with the flow stress at its end, the rate of the step and the
+    temperature at its beginning: one solution for any step size.
 
     See Also
     --------
@@ -200,7 +200,7 @@ class Swift(NamedTuple):
     B, n
         Hardening.
     C
-        Plastic strain at the end of the plateau; negative: a previous plastic strain.
+        Plastic strain at the end of the plateau; negative: earlier plastic strain.
 
     Example
     -------
