@@ -29,7 +29,7 @@ CUBIC = DriftLimits((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1,
 
 
 def drift_limits(basis: Any) -> DriftLimits:
-    """Limits of a basis, or those of similar bases."""
+    """Limits of a basis, or limits of similar bases."""
     traits = basis.traits
     usual = BOXES if traits.steep_edge else QUADRATIC
     return traits.drift_limits or (JUMPS if traits.gradient_jumps else usual)

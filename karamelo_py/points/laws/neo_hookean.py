@@ -21,7 +21,7 @@ class NeoHookean(Hyperelastic):
         Poisson's ratio at small strain, above -1 and below 0.5.
     cp, kappa
         Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
-        initially that of the solid.
+        initially the solid's.
     alpha
         Coefficient of linear expansion.
 

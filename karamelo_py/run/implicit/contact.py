@@ -93,7 +93,7 @@ class Contact:
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
         """Compute forces after nodal displacements (m, d), and their derivatives.
 
-        `supposed`: contact and sticking are those of the last step, before displacements are known.
+        `supposed`: contact and sticking are taken from the last step: no displacements are known.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u

@@ -216,7 +216,7 @@ class Soil(NamedTuple):
 def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
     """Cohesion, friction, dilation at the peak; residual cohesion and friction; softening.
 
-    `surface_of` maps cohesion and friction angle (radians) to those of the yield surface.
+    `surface_of` converts cohesion and friction angle (radians) for the yield surface.
     """
     cohesion, phi, psi, residual_cohesion, residual_phi, softening = soil
     if not 0 <= phi < 90:
