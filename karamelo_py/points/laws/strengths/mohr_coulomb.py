@@ -45,9 +45,9 @@ class MohrCoulomb(NamedTuple):
     s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
     stress (tension positive). Beyond this surface, principal stresses return to a plane, an edge
     (two equal) or, in tension, the apex p = -c cot(phi) (Simpson 2017, Practical Finite Element
-    Modeling in Earth Science using Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2). Pressure
-    follows from the elastic part of J. A step uses the strength at its beginning. With softening,
-    results depend on the cell size.
+    Modeling in Earth Science using Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2).
+    Pressure follows from the elastic part of J. A step uses the strength at its beginning. With
+    softening, results depend on the cell size.
 
     See Also
     --------
