@@ -98,12 +98,12 @@ class SummedField(StepField):
 
 
 def name_of(kind: type) -> str:
-    """Class name of a field in lower case words."""
+    """Return the class name of a field in lower case words."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
 def _trait(kind: type, name: str) -> Any:
-    """Return a trait of a field; one that is not derived from `Field` has its defaults."""
+    """Return a trait of a field; defaults for one not derived from `Field`."""
     return getattr(kind, name, getattr(Field, name))
 
 
@@ -116,7 +116,7 @@ def columns_of(kind: type) -> tuple[str, ...]:
 
 
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
-    """Fields in ``point_fields`` or ``node_fields`` of `owners`, each once."""
+    """List fields in ``point_fields`` or ``node_fields`` of `owners`, each once."""
     return tuple(dict.fromkeys(kind for owner in owners for kind in getattr(owner, attribute, ())))
 
 
@@ -127,9 +127,9 @@ def rows_of_points(
 
     No vector load crosses a line, and the dozens of rows that a visit traverses in parallel fall
     into different cache sets; contiguous rows would collide for n = 512 or 512 000. Rows always
-    have gaps: arrays without gaps are another type, and would need another compilation.
+    have gaps: an array without is another type, and another compilation.
 
-    `room` (k,) is used if it is long enough (`length_of_rows`).
+    `room` (k,) is used if long enough (`length_of_rows`).
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -183,7 +183,7 @@ def _start(kind: type, kin: Any, real: type) -> np.ndarray:
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
-    """Zeros (count, width) for nodes; unused pages take no memory, records cross no lines."""
+    """Return zeros (count, width): unused pages take no memory, records cross no cache lines."""
     room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
     first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
@@ -192,7 +192,7 @@ def records(count: int, width: int, real: type) -> np.ndarray:
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """Make a field (count, components) with initial values."""
     width = kind.shape(kin)
-    # Three numbers are loaded and stored as four, the width of a register.
+    # Three numbers are loaded and stored as four, one register.
     array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
     if (start := _start(kind, kin, real)).any():
         array[:, :width] = start
@@ -200,7 +200,7 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def field(fields: tuple, kind: type) -> Any:
-    """The array of the field of this class, or None."""
+    """Return the array of the field of this class, or None."""
     for one in fields:
         if type(one) is kind:
             return one.array
@@ -211,7 +211,7 @@ def field(fields: tuple, kind: type) -> Any:
 
 
 def load(array, p, like):
-    """Components 0, 1, ... of point `p`, as many as `like` has; () without an array."""
+    """Load components 0, 1, ... of point `p`, as many as `like` has; () without an array."""
     if array is None:
         return ()
     if type(like) is tuple:
@@ -225,7 +225,7 @@ def store(array, p, values):
 
 
 def store_from(array, p, first, values):
-    """Set components from `first` on of point `p` to those in `values`."""
+    """Set components of point `p` from `first` on."""
     if array is not None:
         values = flat(values)
         for k in range(first, len(values)):
@@ -240,7 +240,7 @@ def increase(array, p, values):
 
 
 def forget(array, p, which):
-    """Set components of point `p` to NaN (unknown) where `which` is above 0."""
+    """Set components of point `p` to NaN where `which` > 0."""
     if array is not None:
         for k, chosen in enumerate(which):
             value = array[k, p]
@@ -251,18 +251,15 @@ def load_vector(kin, array, p):
     return kin.Vector._make([array[k, p] for k in range(kin.dimension)])
 
 
-# --- rows by address: code that does not depend on the number and types of arrays -----------------
+# --- rows by address: independent of the number and types of arrays ------------------------------
 
 
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
-    """Address and item size in bytes (m, 2), int64, of each row of non-empty arrays (..., n).
+    """Return address and item size in bytes (m, 2), int64, of each row of arrays (..., n).
 
-    Addresses are valid while the arrays live and are not resized.
+    Of non-empty arrays; valid while they live and are not resized.
 
-    Raises
-    ------
-    ValueError
-        If items are not contiguous, or not of 4 or 8 bytes.
+    Raises ValueError if items are not contiguous, or not of 4 or 8 bytes.
     """
     rows: list[tuple[int, int]] = []
     for array in arrays:
@@ -280,7 +277,7 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def _row(address: int, like: Any, count: int) -> np.ndarray:
-    """View `count` items at an address as integers of the type of `like`."""
+    """View `count` items at an address as integers like `like`."""
     memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
     return np.frombuffer(memory, like.dtype)
 
@@ -300,7 +297,7 @@ def _row_in_kernels(address, like, count):
 def pick_items(
     address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
-    """Set ``room[c, p]`` to item ``order[p]`` of a row, for p from `begin` to `end`.
+    """Set ``room[c, p]`` to item ``order[p]`` of a row, for p in [begin, end).
 
     The row has integers of the type of `like`.
     """
@@ -310,7 +307,7 @@ def pick_items(
 
 
 def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
-    """Set item p of a row to ``room[c, p]``, for p from `begin` to `end`."""
+    """Set item p of a row to ``room[c, p]``, for p in [begin, end)."""
     row = _row(address, like, end)
     for p in range(begin, end):
         row[index(p)] = room[c, p]

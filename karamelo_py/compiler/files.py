@@ -15,7 +15,7 @@ from pathlib import Path
 import platformdirs
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-# Not a link, without waiting for a pipe; systems have some of these flags.
+# No links, no waiting for a pipe; not all systems have these flags.
 _AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
@@ -33,7 +33,7 @@ def _refuse_of_others(about: os.stat_result) -> None:
 
 
 def _guard(directory: Path) -> None:
-    """Refuse a folder that others can write to; close this user's folders."""
+    """Refuse a folder that others can write to; close this user's folders to them."""
     for one in (directory, directory.parent):
         about = one.stat()
         if about.st_mode & stat.S_ISVTX:  # others may not delete files there
@@ -47,7 +47,7 @@ def _guard(directory: Path) -> None:
 def read(path: Path) -> bytes:
     """Read a file that only this user or the administrator can have written.
 
-    Raises OSError if another user can write it, and ValueError if its content is damaged.
+    Raises OSError if another user can write it, ValueError if it is damaged.
     """
     with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
         _guard(path.parent)
@@ -58,13 +58,12 @@ def read(path: Path) -> bytes:
     return data[32:]
 
 
-# Python shows a warning once for each text.
 _warn = functools.partial(warnings.warn, category=RuntimeWarning)
 _reporter = contextvars.ContextVar[Callable[[str], None]]("reporter", default=_warn)
 
 
 def report(text: str) -> None:
-    """Tell the user of a problem, by `telling` or as a warning."""
+    """Report a problem by `telling`, or as a warning."""
     _reporter.get()(text)
 
 
@@ -74,7 +73,7 @@ def report_error(error: OSError) -> None:
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Report problems through `tell`, once, within this context."""
+    """Report problems, each once, through `tell` in this context."""
     texts: list[str] = []
 
     def tell_once(text: str) -> None:

@@ -1,8 +1,8 @@
 """Formulas as stack programs, and the compiled evaluator that runs them over blocks of points.
 
-No formula is compiled: the evaluator loops over the points of a block for each operation. Values
-common to all points are computed once per block: such instructions have the flag `UNIFORM`, and
-`SPREAD` expands the result to a row. Shared subexpressions are stored in rows after the stack.
+No formula is compiled: for each operation the evaluator loops over the points of a block. Values
+common to all points are computed once per block, by instructions with the flag `UNIFORM`; `SPREAD`
+expands the result to a row. Shared subexpressions are stored in rows after the stack.
 """
 
 from typing import NamedTuple
@@ -16,8 +16,8 @@ from karamelo_py.compiler.trace.kernels import caller_of, kernel, noinline
 BLOCK = 128
 MAX_DEPTH = 32
 MAX_KEPT = 32
-ROWS = MAX_DEPTH + MAX_KEPT  # of the scratch array: the stack, then stored rows
-# Flag of an operation done once for the whole block.
+ROWS = MAX_DEPTH + MAX_KEPT  # rows of the stack, then stored rows
+# Flag: done once for the whole block.
 UNIFORM = 1 << 16
 
 # Pushed operands: a constant, a published value, a row of `points` (x y z x0 y0 z0).
@@ -29,8 +29,6 @@ KEEP, KEPT = 150, 151
 
 
 class Program(NamedTuple):
-    """A compiled formula."""
-
     code: np.ndarray  # (n, 2) int64: operation and operand of each instruction
     constants: np.ndarray  # for CONSTANT instructions
 
@@ -50,7 +48,7 @@ def _select(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# Functions with separate loops; others share a loop that selects for each number.
+# Functions with separate loops; the rest select for each number in one loop.
 _UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 ((_POWER, _power),) = numbered("^")
@@ -82,7 +80,7 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise the first `n` numbers of `a` to powers, without branches if all exponents agree.
+    """Raise the first `n` numbers of `a` to powers, branch-free if all exponents agree.
 
     Each result equals `_power`.
     """
@@ -150,8 +148,8 @@ def evaluate(program, globals_, points, count, out, stack):
         _copy(count, out, stack[0])
 
 
-# Kernels of hooks call the evaluator by address, so that they do not contain it, and with whole
-# tables, because slices in a kernel are slow to compile.
+# Hook kernels call the evaluator by address, to not contain it, and with whole tables: slices in a
+# kernel are slow to compile.
 _TABLE = types.float64[:, ::1]
 _ROW = types.float64[::1]
 EVALUATE = types.void(
@@ -164,7 +162,7 @@ STACK = 8  # rows of the scratch table: x y z x0 y0 z0, two results, stack
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
     """`evaluate` the program code[begin:end] with constants[first:last].
 
-    Points are the first rows of `scratch`, the stack its last ones; results go to row `result`.
+    The first rows of `scratch` are the points, the last the stack; results go to row `result`.
     """
     program = Program(code[begin:end], constants[first:last])
     evaluate(program, globals_, scratch[:6], count, scratch[result], scratch[STACK:])

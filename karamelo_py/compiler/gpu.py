@@ -1,7 +1,7 @@
 """GPU code: functions of one thread, device memory, and launches.
 
-A function ``f(i, ...)`` defines the work of thread `i`. It is traced like a kernel and compiled to
-PTX. :class:`Emulator` runs the same code on the processor, thread after thread.
+``f(i, ...)`` defines the work of thread `i`. It is traced like a kernel and compiled to PTX.
+:class:`Emulator` runs the same code on the processor, thread after thread.
 """
 
 import ctypes
@@ -66,7 +66,7 @@ def _counted(array, i, step):
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
         at = llvm.item_pointer(builder, array, table, (i,))
-        # Bits of non-negative floats are ordered like the numbers.
+        # Bits of non-negative floats are ordered like the floats.
         bits = builder.bitcast(number, I64)
         builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
 
@@ -74,7 +74,7 @@ def _largest(array, i, value):
 
 
 def raise_to(array: np.ndarray, i: int, value: float) -> None:
-    """Set a non-negative double to the maximum of it and `value`, atomically."""
+    """Raise a non-negative double to `value` if that is larger, atomically."""
     array[i] = max(array[i], value)
 
 
@@ -86,7 +86,7 @@ def _raise_to(array, i, value):
 
 @intrinsic
 def aligned_record(array, i, count):
-    """Read `count` numbers of record `i`, aligned to 16 bytes, or its size if less."""
+    """Read `count` numbers of record `i`, aligned to 16 bytes, or to its size if less."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(array.dtype, count.literal_value)
@@ -139,7 +139,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     main.attributes.add("alwaysinline")
 
 
-# Functions that LLVM takes from a C library, and NVIDIA's counterparts.
+# Functions of the C library, and NVIDIA's counterparts.
 _MATHEMATICS = {
     "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
     "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
@@ -174,7 +174,7 @@ def library() -> bytes:
 def text_of(
     function: Callable, kinds: tuple, on_card: bool, called: dict | None = None
 ) -> tuple[str, str]:
-    """Compile a thread function for its further arguments; return name and module text.
+    """Return name and module text of a thread function for its further arguments.
 
     `called` as in `values.in_one`.
     """
@@ -193,7 +193,7 @@ def text_of(
 
 
 def numbers_of(function: Callable, arguments: tuple) -> int:
-    """Count the numbers that a thread function returns."""
+    """Count the numbers a thread function returns."""
     kinds = plan_for(arguments).types
     with in_one({}):
         return len(traced(function, (*kinds, types.int64)).result)
@@ -207,7 +207,7 @@ def assembled(text: str, processor: str) -> str:
 
 
 def bandwidth(card: Any, size: int = 1 << 30) -> float:
-    """Measure the copy bandwidth: bytes read and written per second."""
+    """Measure the copy bandwidth: bytes read plus written per second."""
     source, target = card.allocate(size), card.allocate(size)
     fastest = min(card.seconds_of([lambda: card.copy(target, source, size)] * 5))
     card.free(source)
@@ -282,17 +282,17 @@ class Emulator(_Coded):
         return at
 
     def memory(self) -> tuple[int, int]:
-        """Return bytes of free and total memory."""
+        """Return free and total bytes."""
         return 1 << 60, 1 << 60
 
     def free(self, address: int) -> None:
         del self._rooms[address]
 
     def copy_to(self, target: int, source: int, size: int) -> None:
-        """Copy from program memory to device memory; the first argument is the target."""
+        """Copy to device memory; the target is first."""
         ctypes.memmove(target, source, size)
 
-    copy = copy_from = copy_to  # the first argument is the destination
+    copy = copy_from = copy_to
 
     def loaded(self, code: Code) -> Callable:
         (address,) = machine.load(code.code, code.name)
@@ -314,10 +314,10 @@ class Emulator(_Coded):
         return do
 
     def wait(self) -> None:
-        """Wait for all launches."""
+        """Do nothing: launches are done."""
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
-        """Run launches one after another, and time each."""
+        """Run launches in turn, and time each."""
         seconds = []
         for launch in launches:
             begun = perf_counter()
@@ -327,7 +327,7 @@ class Emulator(_Coded):
 
 
 class Counted(Emulator):
-    """Counts allocated bytes, never freed ones; runs nothing."""
+    """Counts allocated bytes (never freed); runs nothing."""
 
     name, taken, copies = "counted", 0, 64
 
@@ -351,7 +351,7 @@ class Card(_Coded):
     """An NVIDIA GPU, through its driver."""
 
     on_card = True
-    copies = 64  # of totals: neighbouring threads add to different copies
+    copies = 64  # of totals: neighbouring threads use different ones
 
     def __init__(self) -> None:
         try:
@@ -409,11 +409,11 @@ class Card(_Coded):
         self._do("cuMemcpyHtoD", target, source, size)
 
     def copy(self, target: int, source: int, size: int) -> None:
-        """Copy within device memory; the first address is the destination."""
+        """Copy within device memory; the target is first."""
         self._do("cuMemcpyDtoD", target, source, size)
 
     def copy_from(self, target: int, source: int, size: int) -> None:
-        """Copy from device memory to program memory, the first address."""
+        """Copy from device to program memory; the target is first."""
         self._do("cuMemcpyDtoH", target, source, size)
 
     def made(self, text: str) -> bytes:
@@ -430,7 +430,7 @@ class Card(_Coded):
         self._do("cuLaunchKernel", entry, blocks, 1, 1, THREADS, 1, 1, 0, self._stream, values, 0)
 
     def together(self, launches: Sequence[Callable]) -> Callable:
-        """Combine several launches to a graph."""
+        """Combine launches to a graph."""
         mode = self._driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_RELAXED
         self._do("cuStreamBeginCapture", self._stream, mode)
         for launch in launches:
@@ -478,7 +478,7 @@ class _There(NamedTuple):
 
 
 def _extent(array: np.ndarray) -> int:
-    """Count bytes up to the end of the last item."""
+    """Count bytes up to the last item's end."""
     if not array.size:
         return 0
     steps = zip(array.shape, array.strides, strict=True)
@@ -541,12 +541,10 @@ class Images:
         return np.ndarray(shape, dtype, (ctypes.c_char * size).from_address(self._room(size)))
 
     def send(self, arrays: Iterable[np.ndarray]) -> None:
-        """Copy arrays to their images."""
         for one in self._of(arrays):
             self.card.copy_to(one.address, one.array.ctypes.data, one.size)
 
     def fetch(self, arrays: Iterable[np.ndarray]) -> None:
-        """Copy images back to their arrays."""
         for one in self._of(arrays):
             self.card.copy_from(one.array.ctypes.data, one.address, one.size)
 

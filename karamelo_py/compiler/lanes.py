@@ -2,11 +2,11 @@
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
-components). Point functions are unaware of it; those that a class lists in ``scalarised`` are
-called lane by lane. Each lane has the bits of the same operations on numbers; sums at nodes differ
-from sums over single points by round-off.
+components). Point functions are unaware of it; those listed in ``scalarised`` of a class are called
+lane by lane. Each lane has the bits of the same operations on numbers; sums at nodes differ from
+sums over single points by round-off.
 
-In the last group of a tile, missing lanes load the first point, and store and contribute nothing.
+In a tile's last group, missing lanes load the first point, and store and contribute nothing.
 Interpreted kernels process points one by one.
 """
 
@@ -32,7 +32,7 @@ from karamelo_py.compiler.trace.primitives import (
 )
 from karamelo_py.compiler.trace.values import intrinsic
 
-# LLVM splits wider vectors in two, and narrow registers are too few for that.
+# LLVM splits wider vectors; narrow registers are too few for that.
 REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays prefetched ahead
 
@@ -58,7 +58,7 @@ def _largest_lane(a):
 
 @shared
 def first_false_lane(condition: bool) -> int:
-    """Return the first lane where a condition is false; 0 without lanes."""
+    """Return the first lane where a condition is false; 0 for a number."""
     return 0
 
 
@@ -88,7 +88,7 @@ def _first(a):
 
 @shared
 def added(total: float, value: float) -> float:
-    """Add a value to `total`; lanes one after another, like numbers."""
+    """Add to `total`, lane after lane, as for numbers."""
     return total + value
 
 
@@ -106,7 +106,7 @@ def _added_lanes(total, a):
 def beside(first: int, steps: int) -> int:
     """Return `first` + `steps` as an array index.
 
-    For lanes both parts are stored, so that neighbours are addressed relative to the first nodes.
+    For lanes both parts are stored: neighbours are addressed relative to the first nodes.
     """
     return first + steps
 
@@ -116,23 +116,23 @@ implements(beside)(lambda first, steps: types.uint64(first + steps))
 
 @shared
 def of_present(p: int, value: float) -> float:
-    """Return `value`, with 0 in the lanes of a group without a point."""
+    """Return `value`, 0 in lanes without a point."""
     return value
 
 
 @shared
 def is_one(number: int) -> bool:
-    """Tell whether all lanes contain the same number."""
+    """Return True if all lanes have the same number."""
     return True
 
 
 @shared
 def prefetch(array: Any, at: tuple) -> None:
-    """Prefetch items that the next iterations over groups will read."""
+    """Prefetch items of the next iterations over groups."""
 
 
 class LaneGroup(LaneType):
-    """Type of up to `width` consecutive points: number of the first, and count."""
+    """Type of up to `width` consecutive points: first, and count."""
 
     def __init__(self, width: int):
         self.width = width
@@ -167,7 +167,6 @@ def lanes_for(bits: int) -> type:
 
 @intrinsic
 def group(tag, first, count):
-    """Make a group of `count` points from `first` on."""
     made = LaneGroup(tag.instance_class.width)
 
     def codegen(builder, _, *numbers):
@@ -183,7 +182,7 @@ def spread(tag, value):
 
 
 def room_for(points, numbers):
-    """Array (components, points) for such numbers on the stack."""
+    """Return an array (components, points) for such numbers, on the stack."""
     return np.zeros((len(numbers), points), np.asarray(numbers[0]).dtype)
 
 
@@ -228,7 +227,7 @@ def _of_present(p, value):
 def _either(
     builder: ir.IRBuilder, condition: ir.Value, first: Callable, second: Callable
 ) -> ir.Value:
-    """Branch: the value of `first` if the condition holds, else of `second`."""
+    """Branch: `first` if the condition holds, else `second`."""
     results = []
     with builder.if_else(condition) as branches:
         for branch, write in zip(branches, (first, second), strict=True):
@@ -250,7 +249,7 @@ def _all_or_masked(
     whole: Callable,
     partly: Callable,
 ) -> ir.Value:
-    """Read or write all lanes if all have a point, as in nearly all groups; else masked.
+    """Access all lanes if all have a point, as in nearly all groups; else masked.
 
     `partly` gets LLVM's name of the vectors, address, alignment and mask.
     """
@@ -269,10 +268,10 @@ def _all_or_masked(
 def _points_at(
     builder: ir.IRBuilder, array: types.Array, value: ir.Value, at: Any, index: ir.Value
 ) -> tuple:
-    """Return the address of an item whose last index is a group, and the group."""
+    """Return address of an item whose last index is a group, and the group."""
     kinds, values = _indices(builder, at, index)
     first = builder.extract_value(values[-1], 0)
-    # Points are contiguous in each row, for any distance between rows.
+    # Points are contiguous in a row, at any distance between rows.
     size = I64(array.dtype.bitwidth // 8)
     indices = [*_as_places(builder, kinds[:-1], values[:-1]), first]
     return llvm.item_pointer(builder, array, value, indices, size), values[-1]
@@ -361,7 +360,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return pointer
-    # Relative to the first node, whose address is computed once for its neighbours.
+    # Relative to the first node: one address for its neighbours.
     stride = llvm.ArrayParts(builder, kind, array).strides[0]
     return llvm.byte_pointer(builder, pointer, builder.mul(steps, stride))
 
@@ -382,7 +381,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # Parameters: mostly all points of a group have one material.
+        # Parameters: a group mostly has one material.
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

@@ -1,4 +1,4 @@
-"""LLVM types of kernels, in registers and in memory, and code that takes values apart."""
+"""LLVM types of kernels, in registers and memory, and code that takes values apart."""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -51,7 +51,7 @@ def register_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def memory_type(kind: types.Type) -> ir.Type:
-    """Return the LLVM type in memory, where booleans take a byte."""
+    """Return the LLVM type in memory: booleans take a byte."""
     if isinstance(kind, types.Boolean):
         return I8
     if isinstance(kind, types.Record):
@@ -63,14 +63,13 @@ def memory_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def is_empty(kind: types.Type) -> bool:
-    """Tell whether a type has no value, as None and tuples of tags."""
+    """Return True for types without a value, as None and tuples of tags."""
     if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
         return all(map(is_empty, kind))
     return register_type(kind) == NOTHING and not isinstance(kind, types.Record)
 
 
 def nothing() -> ir.Constant:
-    """Return the value of None, classes and functions."""
     return ir.Constant(NOTHING, None)
 
 
@@ -128,7 +127,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
 
 
 def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
-    """Name the instruction that converts a number, or None."""
+    """Return the instruction that converts a number, or None."""
     whole, real = types.Integer | types.Boolean, types.Float
     signed = isinstance(kind, types.Integer) and kind.signed
     width = kind.bitwidth if isinstance(kind, types.Integer | real) else 1
@@ -147,7 +146,7 @@ def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
 
 
 def scalar_of(kind: types.Type) -> types.Type:
-    """Return the type of the numbers in lanes; other types unchanged."""
+    """Return the number type of lanes; other types unchanged."""
     return kind.scalar if isinstance(kind, Lanes) else kind
 
 
@@ -173,7 +172,7 @@ def shuffle(builder: ir.IRBuilder, a: ir.Value, b: ir.Value, order: list[int]) -
 
 
 def overloaded(kind: ir.Type) -> str:
-    """Name a type as LLVM's functions do: f64, v4f64."""
+    """Return a type's name in LLVM functions: f64, v4f64."""
     if isinstance(kind, ir.VectorType):
         return f"v{kind.count}{kind.element.intrinsic_name}"
     return kind.intrinsic_name
@@ -183,7 +182,7 @@ def overloaded(kind: ir.Type) -> str:
 
 
 def room(builder: ir.IRBuilder, kind: ir.Type) -> ir.Value:
-    """Allocate stack memory, once for all iterations of a loop."""
+    """Allocate stack memory, once for all iterations."""
     with builder.goto_entry_block():
         return builder.alloca(kind)
 
@@ -302,7 +301,7 @@ def external(
 
 
 def call(builder: ir.IRBuilder, name: str, result: ir.Type, values: list) -> ir.Value:
-    """Call a function of LLVM (whose name contains the type) or of the C library."""
+    """Call a function of LLVM (named with its type) or of the C library."""
     kinds = [value.type for value in values]
     if name.startswith("llvm."):
         name += f".{overloaded(kinds[0])}"
@@ -322,7 +321,7 @@ def of_library(name: str) -> Callable:
 
 @contextmanager
 def counted(builder: ir.IRBuilder, count: ir.Value) -> Iterator[Any]:
-    """Write a loop over the numbers below `count`, around this context."""
+    """Write a loop over [0, count) around this context."""
     before = builder.block
     head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))
     builder.branch(head)

@@ -1,4 +1,4 @@
-"""The operations of formulas: one table of functions of numbers, for kernels and for Python."""
+"""The operations of formulas: one table of number functions, for kernels and Python."""
 
 import functools
 import math
@@ -12,7 +12,7 @@ from karamelo_py.compiler.trace.primitives import implements
 
 @noinline
 def _whole(a, down, up):
-    """Round to an integer by sums, which every processor has."""
+    """Round to an integer by sums: every processor has them."""
     if not abs(a) < 2.0**52:
         return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
@@ -53,7 +53,7 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Avoid pow for small integer exponents: it costs ten multiplications."""
+    """Raise by products for small integer exponents: pow costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)
@@ -118,7 +118,7 @@ _POLES = {
 
 
 def quietly(name: str, *numbers: float) -> float:
-    """Apply an operation as floating-point hardware does: inf or NaN instead of exceptions."""
+    """Apply an operation like floating-point hardware: inf or NaN, no exceptions."""
     a, *rest = numbers = tuple(map(float, numbers))
     try:
         return float((UNARY.get(name) or BINARY[name])(*numbers))
@@ -137,7 +137,7 @@ def quietly(name: str, *numbers: float) -> float:
 
 
 def numbered(*names: str) -> tuple[tuple[int, Callable], ...]:
-    """Numbers and functions of some operations; interpreted, none of them raises."""
+    """Return numbers and functions of operations; interpreted, none raises."""
     every = UNARY | BINARY
     return tuple(
         (OPERATIONS[name], functools.partial(quietly, name) if INTERPRETED else every[name])

@@ -46,7 +46,7 @@ class _Bits(NamedTuple):
 
     number: ir.Type
     whole: ir.Type  # the same bits
-    short: ir.Type  # 32-bit integers, which every processor converts to reals
+    short: ir.Type  # 32-bit integers: every processor converts them to reals
     mantissa: int
     bias: int
 
@@ -85,14 +85,14 @@ def _taken_apart(x):
 
 @intrinsic
 def _scaled(x, n):
-    """x 2^n, with an integer n in the type of x, up to 2000 in size."""
+    """x 2^n, n an integer in the type of x, |n| <= 2000."""
     number, whole, short, mantissa, bias = _bits(x)
 
     def codegen(builder, value, n):
         n = builder.fptosi(n, short)
         half = builder.ashr(n, _constant(short, 1))
         for exponent in (half, builder.sub(n, half)):
-            # In two steps: results reach infinity and denormal numbers.
+            # In two steps: results may be infinite or denormal.
             e = builder.add(exponent, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)

@@ -18,25 +18,17 @@ from karamelo_py.compiler.trace.values import is_literal, rebuilt
 
 @algebra
 class Dual(namedtuple("Dual", "value slopes")):
-    """A number and its derivatives.
-
-    Attributes
-    ----------
-    value
-        The number.
-    slopes
-        A tuple of its derivatives; literals 0 where they vanish.
-    """
+    """A number and its derivatives: `value`, and the tuple `slopes` with literal 0s."""
 
     __slots__ = ()
     __array_ufunc__ = None  # NumPy leaves operations to these
 
     def constant(self, value: Any) -> "Dual":
-        """Make a number with as many slopes, all zero."""
+        """Return a number with as many slopes, all 0."""
         return Dual(value, (0,) * len(self.slopes))
 
     def chain(self, value: Any, slope: Any) -> "Dual":
-        """Make a function of this number from its value and derivative."""
+        """Return a function of this number, from its value and derivative."""
         return Dual(value, tuple([times(slope, s) for s in self.slopes]))
 
     def __add__(self, other):
@@ -114,7 +106,7 @@ def is_tensor(thing: Any) -> bool:
 
 
 def value_of(x: Any) -> Any:
-    """Remove the slopes of a number, or of all numbers of a tuple."""
+    """Drop the slopes of a number, or of a tuple's numbers."""
     if isinstance(x, Dual):
         return x.value
     if isinstance(x, tuple):
@@ -123,12 +115,12 @@ def value_of(x: Any) -> Any:
 
 
 def slopes_of(x: Any, n: int) -> tuple:
-    """Return the `n` slopes of a number, zeros for a constant."""
+    """Return the `n` slopes of a number, 0 for a constant."""
     return x.slopes if isinstance(x, Dual) else (0,) * n
 
 
 def seeded(numbers: tuple) -> Any:
-    """Make numbers the independent variables; for a tensor, one of its class."""
+    """Make numbers the independent variables; of a tensor, keep the class."""
     n = range(len(numbers))
     made = [
         Dual(x, tuple([1 if i == k else 0 for i in n])) for k, x in zip(n, numbers, strict=True)
@@ -141,7 +133,7 @@ def is_zero(slope: Any) -> bool:
 
 
 def times(factor: Any, slope: Any) -> Any:
-    """Multiply a slope; nothing is written for factors 1 and -1."""
+    """Multiply a slope; no code for factors 1 and -1."""
     if is_zero(slope):
         return 0
     if is_literal(factor) and abs(factor) == 1:
@@ -152,7 +144,7 @@ def times(factor: Any, slope: Any) -> Any:
 
 
 def combined(value: Any, a: Any, x: Any, b: Any, y: Any) -> Dual:
-    """Make the number with the slopes a x' + b y'."""
+    """Return the number with the slopes a x' + b y'."""
     n = len(x.slopes) if isinstance(x, Dual) else len(y.slopes)
     slopes = []
     for s, t in zip(slopes_of(x, n), slopes_of(y, n), strict=True):
@@ -164,7 +156,7 @@ def combined(value: Any, a: Any, x: Any, b: Any, y: Any) -> Dual:
 
 
 def size_of(*things: Any) -> int:
-    """Count the slopes of the first number that has some."""
+    """Count the slopes of the first number that has any."""
     for x in things:
         if isinstance(x, Dual):
             return len(x.slopes)
@@ -175,7 +167,7 @@ def size_of(*things: Any) -> int:
 def _sqrt(x):
     root = math.sqrt(x.value)
     some = root > 0
-    # At 0 the slope is infinite; 0 is right for norms, the use of square roots.
+    # At 0 the slope is infinite; 0 is right for norms.
     return x.chain(root, where(some, 0.5 / where(some, root, 1), 0))
 
 
@@ -192,7 +184,7 @@ def elementary(function: Callable, slope: Callable, *others: Callable) -> Callab
 
 
 def _inverse(x):
-    """Return 1/x, and 0 for 0, where slopes are infinite."""
+    """Return 1/x; 0 for 0, where slopes are infinite."""
     return where(x > 0, 1 / where(x > 0, x, 1), 0)
 
 
@@ -261,13 +253,13 @@ def _pow(x, y):
     return _raised(x, y, math.pow(value_of(x), value_of(y)))
 
 
-# Functions with zero slopes, or whose results are not real numbers.
+# Functions with slope 0, or without a real result.
 for _one in (math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite):
     implements(_one, Dual)(lambda x, do=_one: do(x.value))
 
 
 class NoSlope(TypeError):
-    """A function has no derivative; the message names it."""
+    """A function without derivative; the message names it."""
 
 
 def _refused(*functions: Callable) -> None:

@@ -1,11 +1,9 @@
 """Parallel loops, one implementation for all kernels, which calls the loop body by address.
 
-The arguments of a loop stay in memory; the body is a function of their address and an index.
-
-Waking threads takes as long as a small loop. A kernel with many loops is therefore run by a *team*
-(`by_team`): its first thread executes the kernel, the others wait for its loops. Each thread has a
-fixed range of the indices of a loop, and takes indices of threads that make no progress (work
-stealing).
+A loop's arguments stay in memory; the body is a function of their address and an index. Waking
+threads takes as long as a small loop, so a kernel with many loops is run by a *team* (`by_team`):
+its first thread executes the kernel, the rest wait for its loops. Each thread has a fixed range of
+indices, and takes indices of threads that make no progress (work stealing).
 """
 
 import ctypes
@@ -49,13 +47,13 @@ class Serial(NamedTuple):
 
 
 class Threaded(NamedTuple):
-    """All threads; `team` is the address of a team's shared memory (`new_team`)."""
+    """All threads; `team`: address of a team's shared memory (`new_team`)."""
 
     team: int = 0
 
 
 def many_threads() -> bool:
-    """Tell whether many threads may write to one number, as on a GPU."""
+    """Return True if many threads may write to one number, as on a GPU."""
     return False
 
 
@@ -108,7 +106,7 @@ def replaced(address, old, new):
 
 @intrinsic
 def pause(long):
-    """Wait briefly; if `long`, sleep."""
+    """Wait briefly; sleep if `long`."""
 
     def codegen(builder, sleeps):
         def call(name, result, *numbers):
@@ -129,7 +127,7 @@ def pause(long):
 
 
 def add_among(array, i, j, value):
-    """Add an integer to an item of an array atomically."""
+    """Add an integer to an array item atomically."""
     array[i, j] += value
 
 
@@ -165,9 +163,9 @@ if hasattr(os, "register_at_fork"):
 def _share_out(
     count: int, run_range: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
-    """Run a task for each index below `count` by a function of ranges.
+    """Run a task for each index in [0, count) by a function of ranges.
 
-    `threads` is the number of threads; 0 for all.
+    `threads`: their number; 0 for all.
     """
     do, threads = _PART(run_range), threads or config.NUMBA_NUM_THREADS
     size = min(count, threads)
@@ -178,7 +176,7 @@ def _share_out(
         for pair in pairs:
             others.append(_pools.of(threads - 1).submit(do, task, arguments, *pair, failure))
         do(task, arguments, *ends[:2], failure)
-    except BaseException as error:  # such as Ctrl-C; others still use these arguments
+    except BaseException as error:  # such as Ctrl-C; threads still use these arguments
         note(error, failure)
     while others:
         try:
@@ -192,7 +190,7 @@ machine.publish_python("karamelo_share_out", ctypes.CFUNCTYPE(None, *_SHARE_OUT)
 
 
 class _Task(NamedTuple):
-    """Calls a function of an index and the items of a held tuple at an address."""
+    """Calls a function of an index and the items of a held tuple."""
 
     function: Callable
     kind: HeldTuple
@@ -212,7 +210,7 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
-    """Store items; return addresses of a function of them and an index, and of the items."""
+    """Store items; return addresses of a function of these and an index, and of the items."""
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     chosen = traced(function.seen, (*kind, types.intp))
     stored = held_as(lowering, items, kind)
@@ -234,7 +232,7 @@ def _call(task, arguments, number):
 
 @in_kernels
 def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
-    """Call a function whose exceptions are left to the caller."""
+    """Call a function, leaving exceptions to the caller."""
     lowering.regardless = True
     try:
         return function(*arguments)
@@ -249,7 +247,7 @@ def _do_part(task, arguments, begin, end):
 
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
-    """Run a task for each index below `count` by a thread pool."""
+    """Run a task for each index in [0, count) by a thread pool."""
     chosen = traced(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
@@ -276,8 +274,8 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses, about 0.3 ms; then threads sleep, since others may need their cores
-_APART, _LOOKS = 10, 64  # pauses between looks at another's remaining range; looks, 30 us
+_SHORT = 8000  # pauses, about 0.3 ms; then sleep: cores may be needed
+_APART, _LOOKS = 10, 64  # pauses between looks at another range; looks, 30 us
 _PATIENCE = 11000  # pauses until a thread stops waiting for a leader
 _LEFT = (1 << 32) - 1  # of a ticket: the remaining indices; the upper bits are the loop
 
@@ -293,7 +291,7 @@ def new_team(threads: int) -> np.ndarray:
 def _take_part(team, k):
     """Process indices of the present loop, those of thread `k` first; return their number.
 
-    Data of a thread is in its caches, so others take from a range only if it does not shrink for a
+    A thread's data is in its caches: others take from its range only if that does not shrink for a
     while.
     """
     size = read(team + _SIZE)
@@ -345,7 +343,7 @@ def _share(team, count, task, arguments):
 
 @noinline
 def _serve(team, k):
-    """Take part in loops until the leader ends, if there is one."""
+    """Work on loops until the leader, if any, ends."""
     seen, pauses = -1, 0
     while True:
         state = read(team + _STATE)
@@ -375,7 +373,7 @@ def _distribute(team, count, task, arguments):
 
 
 def shared_out(function: Callable) -> Callable:
-    """Make ``f(mode, count, ...)``: ``function(..., k)`` for each k below `count`, in parallel."""
+    """Make ``f(mode, count, ...)``: ``function(..., k)`` for k in [0, count), in parallel."""
     noinline(function)
 
     def loop(mode, count, *arguments):
@@ -389,7 +387,7 @@ def shared_out(function: Callable) -> Callable:
 
 
 def by_threads(share: Callable) -> Callable:
-    """Make the kernel ``f(mode, count, ...)``: ``share(..., k)`` for each k below `count`."""
+    """Make the kernel ``f(mode, count, ...)``: ``share(..., k)`` for k in [0, count)."""
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 

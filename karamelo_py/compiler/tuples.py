@@ -13,7 +13,7 @@ def flat(nested):
 
 
 def nested_as(like, numbers):
-    """Nest numbers like `like`, in the same classes."""
+    """Nest numbers like `like`, in its classes."""
     made, begin = [], 0
     for item in like:
         inner = isinstance(item, tuple)
@@ -30,5 +30,5 @@ def count_in(nested):
 
 
 def record(table, i):
-    """Row `i` of a NamedTuple of arrays, perhaps nested: the same NamedTuple of scalars."""
+    """Return row `i` of a (nested) NamedTuple of arrays, as the same NamedTuple of scalars."""
     return type(table)(*[record(c, i) if isinstance(c, tuple) else c[i] for c in table])

@@ -34,7 +34,7 @@ class Nodes(NamedTuple):
     fields: tuple  # declared fields, (N, components)
 
 
-# First components in the records; in 3D a vector takes four numbers, the width of a register.
+# First components in node records; a 3D vector takes four numbers, one register.
 MASS = 0  # of Nodes.sums
 
 
@@ -51,7 +51,7 @@ def of_change(kin):
 
 
 def vector_at(kin, records, i, first, like):
-    """Load a vector from a node's record, starting at component `first`."""
+    """Load a vector from record `i`, from component `first` on."""
     return vector(kin, row(records, i, first, (*like,)))
 
 
@@ -84,7 +84,7 @@ def known_to_laws(points):
 
 
 def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the arrays of the points with their names; points are the last axis."""
+    """Yield (name, array); points are the last axis."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
@@ -93,7 +93,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
-    """Rebuild `points` from the arrays of `arrays_of`."""
+    """Rebuild `points` from `arrays`, in the order of `arrays_of`."""
     arrays = iter(found)
     own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
     return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
@@ -102,24 +102,22 @@ def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
 class Tiling(NamedTuple):
     """The points of a block by tile."""
 
-    count: np.ndarray  # (3,) int64: number of occupied tiles, of parts of the points, and of
-    #                    parts that other processes wait for
+    count: np.ndarray  # (3,) int64: numbers of occupied tiles, of parts of the points, and of parts
+    #                    that other processes wait for
     share: np.ndarray  # (S + 1,) int64: tiles of the k-th part: order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: the grid of the k-th occupied tile
-    number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile among all
+    number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may see
-    rows: np.ndarray  # (T + 1, r, 2) int16: of each row of the box, in 3D number i ny + j, the
-    #                   first and last node, counted from its beginning; the last before the first
-    #                   if the row is empty, and after the last row. No rows (r = 0) if boxes are
-    #                   not refined
-    buffer: np.ndarray  # (T + 1, 5) int64: its records in the buffers begin and end; Grid.first,
-    #                     step_x and step_y of the numbers that its nodes have there
-    report: np.ndarray  # (T + 1, 14): largest move, largest rate, offending point + 1 of each tile;
-    #                     at looks, the kinetic and stored energy of its points, the
-    #                     number of their solid (-1: of several), their mass and momentum,
-    #                     their elastic energy, and its product with velocity
+    rows: np.ndarray  # (T + 1, r, 2) int16: first and last node of each row of the box (3D: row i
+    #                   ny + j), counted from the row's first; last < first if empty; r = 0 if boxes
+    #                   are not refined
+    buffer: np.ndarray  # (T + 1, 5) int64: range of its records in the buffers; Grid.first, step_x
+    #                     and step_y of its nodes there
+    report: np.ndarray  # (T + 1, 14): largest move, largest rate, failed point + 1; at looks also
+    #                     kinetic and stored energy, number of the solid (-1: several), mass,
+    #                     momentum, elastic energy, and this times velocity
 
 
 CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
@@ -129,15 +127,15 @@ class Buffers(NamedTuple):
     """Sums of the tiles of points: dense boxes of nodes, one after another.
 
     A tile of nodes sums the boxes that reach it, in one order, and zeros them. Its parts are ranges
-    of nodes: overlaps with boxes, after a part that clears the rest if the first box does not cover
+    of nodes that overlap a box, after a part that clears the rest if the first box does not cover
     all. Columns of a part: first node in the grid and in the box; lengths; strides in the grid and
     in the box along the first two directions; the action.
 
-    In scenes of few points, the nodes are the only buffer: tiles add to them one by one.
+    With few points, the nodes are the only buffer, and tiles add to them one by one.
     """
 
     nodes: Nodes  # the fields that points scatter to
-    count: np.ndarray  # (2,) int64: number of parts of the nodes; whether boxes are the nodes
+    count: np.ndarray  # (2,) int64: number of parts; whether the nodes are the only buffer
     first: np.ndarray  # (S + 1,) int64: rows of the k-th part are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
     number: int  # index among the buffers of a scene
@@ -152,10 +150,10 @@ class Places(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Points of one law, its parameters per material, and its tiles."""
+    """Points of one law, the law's parameters per material, and the tiles."""
 
     points: Points
-    laws: NamedTuple  # the law's NamedTuple with an array (m,) for each parameter
+    laws: NamedTuple  # parameters of the law, an array (m,) each
     tiling: Tiling
 
 
@@ -178,12 +176,11 @@ class Matter(NamedTuple):
 
 
 def matter_of(kin: Tag, block: Block) -> Matter:
-    """Return the points of a block without optional fields (`known_to_laws`), and their law."""
     return Matter(kin, known_to_laws(block.points), block.laws)
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """Return the block with the points of `rows`, in this order; they must be sorted again."""
+    """Return the block with the points `rows`, in this order and not yet sorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
@@ -192,7 +189,6 @@ class NoHooks(NamedTuple):
     """No hooks in the compiled loop."""
 
 
-# A compiled hook of a fix; the formula of one of its components.
 HOOK = np.dtype(
     [
         ("address", np.int64),
@@ -203,8 +199,8 @@ HOOK = np.dtype(
         ("uses_before", np.int64),  # the value one step earlier
         ("uses_share", np.int64),  # 1 / number of members with mass
         ("holds", np.int64),  # sets the velocity, or bounds it
-        ("uses_place", np.int64),  # whether its formulas depend on position
-        ("totals", np.int64),  # published by a hook on whole points
+        ("uses_place", np.int64),  # formulas depend on position
+        ("totals", np.int64),  # number published by a hook on whole points
     ]
 )
 PROGRAM = np.dtype(
@@ -215,7 +211,7 @@ PROGRAM = np.dtype(
         ("last", np.int64),
     ]
 )
-# The hook that holds a node in one direction, and its force.
+# The hook that holds a node in one direction.
 HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: none
 
 
@@ -241,9 +237,9 @@ class Hooks(NamedTuple):
     x0: np.ndarray  # (n, d) reference positions of the points, by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
-    held: np.ndarray  # (N, d) HELD, if several hooks hold the same nodes; else (0, d)
-    loads: np.ndarray  # (N, d) of this step, if hooks apply forces; else (0, d)
-    told: np.ndarray  # (F,) bool: whether a field of N/F nodes is of a rigid solid; or (0,)
+    holders: np.ndarray  # (N, d) HELD if several hooks hold the same nodes, else (0, d)
+    loads: np.ndarray  # (N, d) of this step if hooks apply forces, else (0, d)
+    rigid_fields: np.ndarray  # (F,) bool: fields of rigid solids, N/F nodes each; or (0,)
     mode: Tag  # one thread, or several
     apart: Apart
     whole: tuple  # tags of the hooks on whole points, made by `vector_hook`
@@ -252,7 +248,7 @@ class Hooks(NamedTuple):
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
 WHOLE = -1  # instead of an address: one of Hooks.whole
 
-# Stages of a step at which fixes act, in Karamelo's names.
+# Stages at which fixes act, in Karamelo's names.
 INITIAL_INTEGRATE = 0
 POST_PARTICLES_TO_GRID = 1
 POST_UPDATE_GRID_STATE = 2
@@ -281,9 +277,9 @@ CLOCK = np.dtype(
         ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock
         ("contact_kick", np.float64),  # time that forces would act in such steps
         ("last_contact_dt", np.float64),
-        ("rate", np.float64),  # of the fastest point, c + max |v_i - common_i|
+        ("rate", np.float64),  # max over points of c + max |v_i - common_i|
         ("common", np.float64, (1, 3)),  # reference velocity for speeds
-        ("weight", np.float64),  # weight of the common drift: 1, with which `common` is 0
+        ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
         ("wave", np.float64),  # wave speed when `common` was measured
         ("speed", np.float64),  # of the fastest point, in cells
         ("new_rate", np.float64),  # of the last sweep
@@ -293,19 +289,19 @@ CLOCK = np.dtype(
         ("drift", np.float64),  # since the points were sorted, in cells
         ("drift_limit", np.float64),
         ("pace", np.float64),  # largest move in a step since then
-        ("path", np.float64),  # largest path since the start, in cells
+        ("path", np.float64),  # largest path of a point, in cells
         ("spacing", np.float64),  # smallest cell size
         ("courant", np.float64),  # stable step over cell size / rate
         ("courant_moving", np.float64),  # the same once points have moved
         ("heat_limit", np.float64),  # stable step of conduction, infinite without
         ("heat_reference", np.float64),  # the same in undeformed bodies
-        ("kept", np.float64),  # fraction of its velocity that a point retains (FLIP)
-        ("kept_by_time", np.float64),  # for a stable step, if it depends on the step; or 0
+        ("kept", np.float64),  # FLIP coefficient
+        ("kept_by_time", np.float64),  # the same per stable step if it depends on time, or 0
         ("first_limit", np.float64),  # stable step at the start
         ("limit", np.float64),  # stable step now
-        ("now", np.int64),  # which of the two arrays of places is the present one
+        ("now", np.int64),  # index of the present array of places
         ("wrong", np.int64),  # 1 when a point went wrong
-        ("over_limit", np.int64),  # steps above the stable limit, one after another
+        ("over_limit", np.int64),  # consecutive steps above the stable limit
         ("watch_limit", np.int64),  # whether to stop because of them
         ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
         ("level", np.float64),  # fraction of the present stored energy in the balance
@@ -333,19 +329,19 @@ CLOCK = np.dtype(
         ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
         ("to_and_fro", np.float64),  # time for waves through all bodies and back
         ("time_of_look", np.float64),
-        ("lost", np.float64),  # energy lost by that, as a fraction of the unit, at most
-        ("crossed", np.float64),  # cells that stressed material has moved through, at most
+        ("lost", np.float64),  # largest loss by that, as a fraction of the unit
+        ("crossed", np.float64),  # cells that stressed material has moved through
         ("supplied", np.float64),  # largest work so far, of either sign
         ("energy_floor", np.float64),  # round-off of energies
         ("windows", np.int64),  # consecutive windows in which the balance has grown
         ("growth", np.float64),  # in the last window, relative to the largest energy
-        ("grown", np.float64),  # since the first looks or the first window, at most
+        ("grown", np.float64),  # largest growth since the first looks
         ("watch_heat", np.int64),  # whether all sources of heat are known
-        ("coldest", np.float64),  # allowed by initial state, fixes and sources
+        ("coldest", np.float64),  # lower bound from initial state, fixes and sources
         ("hottest", np.float64),
         ("T_low", np.float64),  # of the points at the last look
         ("T_high", np.float64),
-        ("own_heat", np.float64),  # largest rise of a temperature by the work of its point
+        ("own_heat", np.float64),  # largest heating of a point by its dissipation
         ("set_low", np.float64),  # set at nodes by fixes
         ("set_high", np.float64),
         ("rise", np.float64),  # largest heating rate of points by fixes
@@ -361,9 +357,9 @@ class Control(NamedTuple):
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
     clock: np.ndarray  # (1,) CLOCK
-    totals: np.ndarray  # sums, LIMBS numbers each, see kernels.totals: of the published values,
-    #                     then mass and momentum of each solid, 1 + d, and elastic energy and its
-    #                     product with velocity
+    totals: np.ndarray  # sums of LIMBS numbers (kernels.totals): of the published values; of mass
+    #                     and momentum of each solid (1 + d); of elastic energy and this times
+    #                     velocity
     digits: np.ndarray  # (LIMBS,) scratch
     answer: np.ndarray  # rounded totals, and results agreed between processes
     firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
@@ -382,27 +378,27 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 
 
 class Setup(NamedTuple):
-    """All arguments of a step; its type determines the code."""
+    """All arguments of a step; its type selects the code."""
 
-    frame: Tag  # whether weights belong to present or reference positions
-    kin: Tag  # kinematics tag
+    frame: Tag  # present or reference positions for weights
+    kin: Tag
     basis: Tag
     transfer: Tag
-    averaging: Tag  # whether volume changes are averaged (F-bar)
-    contact: Tag  # contact between solids with separate fields
-    heat: Tag  # whether heat flows between points, and its nodes
+    averaging: Tag  # F-bar or none
+    contact: Tag
+    heat: Tag  # heat conduction and its nodes, or none
     grids: Grid  # with an array (g,) for each number
     nodes: Nodes
     buffers: Buffers
     blocks: tuple[Block, ...]  # one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
-    ranges: np.ndarray  # (S + rows, 2) int64: for each part of the nodes, its range of the
-    #                     following rows; then the ranges of node numbers in use, by part
+    ranges: np.ndarray  # (S + rows, 2) int64: for each part of the nodes its range of the following
+    #                     rows, then the ranges of node numbers in use, by part
     control: Control
 
 
 def with_items(of, /, **items):
-    """Replace items of a NamedTuple, also of a held one."""
+    """Replace items of a NamedTuple or of a `hold` tuple."""
     pairs = zip(of._fields, of, strict=True)
     return type(of)(*[items.get(name, item) for name, item in pairs])
 

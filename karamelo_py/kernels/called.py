@@ -1,7 +1,7 @@
 """Python hooks called from compiled steps.
 
-A step calls a Python function by address before it maps points to nodes. The function applies
-forces to points in the arrays of the step.
+A step calls a Python function by address before it maps points to nodes; the function sets forces
+on points in the arrays of the step.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ _call = caller_of(CALL)
 
 
 class CalledHooks(NamedTuple):
-    """The compiled hooks of a scene, and a Python function called at the start of each step."""
+    """Compiled hooks, and a Python function called at the start of each step."""
 
     compiled: NamedTuple
     address: int  # of ``(stage) -> 1``, or 0 if it failed
@@ -30,7 +30,7 @@ class CalledHooks(NamedTuple):
 @kernel
 def _act(address, stage):
     if _call(address, stage) == 0:
-        raise RuntimeError("a hook has failed")  # its own exception precedes this
+        raise RuntimeError("a hook has failed")
 
 
 @at_points.on(CalledHooks)

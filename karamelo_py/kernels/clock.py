@@ -14,12 +14,12 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """Return dt of the present step, in the precision of the run: the time that points move."""
+    """Return dt, the time that points move, in the precision of the run."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the previous step; next to 0 but not 0 (laws divide by it) if there is none."""
+    """Return dt of the previous step; tiny, not 0, if there is none: laws divide by it."""
     last = s.control.clock[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
@@ -28,27 +28,27 @@ def last_step_size(s: Setup) -> Number:
 def kick(s: Setup) -> Number:
     """Return the time for which forces act in this step.
 
-    Positions belong to the ends of steps, velocities to their middles: forces act from the middle
-    of one step to the middle of the next. In the first step they act for a whole step, as initial
-    velocities belong to half a step earlier, unless a script requests half.
+    Velocities belong to the middles of steps: forces act from the middle of the last step to the
+    middle of this one. In the first step they act for all of it, since initial velocities belong to
+    half a step earlier, unless the script requests half.
     """
     return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
 
 
 def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
-    """Return the reference velocity (d,) for speeds, in the number type of `like`."""
+    """Return the reference velocity (d,) for speeds, in the type of `like`."""
     return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step
-ROUNDING = 1e-6  # of a step: error of a million additions
+ROUNDING = 1e-6  # of a step: round-off of a million additions
 
-# Contact is as stiff as a step allows. If dt drops suddenly, as by set_dt, the step for its
-# stiffness drops by this fraction of the time: loaded springs stiffen over several periods.
+# Contact stiffness depends on dt. If dt drops suddenly (set_dt), the dt of the stiffness drops by
+# this fraction of the time: loaded springs stiffen over several periods.
 FOLLOWING = 0.01
 
-# Points that cross cells add energy to a body, more with a longer step. Until they have moved this
-# far, in cells, the stable step is the one of bodies at rest.
+# Crossing cells adds energy, more with a longer step. Until points have moved this far, in cells,
+# the stable step is the one at rest.
 STILL = 0.25
 # Cells that a point may move in a step, if the step ignores a common drift.
 STRIDE = 0.65
@@ -59,13 +59,13 @@ def choose_dt(control: Control) -> None:
     """Choose dt of the next step: from the fastest point, or fixed; less at the end.
 
     The last two steps are equally shortened: prescribed or mapped velocities give impulses that do
-    not vanish with dt, and their forces would be huge in a very short step. Contact with a
-    stiffness of m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back. The
-    first step after load steps begins as in a new scene.
+    not vanish with dt, so a very short step would have huge forces. Contact with a stiffness of
+    m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back. The first step after
+    load steps begins as in a new scene.
     """
     clock = control.clock[0]
     if clock.weight > 1:
-        # The common drift may have rotated since it was measured: limit it by the speeds.
+        # The common drift may have rotated since it was measured: bounded by the speeds.
         clock.rate = max(clock.rate, clock.wave + clock.speed * clock.spacing)
     limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
     dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
@@ -77,7 +77,7 @@ def choose_dt(control: Control) -> None:
     clock.limit = limit
     clock.over_limit = clock.over_limit + 1 if dt > limit else 0
     remaining = clock.end_time - control.values[TIME]
-    # The tolerance covers the rounding of many additions of dt: no final step of 1e-16.
+    # Tolerance for rounding in many additions of dt: no final step of 1e-16.
     if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
@@ -97,14 +97,13 @@ def choose_dt(control: Control) -> None:
 
 @kernel
 def finish(control: Control) -> None:
-    """End a step: new positions become present, time advances, the next dt is chosen."""
+    """End a step: advance time, swap the arrays of places, choose the next dt."""
     clock = control.clock[0]
     clock.now = 1 - clock.now
     dt = control.values[DT]
     clock.last_dt = dt
     clock.last_contact_dt = clock.contact_dt
     time = control.values[TIME] + dt
-    # Exactly the end time, if the step was shortened to it.
     control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
     control.values[TIMESTEP] += 1
     clock.drift += clock.move
@@ -132,7 +131,7 @@ def _read_reports(tiling, control):
 
 
 def read_reports(s: Setup) -> None:
-    """Collect the largest rate and move of all tiles in the clock, and whether a point failed."""
+    """Put the largest rate and move of all tiles, and any failure, in the clock."""
     clock = s.control.clock[0]
     clock.new_rate = 0.0
     clock.new_move = 0.0
@@ -142,15 +141,14 @@ def read_reports(s: Setup) -> None:
 
 
 def take_reports(clock: Any) -> None:
-    """Accept the reports of a sweep."""
-    # Points move in one sweep of a step, domains may grow in another.
+    # Points move in one sweep of a step; domains may grow in another.
     clock.move += clock.new_move
     if clock.new_rate > 0:
         clock.rate = clock.new_rate
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Accept the reports of a sweep; return whether no point failed."""
+    """Read and accept the reports of a sweep; return whether no point failed."""
     clock = s.control.clock[0]
     read_reports(s)
     take(clock)
@@ -168,13 +166,12 @@ class MoveCheck(NamedTuple):
 
 
 def move_check(s: Setup) -> MoveCheck:
-    """Return the settings of the present step."""
     clock = s.control.clock[0]
     return MoveCheck(s.frame, s.kin, s.grids, clock.now, clock.stride)
 
 
 def checked_move(check, points, p):
-    """Return the move of point `p` in a step, in cells, and whether it is allowed."""
+    """Return the move of point `p` in cells, and whether it is allowed."""
     frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)
@@ -186,8 +183,8 @@ def checked_move(check, points, p):
 @by_threads
 def _check_points(check, points, tiling, k):
     check, points, tiling = at_hand(check), at_hand(points), at_hand(tiling)
-    for place in range(tiling.share[k], tiling.share[k + 1]):
-        t = tiling.order[place]
+    for position in range(tiling.share[k], tiling.share[k + 1]):
+        t = tiling.order[position]
         furthest = 0.0
         wrong = 0
         for p in range(tiling.range[t, 0], tiling.range[t, 1]):
@@ -199,7 +196,7 @@ def _check_points(check, points, tiling, k):
 
 
 def check_moves(s: Setup, mode: Tag) -> bool:
-    """Check the new positions again, after hooks that may have changed them."""
+    """Check the new positions again, after hooks on them."""
     clock = s.control.clock[0]
     for block in s.blocks:
         _check_points(mode, block.tiling.count[1], move_check(s), block.points, block.tiling)

@@ -1,29 +1,29 @@
 """Contact on the grid between solids with separate velocity fields.
 
-Where two fields have mass at a node, an impulse removes the part of their relative velocity with
-which they approach along their common normal, after Bardenhagen et al. 2001 ("An improved contact
-algorithm for the material point method and application to stress propagation in granular material",
-CMES 2(4)). Coulomb friction adds a tangential impulse, at most mu times as large. The impulses on
-both fields are opposite: momentum is conserved to round-off.
+Where two fields have mass at a node, an impulse along their common normal removes the approach
+velocity, after Bardenhagen et al. 2001 ("An improved contact algorithm for the material point
+method and application to stress propagation in granular material", CMES 2(4)). Coulomb friction
+adds a tangential impulse, at most mu times as large. Impulses are opposite: momentum is conserved
+to round-off.
 
-Where more than two fields meet, all pairs compute impulses from the same velocities, so the order
-of the solids does not matter. Each pair takes 1 / k of its impulse, where k is the larger of its
-two bodies' numbers of pairs: no body is more than stopped, and energy does not grow. The remainder
-is removed in further iterations.
+Where more than two fields meet, all pairs compute impulses from the same velocities: the order of
+the solids does not matter. Each pair takes 1 / k of its impulse, k being the larger of its two
+bodies' numbers of pairs: no body is more than stopped, and energy does not grow. Further iterations
+remove the remainder.
 
-Fields meet at nodes up to two cells before the bodies do (the reach of the basis functions).
-Therefore the gap between the surfaces is measured, from the mean positions of the points of each
-body around a node (`karamelo_py.points.basis.surface`). Bodies may approach until the gap is closed
-at the end of the step. Convex bodies are apart if they are apart along one direction: the grid axes
-are tried too, since normals tilt where faces end.
+Fields meet up to two cells before the bodies do (the reach of the basis functions). So the gap
+between the surfaces is measured from the mean positions of each body's points around a node
+(`karamelo_py.points.basis.surface`), and bodies may approach until it is closed at the end of the
+step. Convex bodies are apart if they are apart along one direction: the grid axes are tried too,
+since normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or of granular material: each time that it
-seems to leave a gap, points would sink a little into a wall, permanently. So where contact with a
-body of prescribed velocity acted in the last step, others may separate but not approach. For bodies
-that hold no shape this lasts for 100 steps, as their points leave a wall for some steps at a time,
-and it includes the nodes that a moving wall reaches. Such a wall may be one cell thick and have
-corners that other bodies fill: only its faces towards the other body count, and in a hollow corner
-none of them may be entered.
+The mean position is not the lowest point of a liquid or granular material: whenever it seems to
+leave a gap, points would sink a little into a wall, permanently. So where contact with a body of
+prescribed velocity acted in the last step, bodies may separate but not approach. For bodies that
+hold no shape this lasts 100 steps, as their points leave a wall for some steps at a time, and
+includes nodes that a moving wall reaches. Such a wall may be one cell thick and have corners that
+other bodies fill: only its faces towards the other body count, and none of those of a hollow corner
+may be entered.
 """
 
 from math import sqrt
@@ -55,39 +55,39 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
 # Squared sines of angles about the mean direction out of a body:
-SCATTER = 0.003  # accuracy of the direction of a plane face
+SCATTER = 0.003  # accuracy for a plane face
 EDGE = 0.03  # above it, a face ends or is round
 FACING = 0.3  # cosine of the angle at which two faces face each other
-MEMORY = 100  # steps after a contact in which bodies that hold no shape may not approach a wall
-REPEATS = 16  # iterations if more than two fields meet; each at least halves the remainder
+MEMORY = 100  # steps after a contact in which shapeless bodies may not approach a wall
+REPEATS = 16  # iterations where more than two fields meet; each at least halves the remainder
 
 
 class SeparateFields(NamedTuple):
     """Contact where fields meet: F fields on equal grids, S solids."""
 
     node_fields = (Normal, Centre)
-    looks_beyond = 1  # cells beyond the nodes of points whose sums are read
+    looks_beyond = 1  # cells beyond the points' nodes whose sums are read
 
-    stride: int  # from a node to the same position in the next field
-    beside: np.ndarray  # (d, 2) stride to the next node along each axis, number of nodes
+    stride: int  # to the same position in the next field
+    beside: np.ndarray  # (d, 2) stride to the next node and number of nodes, along each axis
     per_mass: np.ndarray  # (F,) specific volume over h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
     warmth: np.ndarray  # (F, F) fraction of the frictional heat to the first of two fields
-    pair: np.ndarray  # (F, F) slot of the published force of a pair on its first field, or -1
-    slot: np.ndarray  # (F,) slot of the published force on each field
-    copies: np.ndarray  # (k, 2) slots: from a field to the other solids with that field
-    touched: np.ndarray  # (N, F) int32: the last step (from 1) of contact between a node and the
-    #                      node of another, later field; negative if the two stuck
-    prescribed: np.ndarray  # (N, d) 1 + slot of the reaction, if a fix prescribes v, else 0
-    reactions: np.ndarray  # number of slots of such reactions, and these
-    forces: np.ndarray  # number of slots of all forces and torques, and these
-    rigid: np.ndarray  # (F,) bool: whether contact does not move a field
-    torque: np.ndarray  # (F,) slot of the published torque on each field
-    memory: np.ndarray  # (F,) steps after a contact in which a body may not approach a wall
-    surface: np.ndarray  # (F, k) distance of the surface by the mean position of points, in cells
+    pair: np.ndarray  # (F, F) slot of the force of a pair on its first field, or -1
+    slot: np.ndarray  # (F,) slot of the force on each field
+    copies: np.ndarray  # (k, 2) slots: from a field to other solids with that field
+    touched: np.ndarray  # (N, F) int32: last step (from 1) of contact between a node and a later
+    #                      field's node; negative if they stuck
+    prescribed: np.ndarray  # (N, d) 1 + slot of the reaction if a fix prescribes v, else 0
+    reactions: np.ndarray  # number of such slots, then the slots
+    forces: np.ndarray  # number of slots of forces and torques, then the slots
+    rigid: np.ndarray  # (F,) bool: contact does not move the field
+    torque: np.ndarray  # (F,) slot of the torque on each field
+    memory: np.ndarray  # (F,) see MEMORY
+    surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a position
-    partners: np.ndarray  # (F,) int64 scratch: number of contacts of each of them
-    change: np.ndarray  # (F, d) scratch: velocity change of each of them
+    partners: np.ndarray  # (F,) int64 scratch: number of contacts of each
+    change: np.ndarray  # (F, d) scratch: velocity change of each
 
 
 class Bodies(NamedTuple):
@@ -102,9 +102,9 @@ class Bodies(NamedTuple):
 
 
 class Where(NamedTuple):
-    """A position where fields meet, and the step."""
+    """A position where fields meet, in a step."""
 
-    place: int  # number of its node in the first field
+    node: int  # its node in the first field
     x: tuple  # (d,)
     h: float
     dt: float
@@ -112,7 +112,7 @@ class Where(NamedTuple):
 
 
 class Touched(NamedTuple):
-    """Instead of `Where`: pairs of bodies with contact in a step."""
+    """Selects pairs that were in contact in a step, instead of `Where`."""
 
     step: int
 
@@ -128,18 +128,18 @@ class Side(NamedTuple):
 
 
 class NodePair(NamedTuple):
-    """Two bodies at a position: a node of each, and vectors of both."""
+    """Two bodies at a position."""
 
     n: int
     m: int
     per_n: float  # 1 / mass
     per_m: float
-    outward: tuple  # common normal, not normalised, from the first body to the second
-    scatter: float  # the smaller of both outward directions
-    yielding: tuple  # change of the relative velocity per impulse along each direction
+    outward: tuple  # common normal, not normalised, out of the first body
+    scatter: float  # smaller scatter of the two outward directions
+    yielding: tuple  # change of relative velocity per impulse, per axis
     relative: tuple  # velocity of the first body relative to the second
     wall: bool  # whether exactly one has a prescribed velocity
-    hollow: bool  # and it has a corner that the other fills
+    hollow: bool  # and it has a corner filled by the other
 
 
 @noinline
@@ -153,7 +153,7 @@ def _yielding(contact, n, k, per_mass):
 
 @noinline
 def _led(contact, kin, n):
-    """Return True if the velocity of a body is prescribed: its faces retain their directions."""
+    """Return True if the velocity is prescribed: faces retain their directions."""
     led = False
     for k in range(kin.dimension):
         led = led or _immovable(contact, n, k)
@@ -183,7 +183,7 @@ def _beside(contact, kin, n, which):
 
 @noinline
 def _face(bodies, n):
-    """Return the sum of m grad N of a node, which points out of the body."""
+    """Return the nodal sum of m grad N, pointing out of the body."""
     contact, kin, nodes = bodies
     gradient = vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
     return vector(kin, [_kept(contact, n, k) * of_axis for k, of_axis in enumerate(gradient)])
@@ -197,13 +197,12 @@ def _cosine_above(a, b, least):
 def _normal(bodies, n, other):
     """Return the outward direction of a body, and the squared sine of its scatter angle.
 
-    It is the mean of the sums of m grad N over the nodes around `n`. The sum of one node rotates by
-    tens of degrees as points in rows inclined to the grid pass it. With weights 1/4, 1/2, 1/4 along
-    each axis, a plane face is accurate to two degrees. Nodes that point the same way as `other`,
-    the outward direction of the other body, are omitted: both faces of a thin wall are near, and
-    only one faces that body.
+    The mean of the sums of m grad N over the nodes around `n`: the sum of one node rotates by tens
+    of degrees as rows of points inclined to the grid pass it. With weights 1/4, 1/2, 1/4 along each
+    axis, a plane face is accurate to two degrees. Nodes whose sum points the same way as `other`,
+    the outward direction of the other body, are omitted: of a thin wall only one face counts.
 
-    The length is its weight relative to the other body's direction. It grows with the surface
+    The length is the weight relative to the other body's direction. It grows with the surface
     around the nodes, and falls where their directions differ, as at edges. (Lemiale, Nairn &
     Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of the same
     density both are equal, and the block's direction is tilted by 15 degrees.)
@@ -213,24 +212,24 @@ def _normal(bodies, n, other):
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
         if inside:
-            part = contact.per_mass[n // contact.stride] * _face(bodies, beside)
+            term = contact.per_mass[n // contact.stride] * _face(bodies, beside)
             for k in range(kin.dimension):
-                part = (0.5 if which // 3**k % 3 == 1 else 0.25) * part
-            if not _cosine_above(part, other, FACING):
-                total = total + part
-                lengths += sqrt(dot(part, part))
+                term = (0.5 if which // 3**k % 3 == 1 else 0.25) * term
+            if not _cosine_above(term, other, FACING):
+                total = total + term
+                lengths += sqrt(dot(term, term))
     square, scatter = dot(total, total), 1.0
     if square > 0:
         scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
         total = square / (scatter * scatter) * total
-    if kin.hoops:  # on the axis, contact acts along it
+    if kin.hoops:  # on the axis: along it
         total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
     return total, scatter
 
 
 @noinline
 def _is_hollow(bodies, n, normal, other):
-    """Return True if two of the faces towards another body around a node face each other."""
+    """Return True if two faces towards another body, around a node, face each other."""
     contact, kin, _ = bodies
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
@@ -244,21 +243,21 @@ def _is_hollow(bodies, n, normal, other):
 
 @noinline
 def _entering(bodies, n, other, velocity, least):
-    """Return the largest part of a velocity, above `least`, that enters a face towards `other`."""
+    """Return the largest part of a velocity, above `least`, into a face towards `other`."""
     contact, kin, _ = bodies
-    most, part = least, zero_vector(kin, 0.0)
+    most, inward = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
         face = _face(bodies, beside if inside else n)
         speed, square = -dot(face, velocity), dot(face, face)
         if inside and speed > most * sqrt(square) and _cosine_above(face, -1.0 * other, FACING):
             most = speed / sqrt(square)
-            part = (-speed / square) * face
-    return part
+            inward = (-speed / square) * face
+    return inward
 
 
 def _across(direction, other):
-    """Return the part of a vector that is perpendicular to another one."""
+    """Return the component of `direction` perpendicular to `other`."""
     square = dot(other, other)
     return direction - (dot(direction, other) / square if square > 0 else 0.0) * other
 
@@ -267,8 +266,8 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity to remove so that no face of a hollow corner is entered.
 
-    The remainder slides along one face, then along the edge of two, or is 0. It is perpendicular
-    to what is removed: one impulse along that direction removes all of it.
+    The remainder slides along one face, along the edge of two, or is 0. It is perpendicular to the
+    removed part, so one impulse removes all of that.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -280,10 +279,10 @@ def _entering_corner(bodies, n, other, velocity):
 
 
 @noinline
-def _normal_of_led(bodies, n, other, velocity, known):
-    """Return normal, scatter, and whether the corner is hollow, of a led body at node `n`."""
+def _normal_of_led(bodies, n, other, velocity, may_be_hollow):
+    """Return normal, scatter, and whether the corner is hollow, of a prescribed body."""
     normal, scatter = _normal(bodies, n, other)
-    hollow = known and scatter >= EDGE and _is_hollow(bodies, n, normal, other)
+    hollow = may_be_hollow and scatter >= EDGE and _is_hollow(bodies, n, normal, other)
     if hollow:
         into = _entering_corner(bodies, n, other, velocity)
         normal = -1.0 * into if dot(into, into) > 0 else normal
@@ -291,31 +290,31 @@ def _normal_of_led(bodies, n, other, velocity, known):
 
 
 @noinline
-def _pair_of(bodies, records, n, m, known):
-    """Pair the bodies at nodes `n` and `m` with velocities `records`; `known` ones limit faces."""
+def _pair_of(bodies, records, n, m, may_be_hollow):
+    """Pair the bodies at nodes `n` and `m`, with velocities `records`."""
     contact, kin, nodes = bodies
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
-    like = zero_vector(kin, 0.0)
-    relative = vector_at(kin, records, n, 0, like) - vector_at(kin, records, m, 0, like)
+    zero = zero_vector(kin, 0.0)
+    relative = vector_at(kin, records, n, 0, zero) - vector_at(kin, records, m, 0, zero)
     led_n, led_m = _led(contact, kin, n), _led(contact, kin, m)
     hollow = False
     if led_n and not led_m:
-        of_m, scatter_m = _normal(bodies, m, like)
-        of_n, scatter_n, hollow = _normal_of_led(bodies, n, of_m, -1.0 * relative, known)
+        of_m, scatter_m = _normal(bodies, m, zero)
+        of_n, scatter_n, hollow = _normal_of_led(bodies, n, of_m, -1.0 * relative, may_be_hollow)
         if hollow or scatter_n < EDGE:
             of_m = 0.0 * of_m
     elif led_m and not led_n:
-        of_n, scatter_n = _normal(bodies, n, like)
-        of_m, scatter_m, hollow = _normal_of_led(bodies, m, of_n, relative, known)
+        of_n, scatter_n = _normal(bodies, n, zero)
+        of_m, scatter_m, hollow = _normal_of_led(bodies, m, of_n, relative, may_be_hollow)
         if hollow or scatter_m < EDGE:
             of_n = 0.0 * of_n
     else:
-        of_n, scatter_n = _normal(bodies, n, like)
-        of_m, scatter_m = _normal(bodies, m, like)
+        of_n, scatter_n = _normal(bodies, n, zero)
+        of_m, scatter_m = _normal(bodies, m, zero)
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
-    # Opposite faces that end next to each other tilt to opposite sides: the difference does not.
+    # Opposite faces ending next to each other tilt to opposite sides; the difference does not.
     outward = of_n - of_m
     wall, yields = led_n != led_m, vector(kin, yielding)
     return NodePair(n, m, per_n, per_m, outward, scatter, yields, relative, wall, hollow)
@@ -328,7 +327,7 @@ def _left(pair, push):
 
 @noinline
 def _reach(bodies, outward, n, where, side):
-    """Return the distance from node `n` to its surface along the normal; `side` is 1 or -1."""
+    """Return the distance from node `n` to its surface along the normal; `side`: 1 or -1."""
     contact, _, nodes = bodies
     centre = field(nodes.fields, Centre)
     mean = 0.0
@@ -350,13 +349,13 @@ def _gap(bodies, outward, pair, where):
 def _directions(bodies, pair):
     """Return further directions along which bodies may be apart; zeros for none.
 
-    Along the grid axes gaps do not depend on where faces end. Where faces of both bodies end, the
-    vector between the mean positions leads across the gap; next to a plane face it does not.
+    Along grid axes gaps do not depend on where faces end. Where both bodies' faces end, the vector
+    between the mean positions leads across the gap; next to a plane face it does not.
     """
     _, kin, nodes = bodies
-    centre, like = field(nodes.fields, Centre), zero_vector(kin, 0.0)
-    between = pair.per_m * vector_at(kin, centre, pair.m, 0, like)
-    between = between - pair.per_n * vector_at(kin, centre, pair.n, 0, like)
+    centre, zero = field(nodes.fields, Centre), zero_vector(kin, 0.0)
+    between = pair.per_m * vector_at(kin, centre, pair.m, 0, zero)
+    between = between - pair.per_n * vector_at(kin, centre, pair.n, 0, zero)
     axes = range(kin.dimension)
     along = [[c if i == k else 0.0 for i, c in enumerate(between)] for k in axes]
     across = (1.0 if pair.scatter > EDGE else 0.0) * between
@@ -365,9 +364,9 @@ def _directions(bodies, pair):
 
 @noinline
 def _last_contact(bodies, pair, spreads):
-    """Return the last step of contact between two bodies at their nodes, 0 for none.
+    """Return the last step of contact of a pair at its nodes, 0 for none.
 
-    If it `spreads`, contact at the nodes that a moving rigid wall comes from counts as well.
+    If it `spreads`, contact at the nodes that a moving rigid wall comes from counts too.
     """
     contact, kin, nodes = bodies
     other = pair.m // contact.stride
@@ -384,7 +383,7 @@ def _last_contact(bodies, pair, spreads):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return the approach velocity above what closes the gap in a step; 0 for bodies apart."""
+    """Return the approach velocity beyond closing the gap in a step; 0 for bodies apart."""
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -393,7 +392,7 @@ def _excess_of(bodies, pair, where):
         return 0.0
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
     last = _last_contact(bodies, pair, memory > 1)
-    # Where three bodies meet, a pair may already have touched in this step.
+    # With three bodies, a pair may already have touched in this step.
     lasts = pair.wall and last > 0 and last >= where.step - memory
     if lasts and memory > 1:
         return approach / size
@@ -425,7 +424,7 @@ def _friction_of(pair, friction, push, slide, share):
 
 @noinline
 def _meet(contact, nodes, n):
-    """List the fields that meet at a position in `meeting`; return their number, 0 if not first."""
+    """List the fields at a position in `meeting`; return their number, 0 if not first."""
     if not nodes.sums[n, MASS] > 0:
         return 0
     a = n // contact.stride
@@ -441,29 +440,29 @@ def _meet(contact, nodes, n):
 
 
 @noinline
-def _node(contact, place, i):
-    return place + contact.meeting[i] * contact.stride
+def _node(contact, node, i):
+    return node + contact.meeting[i] * contact.stride
 
 
 @noinline
-def _count_partners(which, bodies, place, count):
-    """Count the approaching pairs, or those that have `Touched`, of each field."""
-    contact, found = bodies.contact, False
+def _count_partners(which, bodies, node, count):
+    """Count approaching, or `Touched`, pairs of each field; return whether any."""
+    contact, any_pair = bodies.contact, False
     contact.partners[:count] = 0
     for i in range(count):
-        n = _node(contact, place, i)
+        n = _node(contact, node, i)
         for j in range(i + 1, count):
             if isinstance(which, Touched):
                 belongs = abs(contact.touched[n, contact.meeting[j]]) == which.step
             else:
-                m = _node(contact, place, j)
+                m = _node(contact, node, j)
                 pair = _pair_of(bodies, bodies.nodes.update, n, m, True)
                 belongs = _excess_of(bodies, pair, which) > 0
             if belongs:
                 contact.partners[i] += 1
                 contact.partners[j] += 1
-                found = True
-    return found
+                any_pair = True
+    return any_pair
 
 
 @noinline
@@ -484,7 +483,6 @@ def _take(contact, control, side, k, impulse):
         return
     force = impulse / control.clock[0].kick
     add_to(control.totals, contact.slot[field_] + k, force)
-    # Torque about the two other axes.
     add_to(control.totals, contact.torque[field_] + (k + 1) % 3, x[(k + 2) % 3] * force)
     add_to(control.totals, contact.torque[field_] + (k + 2) % 3, -x[(k + 1) % 3] * force)
     if slot:
@@ -497,11 +495,11 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _touch_pair(bodies, control, i, j, where):
-    """Apply the impulse between the `i`-th and `j`-th of the fields that meet, shared by pairs."""
+    """Apply the impulse between the `i`-th and `j`-th of the meeting fields."""
     contact, kin, nodes = bodies
     share = _share(contact, i, j)
     a, b = contact.meeting[i], contact.meeting[j]
-    n, m = _node(contact, where.place, i), _node(contact, where.place, j)
+    n, m = _node(contact, where.node, i), _node(contact, where.node, j)
     pair = _pair_of(bodies, nodes.update, n, m, True)
     excess = _excess_of(bodies, pair, where)
     if not excess > 0:
@@ -510,10 +508,10 @@ def _touch_pair(bodies, control, i, j, where):
     normal = pair.outward._make([outward / size for outward in pair.outward])
     compliance = dot(normal, normal, pair.yielding)
     if not compliance > 0:
-        return  # both are prescribed
+        return  # both prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction does not act on the remaining approach: separate bodies may still come together.
+    # No friction on the remaining approach: separate bodies may still meet.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
@@ -521,8 +519,8 @@ def _touch_pair(bodies, control, i, j, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # Dissipated energy: impulse times the mean of the sliding speeds at both ends of the step.
-        # Forces within the bodies undo their change in between.
+        # Dissipation: impulse times the mean of the sliding speeds at both ends of the step. In
+        # between, internal forces undo their change.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
@@ -553,14 +551,14 @@ def _touch_place(bodies, control, count, where):
     contact, kin, nodes = bodies
     contact.partners[:count] = 1  # a single pair checks its approach itself
     for _ in range(REPEATS if count > 2 else 1):
-        if count > 2 and not _count_partners(where, bodies, where.place, count):
+        if count > 2 and not _count_partners(where, bodies, where.node, count):
             return
         contact.change[:count] = 0.0
         for i in range(count):
             for j in range(i + 1, count):
                 _touch_pair(bodies, control, i, j, where)
         for i in range(count):
-            n = _node(contact, where.place, i)
+            n = _node(contact, where.node, i)
             for k in range(kin.dimension):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
@@ -574,8 +572,8 @@ def touch_node(bodies, grids, control, n):
     if count > 1:
         grid = record(grids, n // contact.stride)
         step = int(control.values[TIMESTEP]) + 1
-        place, x = n % contact.stride, node_position(grid, n)
-        _touch_place(bodies, control, count, Where(place, x, grid.h, control.values[DT], step))
+        node, x = n % contact.stride, node_position(grid, n)
+        _touch_place(bodies, control, count, Where(node, x, grid.h, control.values[DT], step))
 
 
 @noinline
@@ -611,7 +609,6 @@ def _bodies(s):
     return Bodies(s.contact, s.kin, s.nodes)
 
 
-# Contact acts on v* and the velocity change of this step.
 SeparateFields.rows = (  # type: ignore[attr-defined]
     Once(_begin_forces),
     each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
@@ -622,8 +619,6 @@ SeparateFields.rows = (  # type: ignore[attr-defined]
 
 
 class ListedPairs(NamedTuple):
-    """Pairs of nodes where two fields meet."""
-
     nodes: np.ndarray  # (n, 2)
     normals: np.ndarray  # (n, d) unit normals from the first to the second body
     gaps: np.ndarray  # (n,) remaining distances
@@ -631,18 +626,18 @@ class ListedPairs(NamedTuple):
 
 @kernel
 def list_pairs(bodies, grids, spans, pairs):
-    """List the pairs of nodes where two fields meet in `pairs`; return their number."""
+    """Fill `pairs` with the pairs of nodes where two fields meet; return their number."""
     contact, kin, nodes = bodies
     count = 0
     for s in range(1, 1 + spans[0, 0]):
         for first in range(spans[s, 0], spans[s, 1]):
             meeting = _meet(contact, nodes, first)
-            place = first % contact.stride
+            node = first % contact.stride
             grid = record(grids, first // contact.stride)
-            where = Where(place, node_position(grid, first), grid.h, 1.0, 0)
+            where = Where(node, node_position(grid, first), grid.h, 1.0, 0)
             for i in range(meeting if meeting > 1 else 0):
                 for j in range(i + 1, meeting):
-                    n, m = _node(contact, place, i), _node(contact, place, j)
+                    n, m = _node(contact, node, i), _node(contact, node, j)
                     pair = _pair_of(bodies, nodes.update, n, m, False)
                     size = sqrt(dot(pair.outward, pair.outward))
                     if size > 0:
@@ -663,13 +658,13 @@ def list_pairs(bodies, grids, spans, pairs):
 
 @noinline
 def _stay_pair(bodies, i, j, pair, sticks):
-    """Remove the pair's part of the velocity across the surface, or all that v* lacks."""
+    """Remove a pair's velocity across the surface, or all of it that v* lacks."""
     contact, kin, nodes = bodies
     share, taken = _share(contact, i, j), pair.relative
     if pair.hollow:
-        like = zero_vector(kin, 0.0)
-        free = vector_at(kin, nodes.update, pair.n, 0, like)
-        free = free - vector_at(kin, nodes.update, pair.m, 0, like)
+        zero = zero_vector(kin, 0.0)
+        free = vector_at(kin, nodes.update, pair.n, 0, zero)
+        free = free - vector_at(kin, nodes.update, pair.m, 0, zero)
         if dot(free, free) > 0:
             taken = taken - dot(taken, free) / dot(free, free) * free
     across = dot(pair.outward, pair.relative)
@@ -687,28 +682,27 @@ def _stay_pair(bodies, i, j, pair, sticks):
 
 
 @noinline
-def _stay_place(bodies, place, count, step):
+def _stay_place(bodies, node, count, step):
     contact, kin, nodes = bodies
-    if not _count_partners(Touched(step), bodies, place, count):
+    if not _count_partners(Touched(step), bodies, node, count):
         return
     for _ in range(REPEATS if count > 2 else 1):
         contact.change[:count] = 0.0
         for i in range(count):
-            n = _node(contact, place, i)
+            n = _node(contact, node, i)
             for j in range(i + 1, count):
                 touched = contact.touched[n, contact.meeting[j]]
                 if abs(touched) == step:
-                    pair = _pair_of(bodies, nodes.velocity, n, _node(contact, place, j), True)
+                    pair = _pair_of(bodies, nodes.velocity, n, _node(contact, node, j), True)
                     _stay_pair(bodies, i, j, pair, touched < 0)
         for i in range(count):
-            n = _node(contact, place, i)
+            n = _node(contact, node, i)
             for k in range(kin.dimension):
                 nodes.velocity[n, k] += contact.change[i, k]
 
 
 @noinline
 def stay_node(bodies, step, n):
-    """Apply `_stay` at the position of node `n`, if contact acted there in `step`."""
     count = _meet(bodies.contact, bodies.nodes, n)
     if count > 1:
         _stay_place(bodies, n % bodies.contact.stride, count, step)
@@ -717,15 +711,14 @@ def stay_node(bodies, step, n):
 def _stay(steps):
     """Prevent the deforming velocity from opening or closing active contacts.
 
-    If it is mapped separately from v*, the surfaces seem to move although they are pressed
-    together, and stress does spurious work: a collision of bars then quadruples their energy, or
-    doubles it if only approach is removed. `steps` is 1 if v* of this step is known, else 0: then
-    the contacts of the last step count.
+    Mapped separately from v*, it would move surfaces that are pressed together, and stress would do
+    spurious work: a collision of bars quadruples their energy, or doubles it if only approach is
+    removed. `steps` is 1 if v* of this step is known, else 0: then the last step's contacts count.
     """
 
     def stay(s, n):
         step = int(s.control.values[TIMESTEP]) + steps
-        if step > 0:  # contact is possible from the first step
+        if step > 0:  # no contact before the first step
             stay_node(_bodies(s), step, n)
 
     return (each_node(stay),)

@@ -29,20 +29,20 @@ def export_state(matter, out):
 
 
 @kernel
-def export(what, times_volume, matter, out):
-    """Fill ``out`` (n,) with a column, times reference volume if ``times_volume``."""
+def export(quantity, times_volume, matter, out):
+    """Fill ``out`` (n,) with a column; ``times_volume``: times reference volume."""
     kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
-        number = law_functions.shown(what, law, kin, state)
+        number = law_functions.shown(quantity, law, kin, state)
         out[p] = (
             points.mass[p] * law_functions.specific_volume(law) * number if times_volume else number
         )
 
 
 @kernel
-def impose_stress(matter, chosen, given, stress):
-    """Set components ``given`` (6,) of the Cauchy stress of chosen points to ``stress`` (n, 6)."""
+def impose_stress(matter, chosen, components, stress):
+    """Set ``components`` (6,) of the Cauchy stress of chosen points to ``stress`` (n, 6)."""
     kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         if not chosen[p]:
@@ -50,7 +50,7 @@ def impose_stress(matter, chosen, given, stress):
         law, state = state_at(kin, points, laws, p)
         old = law_functions.cauchy_stress(law, kin, state)
         for k in range(len(old)):
-            if not given[k]:
+            if not components[k]:
                 stress[p, k] = old[k]
         store(points.state, p, law_functions.with_stress(law, kin, state, row(stress, p, 0, old)))
 
@@ -88,8 +88,8 @@ def export_to_nodes(at, values, unit, out):
         grid = record(grids, index(grid_of[p]))
         stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
         for k in range(support(basis, kin)):
-            part = entry(basis, kin, grid, stencil, k)
-            n, value = index(part[0]), part[1] * values[p]
+            node_weight = entry(basis, kin, grid, stencil, k)
+            n, value = index(node_weight[0]), node_weight[1] * values[p]
             units = (value + whole) - whole
             out[n, 0] += units
             out[n, 1] += ((value - units) + fine) - fine
@@ -102,9 +102,9 @@ def export_velocity_moment(at, gradients, out):
     flat = planar(kin)
     for p in range(out.shape[1]):
         grid = record(grids, index(grid_of[p]))
-        place = place_at(basis, kin, where, p)
-        stencil = locate(basis, kin, grid, place)
-        total = zero(flat, place[0])
+        position = place_at(basis, kin, where, p)
+        stencil = locate(basis, kin, grid, position)
+        total = zero(flat, position[0])
         gradient = load(gradients, p, total)
         for k in range(support(basis, kin)):
             weight = entry(basis, kin, grid, stencil, k)[1]

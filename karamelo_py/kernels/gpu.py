@@ -1,10 +1,9 @@
 """A step on a GPU: functions of one thread for a point, a cell, a node, or the clock.
 
-Points belong to cells, numbered by the first node that a point sees; all points of a cell see the
-same nodes. Before each scatter points are sorted by cell (counting sort), then by id. One thread
-sums what a cell's points give to each of its nodes, another sums at a node over cells. No two
-threads add to one real number: results are reproducible, and independent of the order of points
-in memory.
+A cell is numbered by the first node its points see; all its points see the same nodes. Before each
+scatter a counting sort orders points by cell, then by id. One thread sums what a cell's points give
+to each of its nodes, another sums at a node over cells. No two threads add to one real number:
+results are reproducible, and independent of the order in memory.
 
 `fate` (5,) has errors and extremes; after the last step, threads do nothing.
 """
@@ -22,7 +21,7 @@ from karamelo_py.compiler.tuples import flat, nested_as, record
 from karamelo_py.kernels import sweep
 from karamelo_py.kernels.arrays import DT, TIME, Nodes
 from karamelo_py.kernels.clock import finish, kick, last_step_size, step_size
-from karamelo_py.kernels.equations import found, load_all, scattered_all, updated_all
+from karamelo_py.kernels.equations import load_all, node_array, scattered_all, updated_all
 from karamelo_py.kernels.equations.node_updates import at_node
 from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.stencils import gathered_by
@@ -41,7 +40,7 @@ WARP = 32  # threads that read memory together
 OCCUPIED = 1 << 40  # in `CellLists.sums`: added per cell with points
 
 
-# Stages of a step in `karamelo-py bench`, by function.
+# Stages shown by `karamelo-py bench`, by function.
 STAGES = {
     "gather_point": "gather from the nodes, update of points",
     "load_point": "loads of points",
@@ -63,7 +62,7 @@ OTHERS = "clock, reports, totals"
 class CellLists(NamedTuple):
     """The n points of a block by cell, of N nodes; corner c of point p is listed as c n + p."""
 
-    count: np.ndarray  # (N,) int32: points of each cell that are not yet listed
+    count: np.ndarray  # (N,) int32: points of each cell not yet listed
     number: np.ndarray  # (n,) int32: the cell of each point
     first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
     box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; then the count
@@ -76,7 +75,6 @@ class CellLists(NamedTuple):
 
 
 def nodes_in_cell(basis: Any, kin: Any) -> int:
-    """Count the nodes of a cell."""
     return basis.line_nodes**kin.dimension
 
 
@@ -85,7 +83,7 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 
 @functools.cache  # one for all launches
 def while_steps_go_on(function: Callable) -> Callable:
-    """Make a thread function that does nothing once the steps have ended."""
+    """Return a thread function that does nothing once the steps have ended."""
 
     def go_on(i, fate, *arguments):
         if fate[STATUS] == 0:
@@ -97,7 +95,7 @@ def while_steps_go_on(function: Callable) -> Callable:
 
 
 def goes_wrong(fate, number):
-    """Note the number of a failed point: the lowest remains."""
+    """Note the number of a failed point; the lowest remains."""
     raise_to(fate, WRONG, BEHIND - float(number))
 
 
@@ -111,7 +109,7 @@ def _report(fate, number, moved, rate, stride):
 
 
 def is_last(s):
-    """Return True in the last step of the run: nothing is summed for a next one."""
+    """Return True in the last step: nothing is summed for a next one."""
     values = s.control.values
     return values[TIME] + values[DT] >= s.control.clock[0].end_time
 
@@ -119,7 +117,7 @@ def is_last(s):
 class Stage:
     """A visit of the points as thread functions.
 
-    `columns` are the columns of nodes that it sums: (array, column, whether it adds), of the arrays
+    `columns`: (array, column, whether it adds) of each column of nodes it sums, of the arrays
     `present`. The nodes of a cell are summed in `parts`.
     """
 
@@ -169,7 +167,7 @@ class Stage:
             pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
             x = sweep.position_of(pt.w, pt.p)
             totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
-            # From zero: the largest so far would depend on the order of threads.
+            # From zero: the largest so far depends on the order of threads.
             moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
             _report(fate, block.points.id[pt.p], moved, rate, c.stride)
             keep(pt, cells)
@@ -178,15 +176,15 @@ class Stage:
             points = block.points
             c, pt = point(s, block, index(i))
             where = place(pt)
-            found = inside(pt.w.grid, c.kin, where)
+            is_inside = inside(pt.w.grid, c.kin, where)
             for k in range(corners):
-                number = 0  # of a run that ends here
-                if found:
+                number = 0  # the run ends
+                if is_inside:
                     stencil = locate(c.basis, c.kin, pt.w.grid, where)
                     number = entry(c.basis, c.kin, pt.w.grid, stencil, k * count)[0]
                 cells.number[index(k * points.mass.size + i)] = number
                 counted(cells.count, number, 1)
-            if not found:
+            if not is_inside:
                 goes_wrong(fate, points.id[pt.p])
 
         self._point, self._place = point, place
@@ -194,7 +192,7 @@ class Stage:
         self.gather, self.count = gather_point, count_point
 
     def scatter(self, part: int) -> Callable:
-        """Make the function of a cell: sum its points' contributions to a part of its nodes."""
+        """Return the function of a cell that sums over its points at a part of its nodes."""
         point, place, quantities = self._point, self._place, self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
@@ -242,16 +240,15 @@ class Stage:
 
     @property
     def numbers(self) -> int:
-        """Return the most numbers that a cell sums in a part."""
         return len(self.columns) * -(-self.support // self.parts)
 
     def nodes_of(self, part: int) -> tuple[int, int]:
-        """Return the range of the stencil that is summed in a part."""
+        """Return the range of stencil nodes summed in a part."""
         count = self.support
         return count * part // self.parts, count * (part + 1) // self.parts
 
     def sum(self, part: int, anew: bool) -> Callable:
-        """Make the function of a node: sum over cells, `anew` from zero."""
+        """Return the function of a node that sums over cells, `anew` from zero."""
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(part)
 
@@ -264,7 +261,7 @@ class Stage:
                 cell = i - _steps_to(s, grid, k)
                 totals = _with_cell(totals, cells, cell, k - begin, end - begin)
             for (name, column, add), value in zip(columns, totals, strict=True):
-                array = found(at(s).nodes, name)
+                array = node_array(at(s).nodes, name)
                 if add or not anew:
                     array[index(i), column] += value
                 else:
@@ -273,7 +270,7 @@ class Stage:
         return sum_node
 
     def age(self) -> Callable:
-        """Make the function of a node before marking: 2 is used, 1 to be cleared, 0 unused."""
+        """Return the function of a node before marking: 2 used, 1 to be cleared, 0 unused."""
         only_if_more = self.row.only_if_more
 
         def age_node(i, fate, s, use):
@@ -283,7 +280,7 @@ class Stage:
         return age_node
 
     def mark(self) -> Callable:
-        """Make the function of a cell that marks its nodes as used."""
+        """Return the function of a cell that marks its nodes as used."""
         count, only_if_more = self.support, self.row.only_if_more
 
         def mark_nodes(i, fate, s, cells, use):
@@ -310,7 +307,7 @@ def _steps_to(s, grid, k):
 
 
 def _with_cell(totals, cells, cell, first, step):
-    """Add the sums of a cell, in the rows `first`, `first` + `step`, ... of its box."""
+    """Add a cell's sums, from rows `first`, `first` + `step`, ... of its box."""
     box = cells.box[index(max(cell, 0))]
     occupied = (box >= 0) & (cell >= 0)
     at = index(max(box, 0))
@@ -330,7 +327,6 @@ def _weight(number):
 
 
 def sum_counts(i, fate, cells):
-    """Sum a chunk of counts."""
     total = 0
     for c in range(i * CHUNK, min((i + 1) * CHUNK, cells.count.size)):
         total += _weight(cells.count[c])
@@ -338,7 +334,7 @@ def sum_counts(i, fate, cells):
 
 
 def sum_sums(i, fate, cells, level):
-    """Sum a chunk of sums: `level` is where they begin, their count, and where the next begin."""
+    """Sum a chunk of sums; `level`: where they begin, their count, where the next begin."""
     begin, count, above = level
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
@@ -347,7 +343,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Find the prefix sum of a chunk; `above` is the level above, -1 if there is none."""
+    """Find a chunk's prefix sum; `above` is the level above, -1 if there is none."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -356,23 +352,22 @@ def sum_before(i, fate, cells, begin, above):
 
 
 def place_list(i, fate, cells):
-    """Set where the points of a cell are listed, and the number of its box."""
+    """Set where a cell's points are listed, and the number of its box."""
     chunk = i // CHUNK
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):
         total += _weight(cells.count[c])
-    first, own, box = total % OCCUPIED, cells.count[i], total // OCCUPIED
+    first, count, box = total % OCCUPIED, cells.count[i], total // OCCUPIED
     cells.first[i] = first
-    cells.box[i] = box if own > 0 else -1
-    if own > 0:
+    cells.box[i] = box if count > 0 else -1
+    if count > 0:
         cells.cell[box] = i
     if i + 1 == cells.count.size:
-        cells.first[i + 1] = first + own
-        cells.box[i + 1] = box + (1 if own > 0 else 0)
+        cells.first[i + 1] = first + count
+        cells.box[i + 1] = box + (1 if count > 0 else 0)
 
 
 def list_point(i, fate, cells):
-    """Enter a point into the list of its cell."""
     c = cells.number[i]
     cells.order[cells.first[c] + counted(cells.count, c, -1) - 1] = i
 
@@ -382,7 +377,7 @@ def _point_and_corner(corners, count, listed):
 
 
 def sort_cell(corners: int) -> Callable:
-    """Make the function that sorts the points of a cell by id (and their corners)."""
+    """Return the function that sorts a cell's points by id (and corners)."""
 
     def key(ids, listed):
         p, corner = _point_and_corner(corners, ids.size, listed)
@@ -395,9 +390,9 @@ def sort_cell(corners: int) -> Callable:
         first, last = cells.first[c], cells.first[c + 1]
         for q in range(first + 1, last):
             p = cells.order[q]
-            own = key(ids, p)
+            this_key = key(ids, p)
             at = q
-            while at > first and key(ids, cells.order[at - 1]) > own:
+            while at > first and key(ids, cells.order[at - 1]) > this_key:
                 cells.order[at] = cells.order[at - 1]
                 at -= 1
             cells.order[at] = p
@@ -412,7 +407,6 @@ def sort_cell(corners: int) -> Callable:
 
 
 def order_cell(i, fate, cells, come_from):
-    """Find the new places of a cell's points."""
     boxes = cells.box[cells.box.size - 1]
     if i >= boxes:
         return
@@ -433,14 +427,12 @@ def order_cell(i, fate, cells, come_from):
 
 
 def take_rows(i, fate, rows, come_from, room):
-    """Copy the numbers of the point that moves to place `i`."""
     p = index(come_from[i])
     for k in range(rows.shape[0]):
         room[k, i] = rows[k, p]
 
 
 def put_rows(i, fate, rows, room):
-    """Copy the numbers of a point to its new place."""
     for k in range(rows.shape[0]):
         rows[k, i] = room[k, i]
 
@@ -449,7 +441,7 @@ def put_rows(i, fate, rows, room):
 
 
 def of_nodes(row: Any) -> Callable:
-    """Make the function of a node for a `NodeTask`."""
+    """Return the function of a node for a `NodeTask`."""
     task, at, length = row.task, row.at or (lambda s: s), row.length or kick
     made = task if callable(task) else lambda s: task
 
@@ -466,7 +458,7 @@ def clear(i, fate, array, first):
 
 
 def take_reports(take: Callable) -> Callable:
-    """Make the function that passes the reports of a visit to the clock."""
+    """Return the function that passes a visit's reports to the clock."""
 
     def take_all_reports(i, fate, s):
         clock = s.control.clock[0]
@@ -482,13 +474,11 @@ def take_reports(take: Callable) -> Callable:
 
 
 def finish_step(i, fate, s):
-    """End a step: advance time, choose dt."""
     fate[DRIFT] += s.control.clock[0].move
     finish(s.control)
 
 
 def end_step(i, fate, s):
-    """Set the status if the run ends."""
     clock = s.control.clock[0]
     if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
         fate[STATUS] = 1.0 + ABOVE_LIMIT

@@ -1,7 +1,7 @@
 """Hooks of fixes, totals and the energy monitor on a GPU: functions of one thread.
 
-Members are processed one by one by the functions of :mod:`karamelo_py.kernels.hook_loop`, with
-private scratch. Totals are sums of integers, in any order; several copies spread the traffic.
+The functions of :mod:`karamelo_py.kernels.hook_loop` process members one by one, with private
+scratch. Totals are sums of integers, in any order; several copies spread the traffic.
 """
 
 from collections.abc import Callable
@@ -39,10 +39,10 @@ def _control(count: int) -> Callable:
         return room
 
     def control_of(s, copies, i):
-        own = copies[index((i // 32) % len(copies))]
+        copy = copies[index((i // 32) % len(copies))]
         if count:
-            return with_items(s.control, totals=own, values=own_values(s.control.values))
-        return with_items(s.control, totals=own)
+            return with_items(s.control, totals=copy, values=own_values(s.control.values))
+        return with_items(s.control, totals=copy)
 
     return control_of
 
@@ -53,9 +53,9 @@ _CONTROL = _control(0)
 # --- nodes ------------------------------------------------------------------------------------
 
 
-def clear_held(i, fate, held):
-    for c in range(held.shape[1]):
-        held[i, c].slot = 0
+def clear_held(i, fate, holders):
+    for c in range(holders.shape[1]):
+        holders[i, c].slot = 0
 
 
 class Act(NamedTuple):
@@ -78,38 +78,38 @@ def count_node(i, fate, s, about):
 
 
 def hooked_nodes(target: int, of_heat: bool = False) -> Callable:
-    """Make the argument of hooks on node components; temperatures as in FLIP."""
+    """Return the `nodes_of` of hooks on node components; temperatures as in FLIP."""
     return lambda s: hook_loop.hooked_nodes(s, target, 1.0 if of_heat else s.control.clock[0].kept)
 
 
 def whole_nodes(target: int, stage: int) -> Callable:
-    """Make the argument of hooks on whole nodes."""
+    """Return the `nodes_of` of hooks on whole nodes."""
     return lambda s, tag: hook_loop.whole_nodes(s, tag, stage, target)
 
 
 def work_of_loads(i, fate, s, about):
     """Sum the work of loads on a node, and clear them."""
     if s.nodes.sums[i, arrays.MASS] > 0:
-        own = _hooks_with_room(about.hooks)
-        own.chosen[0] = i
-        call = hook_loop.Call(own, _CONTROL(s, about.copies, i), float(kick(s)), 0, 1.0)
+        hooks = _hooks_with_room(about.hooks)
+        hooks.chosen[0] = i
+        call = hook_loop.Call(hooks, _CONTROL(s, about.copies, i), float(kick(s)), 0, 1.0)
         hook_loop.act(hook_loop.hooked_nodes(s, hook_loop.LOADS, 0.0), hook_loop.ACT, call, 1)
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
-    """Make the function of a member of a hook on nodes, ACT or RUB, acting for `length`."""
+    """Return the function of a member of a hook on nodes, ACT or RUB, acting for `length`."""
     control_of = _control(values)
 
     def visit_member(i, fate, s, about, *tag):
         hooks = about.hooks
         n = _member(hooks, about.h, i)
         if s.nodes.sums[n, arrays.MASS] > 0:
-            own = _hooks_with_room(hooks)
-            own.chosen[0] = n
+            private = _hooks_with_room(hooks)
+            private.chosen[0] = n
             shared = hooks.table[about.h].uses_share
             share = 1.0 / max(about.heavy[about.h], 1) if shared else 1.0
             control = control_of(s, about.copies, i)
-            call = hook_loop.Call(own, control, float(length(s)), about.h, share)
+            call = hook_loop.Call(private, control, float(length(s)), about.h, share)
             hook_loop.act(nodes_of(s, *tag), task, call, 1)
 
     return visit_member
@@ -119,7 +119,6 @@ def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = k
 
 
 def clear_force(i, fate, s, block):
-    """Clear the force of fixes on a point."""
     force = field(block.points.fields, Force)
     if force is not None:
         for c in range(s.kin.dimension):
@@ -127,29 +126,28 @@ def clear_force(i, fate, s, block):
 
 
 def whole_points(heats: bool) -> Callable:
-    """Make the argument of hooks on whole points."""
+    """Return the `points_of` of hooks on whole points."""
     return lambda s, block, then, tag: hook_loop.whole_points(
         tag, s, block, then, heat_of(block.points) if heats else ()
     )
 
 
 def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
-    """Make the function of a point for a hook on ``points_of(s, block, then)``."""
+    """Return the function of a point for a hook on ``points_of(s, block, then)``."""
     control_of = _control(values)
 
     def visit_point(i, fate, s, block, about, *tag):
-        own, control = _hooks_with_room(about.hooks), control_of(s, about.copies, i)
-        what = points_of(s, block, then, *tag)
-        call = hook_loop.Call(own, control, float(step_size(s)), about.h, 1.0)
-        count, _ = hook_loop.choose_points(what, call, i, i + 1)
+        hooks, control = _hooks_with_room(about.hooks), control_of(s, about.copies, i)
+        members = points_of(s, block, then, *tag)
+        call = hook_loop.Call(hooks, control, float(step_size(s)), about.h, 1.0)
+        count, _ = hook_loop.choose_points(members, call, i, i + 1)
         if count > 0:
-            hook_loop.act(what, hook_loop.ACT, call, 1)
+            hook_loop.act(members, hook_loop.ACT, call, 1)
 
     return visit_point
 
 
 def check_point(i, fate, s, block):
-    """Check the new position of a point again."""
     points = block.points
     cells, good = checked_move(move_check(s), points, i)
     if good:
@@ -159,7 +157,6 @@ def check_point(i, fate, s, block):
 
 
 def take_moves(i, fate, s):
-    """Accept the distances that points have moved."""
     clock = s.control.clock[0]
     clock.move = max(clock.move, fate[MOVED])
     fate[MOVED] = 0.0
@@ -174,9 +171,9 @@ def _setup(s: arrays.Setup) -> Callable:
     def contact_of(s):
         if fields == 0:
             return s.contact
-        own = room_for(2, (0,) * fields)
+        scratch = room_for(2, (0,) * fields)
         change = room_for(d, (0.0,) * fields)
-        return with_items(s.contact, meeting=own[:, 0], partners=own[:, 1], change=change)
+        return with_items(s.contact, meeting=scratch[:, 0], partners=scratch[:, 1], change=change)
 
     def setup_of(s, copies, i):
         return with_items(s, contact=contact_of(s), control=_CONTROL(s, copies, i))
@@ -185,7 +182,7 @@ def _setup(s: arrays.Setup) -> Callable:
 
 
 def each_node(function: Callable, s: arrays.Setup) -> Callable:
-    """Make the function of a node for an `EachNode`."""
+    """Return the function of a node for an `EachNode`."""
     setup_of = _setup(s)
 
     def visit_each_node(i, fate, s, use, copies):
@@ -196,7 +193,7 @@ def each_node(function: Callable, s: arrays.Setup) -> Callable:
 
 
 def each_point(function: Callable, s: arrays.Setup) -> Callable:
-    """Make the function of a point for an `EachPoint`."""
+    """Return the function of a point for an `EachPoint`."""
     setup_of = _setup(s)
 
     def visit_each_point(i, fate, s, block, copies):
@@ -206,8 +203,6 @@ def each_point(function: Callable, s: arrays.Setup) -> Callable:
 
 
 def once(function: Callable) -> Callable:
-    """Make the function for a `Once`."""
-
     def do_once(i, fate, s):
         function(s)
 
@@ -218,19 +213,18 @@ def once(function: Callable) -> Callable:
 
 
 def clear_totals(i, fate, copies, first, count):
-    """Clear a number of `count` rows of totals, from `first` on, in all copies."""
+    """Clear a number of `count` rows of totals, from row `first` on, in all copies."""
     limbs = copies.shape[2]
     k, rest = i // (count * limbs), i % (count * limbs)
     copies[k, first + rest // limbs, rest % limbs] = 0
 
 
 def clear_rows(i, fate, sums, first):
-    """Clear a number of the totals, from row `first` on."""
     sums[first + i // sums.shape[1], i % sums.shape[1]] = 0
 
 
 def collect_total(i, fate, copies, sums, first):
-    """Sum a number of the totals over the copies."""
+    """Sum a number of the totals over the copies, and clear those."""
     row, limb = first + i // copies.shape[2], i % copies.shape[2]
     total = sums[row, limb]
     for k in range(copies.shape[0]):
@@ -240,7 +234,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish the totals of hooks: `which` is their range, and if not only at the end of a run."""
+    """Publish totals of hooks; `which`: their range, and whether not only at the end of a run."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):
@@ -251,10 +245,10 @@ def publish(i, fate, s, hooks, which):
 
 
 def add_energies(i, fate, s, block, copies):
-    """Sum energies of every `CHUNK`-th point, and mass and momentum of their solids."""
+    """Sum energies of every `CHUNK`-th point, and mass and momentum of the solids."""
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
     threads = -(-points.mass.size // CHUNK)
-    own = copies[index(i % len(copies))]
+    copy = copies[index(i % len(copies))]
     firsts, first_row = s.control.firsts, s.control.values.size
     kinetic = stored = 0.0
     solid, begin, behind = -1, 0, 0
@@ -264,28 +258,28 @@ def add_energies(i, fate, s, block, copies):
         kinetic += of_motion
         stored += of_strain
         if not begin <= points.id[p] < behind:
-            _add_all(own, first_row, solid, total)
+            _add_all(copy, first_row, solid, total)
             total = (0.0,) * (1 + kin.dimension)
             solid = watch.solid_of(firsts, points.id[p])
             begin, behind = firsts[solid], firsts[solid + 1]
         more = zip(total, (mass, *[mass * x for x in v]), strict=True)
-        total = tuple([part + x for part, x in more])
+        total = tuple([old + x for old, x in more])
         more = zip(of_all, (elastic, *[elastic * x for x in v]), strict=True)
-        of_all = tuple([part + x for part, x in more])
-    totals.add_to(own, totals.KINETIC, kinetic)
-    totals.add_to(own, totals.STORED, stored)
-    _add_all(own, first_row, solid, total)
-    _add_all(own, first_row, firsts.size - 1, of_all)
+        of_all = tuple([old + x for old, x in more])
+    totals.add_to(copy, totals.KINETIC, kinetic)
+    totals.add_to(copy, totals.STORED, stored)
+    _add_all(copy, first_row, solid, total)
+    _add_all(copy, first_row, firsts.size - 1, of_all)
 
 
-def _add_all(own, first_row, solid, total):
+def _add_all(copy, first_row, solid, total):
     if solid >= 0:
         for k, number in enumerate(total):
-            totals.add_to(own, first_row + solid * len(total) + k, number)
+            totals.add_to(copy, first_row + solid * len(total) + k, number)
 
 
 def add_work(i, fate, s, block, copies):
-    """Add the work of forces on a point to the work of loads on nodes."""
+    """Add the work of forces on a point to the total."""
     work = field(block.points.fields, WorkOfForces)
     if work is not None:
         totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))
@@ -293,7 +287,7 @@ def add_work(i, fate, s, block, copies):
 
 
 def look_before(i, fate, s):
-    """Store the energies before a look at the next step."""
+    """Store the energies for a look at the next step."""
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)
     watch.note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))

@@ -1,7 +1,7 @@
 """Heat flow through the nodes: its rows, and the fixes that act on it.
 
-A temperature is to a heat capacity what a velocity is to a mass: nodes of heat are `Nodes` with one
-component, and loops over nodes and fixes of velocities serve them, too. Equations:
+A temperature is to heat capacity what a velocity is to mass: nodes of heat are `Nodes` with one
+component, which the loops for velocities also serve. Equations:
 :mod:`karamelo_py.kernels.equations.heat`.
 """
 
@@ -25,7 +25,7 @@ from karamelo_py.points.kinematics import Line
 
 @point_function(otherwise=True)
 def at_heat_nodes(hooks, stage, target, s):
-    """Let fixes act on the nodes of heat."""
+    """Apply fixes to the nodes of heat."""
 
 
 @at_heat_nodes.on(arrays.Hooks)
@@ -43,10 +43,9 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
 
 
 def heated(s, block, then):
-    """Return the argument of fixes that heat points."""
     points = block.points
-    own = [field(points.fields, kind) for kind in of_heat.HEATED]
-    return hook_loop.HeatedPoints(points.id, s.kin, *own, points.x[s.control.clock[0].now])
+    fields = [field(points.fields, kind) for kind in of_heat.HEATED]
+    return hook_loop.HeatedPoints(points.id, s.kin, *fields, points.x[s.control.clock[0].now])
 
 
 def heat_of(points):
@@ -55,7 +54,7 @@ def heat_of(points):
 
 @point_function(otherwise=True)
 def at_heated_points(hooks, s):
-    """Let fixes supply heat to points, or set their temperature."""
+    """Apply fixes that supply heat to points, or set their temperature."""
 
 
 @at_heated_points.on(arrays.Hooks)
@@ -73,24 +72,21 @@ def _of_heat(s):
 
 
 def at_its_nodes(s):
-    """Return the setup with the nodes of heat, which have one component."""
+    """Return the setup with the nodes of heat (one component)."""
     return _of_heat(s)._replace(kin=Line())
 
 
 def _take_factor(clock):
-    # The rate reported by `Warming`: how much faster conduction has become.
+    # Reported by `Warming`: how much faster conduction has become.
     clock.heat_limit = clock.heat_reference / clock.new_rate
 
 
 class AtHeatNodes(NamedTuple):
-    """Fixes act on the nodes of heat."""
-
     stage: int
     target: int
 
 
-class AtHeatedPoints(NamedTuple):
-    """Fixes supply heat to points, or set their temperature."""
+class AtHeatedPoints(NamedTuple): ...
 
 
 @take.on(AtHeatNodes, Processor)
@@ -122,7 +118,6 @@ FLOW_TO_NODES = (
 )
 # Fixes hold the new temperature of nodes.
 HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE)
-# Points take the change of the nodal temperature.
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
 

@@ -1,8 +1,7 @@
 """The loop of compiled hooks of fixes over members of groups, at nodes and at points.
 
-Hooks act on a tuple (`HookedNodes`, `MovingPoints`, `HeatedPoints`), whose class determines how
-members are chosen and a block of them is processed. `karamelo_py.kernels.hooks` describes the
-functions of hooks.
+The class of `members` (`HookedNodes`, `MovingPoints`, `HeatedPoints`, ...) selects how a block of
+them is chosen and processed. `karamelo_py.kernels.hooks` describes the functions of hooks.
 """
 
 from typing import NamedTuple
@@ -29,13 +28,13 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import is_rigid
 
-# Bare numbers would each be a type.
+# Each bare number would be a type.
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
 END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # task for the members of a hook
-LOADS = 3  # as a target: for all nodes
+LOADS = 3  # a target: all nodes
 DONE = -1  # instead of a stage
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
@@ -54,7 +53,7 @@ class Call(NamedTuple):
 
 
 class HookedNodes(NamedTuple):
-    """Nodes that node functions change, also nodes of heat."""
+    """Nodes for node functions, also nodes of heat."""
 
     target: int  # `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`, or `LOADS`
     kin: NamedTuple
@@ -67,11 +66,11 @@ class HookedNodes(NamedTuple):
 
 
 class WholeNodes(HookedNodes):
-    """Nodes that functions of whole nodes change; `tag` of `kinds.vector_hook`."""
+    """Nodes for functions of whole nodes; `tag` of `kinds.vector_hook`."""
 
 
 class MovingPoints(NamedTuple):
-    """Points whose velocity point functions change; `y` has corners after the d coordinates."""
+    """Points for point functions; in `y`, corners follow the d coordinates."""
 
     ids: np.ndarray
     v: np.ndarray  # (d, n)
@@ -83,7 +82,7 @@ class MovingPoints(NamedTuple):
 
 
 class WholePoints(NamedTuple):
-    """Points of one law that functions of whole points change."""
+    """Points of one law for functions of whole points."""
 
     tag: NamedTuple  # of `kinds.vector_hook`
     ids: np.ndarray
@@ -95,7 +94,7 @@ class WholePoints(NamedTuple):
 
 
 class HeatedPoints(NamedTuple):
-    """Points that heat functions change."""
+    """Points for heat functions."""
 
     ids: np.ndarray
     kin: NamedTuple
@@ -110,99 +109,103 @@ class HeatedPoints(NamedTuple):
 # --- the loop ---------------------------------------------------------------------------------
 
 
-def _turns(what, k, parts):
+def _turns(members, k, parts):
     """Return begin, end and stride of the chunks of thread `k` of `parts`."""
-    if isinstance(what, HookedNodes):
-        shares = what.ranges[0, 0]
+    if isinstance(members, HookedNodes):
+        shares = members.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-    # Interleaved, because members may be clustered.
-    size = TURN if parts > 1 else max(what.ids.size, 1)
-    return k * size, what.ids.size, parts * size
+    # Interleaved: members may be clustered.
+    size = TURN if parts > 1 else max(members.ids.size, 1)
+    return k * size, members.ids.size, parts * size
 
 
-def _bounds(what, turn, parts):
-    if isinstance(what, HookedNodes):
-        return what.ranges[turn, 0], what.ranges[turn, 1]
-    return turn, min(turn + TURN, what.ids.size) if parts > 1 else what.ids.size
+def _bounds(members, turn, parts):
+    if isinstance(members, HookedNodes):
+        return members.ranges[turn, 0], members.ranges[turn, 1]
+    return turn, min(turn + TURN, members.ids.size) if parts > 1 else members.ids.size
 
 
 @point_function()
-def act(what, task, call, count):
-    """Do `task` with the chosen members and add to totals; return how many count."""
+def act(members, task, call, count):
+    """Do `task` with the chosen members, add to totals; return how many count."""
 
 
 @noinline
-def _act_on_part(what, task, call, k, parts):
-    found = 0
+def _act_on_part(members, task, call, k, parts):
+    total = 0
     call.hooks.scratch[:6] = 0.0
-    first, last, step = _turns(what, k, parts)
+    first, last, step = _turns(members, k, parts)
     for turn in range(first, last, step):
-        place, end = _bounds(what, turn, parts)
+        position, end = _bounds(members, turn, parts)
         count, member = BLOCK, NONE
         while count == BLOCK:
-            if isinstance(what, HookedNodes):
-                count, place, member = _choose_nodes(what, call, place, end, member)
+            if isinstance(members, HookedNodes):
+                count, position, member = _choose_nodes(members, call, position, end, member)
             else:
-                count, place = choose_points(what, call, place, end)
+                count, position = choose_points(members, call, position, end)
             if count > 0:
-                found += act(what, task, call, count)
-    return found
+                total += act(members, task, call, count)
+    return total
 
 
 @shared_out
-def _act_on_parts(what, task, call, k):
-    """Act in the part of thread `k`, with private scratch and totals, which do not round."""
+def _act_on_parts(members, task, call, k):
+    """Act on the members of thread `k`, with private scratch and totals (which do not round)."""
     hooks, control, h = call.hooks, call.control, call.h
-    own = record(hooks.apart, k)
+    private = record(hooks.apart, k)
     for i in range(control.values.size):
-        own.values[i] = control.values[i]
-    clock, there = control.clock[0], own.clock[0]
-    there.last_dt, there.kick = clock.last_dt, clock.kick
-    there.contact_dt, there.contact_kick = clock.contact_dt, clock.contact_kick
-    there.set_low, there.set_high = clock.set_low, clock.set_high
-    there.rise, there.fall = clock.rise, clock.fall
-    there.coldest, there.hottest = clock.coldest, clock.hottest
-    here = hold(arrays.with_items(hooks, chosen=own.chosen, scratch=own.scratch))
-    mine = hold(arrays.with_items(control, values=own.values, totals=own.totals, clock=own.clock))
+        private.values[i] = control.values[i]
+    clock, private_clock = control.clock[0], private.clock[0]
+    private_clock.last_dt, private_clock.kick = clock.last_dt, clock.kick
+    private_clock.contact_dt, private_clock.contact_kick = clock.contact_dt, clock.contact_kick
+    private_clock.set_low, private_clock.set_high = clock.set_low, clock.set_high
+    private_clock.rise, private_clock.fall = clock.rise, clock.fall
+    private_clock.coldest, private_clock.hottest = clock.coldest, clock.hottest
+    here = hold(arrays.with_items(hooks, chosen=private.chosen, scratch=private.scratch))
+    mine = hold(
+        arrays.with_items(
+            control, values=private.values, totals=private.totals, clock=private.clock
+        )
+    )
     mine_call = Call(here, mine, call.dt, h, call.share)
-    _act_on_part(what, task, mine_call, k, hooks.apart.chosen.shape[0])
-    totals.hand_over(own.totals, control.totals, totals.WORK)
-    # Totals of other hooks that held the nodes change, too.
-    several = hooks.held.size > 0
+    _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
+    totals.hand_over(private.totals, control.totals, totals.WORK)
+    # Totals of other hooks that held the nodes change too.
+    several = hooks.holders.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)
         for row in range(first, first + count):
-            totals.hand_over(own.totals, control.totals, row)
+            totals.hand_over(private.totals, control.totals, row)
 
 
-def _act_on_all(what, task, call):
+def _act_on_all(members, task, call):
     hooks = call.hooks
     if not isinstance(hooks.mode, Threaded):
-        _act_on_part(what, task, call, NONE, NONE + 1)
+        _act_on_part(members, task, call, NONE, NONE + 1)
         return
     parts = hooks.apart.chosen.shape[0]
-    _act_on_parts(hooks.mode, parts, what, task, call)
+    _act_on_parts(hooks.mode, parts, members, task, call)
     clock = call.control.clock[0]
     for k in range(parts):
-        own = hooks.apart.clock[k, 0]
-        clock.set_low = min(clock.set_low, own.set_low)
-        clock.set_high = max(clock.set_high, own.set_high)
-        clock.rise, clock.fall = max(clock.rise, own.rise), min(clock.fall, own.fall)
-        clock.coldest = min(clock.coldest, own.coldest)
-        clock.hottest = max(clock.hottest, own.hottest)
+        private = hooks.apart.clock[k, 0]
+        clock.set_low = min(clock.set_low, private.set_low)
+        clock.set_high = max(clock.set_high, private.set_high)
+        clock.rise, clock.fall = max(clock.rise, private.rise), min(clock.fall, private.fall)
+        clock.coldest = min(clock.coldest, private.coldest)
+        clock.hottest = max(clock.hottest, private.hottest)
 
 
 # --- formulas and totals ----------------------------------------------------------------------
 
 
 def directions(hooks):
-    """Return the dimension at run time, so that loops are not unrolled."""
+    """Return the dimension at run time: loops are not unrolled."""
     return hooks.x0.shape[1]
 
 
 @noinline
 def evaluate(call, component, count, result, shift):
-    """Evaluate the formula of a component at the present time plus `shift` into row `result`."""
+    """Evaluate a component's formula at the present time plus `shift` into row `result`."""
     hooks, control = call.hooks, call.control
     program = hooks.programs[call.h, component]
     if program.begin == program.end:
@@ -223,7 +226,7 @@ def evaluate(call, component, count, result, shift):
 def _evaluate_now_and_before(call, c, count):
     evaluate(call, c, count, VALUE, 0.0)
     if call.hooks.table[call.h].uses_before:
-        # There is nothing before time 0.
+        # Nothing precedes time 0.
         control = call.control
         step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
         evaluate(call, c, count, BEFORE, -step_back)
@@ -231,7 +234,7 @@ def _evaluate_now_and_before(call, c, count):
 
 @noinline
 def _published(hooks, h):
-    """Return the first total of a hook, and how many it has."""
+    """Return the first total of a hook, and their number."""
     slot = hooks.table[h].slot
     if hooks.table[h].address == arrays.WHOLE:
         return slot, hooks.table[h].totals
@@ -261,10 +264,10 @@ def publish_total(hooks, h, control):
 # --- nodes ------------------------------------------------------------------------------------
 
 
-def _choose_nodes(what, call, row, end, member):
-    """Choose up to a block of members in use, with mass; return number, and where to continue."""
-    hooks, h, ranges, sums = call.hooks, call.h, what.ranges, what.nodes.sums
-    of_all = what.target == LOADS or hooks.table[h].begin < 0
+def _choose_nodes(members, call, row, end, member):
+    """Choose up to a block of members with mass, in use; return number, where to continue."""
+    hooks, h, ranges, sums = call.hooks, call.h, members.ranges, members.nodes.sums
+    of_all = members.target == LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
     member = max(member, NONE if of_all else hooks.table[h].begin)
     count = 0
@@ -293,22 +296,22 @@ def _node(hooks, h, m):
 
 
 @act.on(HookedNodes)
-def _act_at_nodes(what, task, call, count):
+def _act_at_nodes(members, task, call, count):
     hooks = call.hooks
     if task == COUNT:
-        found = 0
+        counted = 0
         for q in range(count):
-            found += totals.counts(call.control.ranks, hooks.chosen[q])
-        return found
-    if what.target == LOADS:
-        _work_at_nodes(what, call, count)
+            counted += totals.counts(call.control.ranks, hooks.chosen[q])
+        return counted
+    if members.target == LOADS:
+        _work_at_nodes(members, call, count)
         return 0
     if hooks.table[call.h].uses_place:
-        locate_nodes(what.grids, hooks, count)
+        locate_nodes(members.grids, hooks, count)
     if task == RUB:
-        _rub_at_nodes(what, call, count)
+        _rub_at_nodes(members, call, count)
     else:
-        _change_nodes(what, call, count)
+        _change_nodes(members, call, count)
     return 0
 
 
@@ -327,35 +330,35 @@ def locate_nodes(grids, hooks, count):
 
 
 @noinline
-def _clear_held(what, held):
-    kin, ranges = what.kin, what.ranges
-    if held.size > 0:
+def _clear_held(members, holders):
+    kin, ranges = members.kin, members.ranges
+    if holders.size > 0:
         for r in range(ranges[0, 0], ranges[ranges[0, 0] - 1, 1]):
             for n in range(ranges[r, 0], ranges[r, 1]):
                 for c in range(kin.dimension):
-                    held[n, c].slot = 0
+                    holders[n, c].slot = 0
 
 
 @noinline
 def _take_over(call, n, c, force):
-    """Let a hook hold node `n` by `force`; return the force of previous hooks on it."""
+    """Make a hook hold node `n` by `force`; return the previous holders' force."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
-    if hooks.held.size > 0 and hooks.table[h].holds:
-        held = hooks.held[n, c]
-        if held.slot > 0:
-            before = held.force
+    if hooks.holders.size > 0 and hooks.table[h].holds:
+        holder = hooks.holders[n, c]
+        if holder.slot > 0:
+            before = holder.force
             if totals.counts(control.ranks, n):
-                totals.add_to(control.totals, held.slot - 1, -before)
-        held.slot = 1 + hooks.table[h].slot + c
-        held.force = before + force
+                totals.add_to(control.totals, holder.slot - 1, -before)
+        holder.slot = 1 + hooks.table[h].slot + c
+        holder.force = before + force
     return before
 
 
 @noinline
-def _moves_as_told(hooks, n):
+def _is_of_rigid(hooks, n):
     """Return True for a node of a rigid solid's field: no work is done on it."""
-    told = hooks.told
-    return told.size > 0 and told[n // (hooks.loads.shape[0] // told.size)]
+    rigid = hooks.rigid_fields
+    return rigid.size > 0 and rigid[n // (hooks.loads.shape[0] // rigid.size)]
 
 
 def _is_taken(rigid, n):
@@ -363,24 +366,24 @@ def _is_taken(rigid, n):
 
 
 @noinline
-def _change_nodes(what, call, count):
+def _change_nodes(members, call, count):
     hooks, control, slot = call.hooks, call.control, call.hooks.table[call.h].slot
     for c in range(directions(hooks)):
         if hooks.programs[call.h, c].begin < 0:
             continue
         _evaluate_now_and_before(call, c, count)
         for q in range(count):
-            if what.target == arrays.ON_SUMS:
-                total, work, before = _change_force(what, call, c, q), 0.0, 0.0
-            elif what.target == arrays.ON_UPDATE:
-                total, work, before = _change_update(what, call, c, q)
+            if members.target == arrays.ON_SUMS:
+                total, work, before = _change_force(members, call, c, q), 0.0, 0.0
+            elif members.target == arrays.ON_UPDATE:
+                total, work, before = _change_update(members, call, c, q)
             else:
-                total, work, before = _change_velocity(what, call, c, q), 0.0, 0.0
-            # The rows of the formulas now take the terms to sum.
-            own = totals.counts(control.ranks, hooks.chosen[q])
-            hooks.scratch[VALUE, q] = total if own else 0.0
-            hooks.scratch[BEFORE, q] = work if own else 0.0
-            if own and before != 0:
+                total, work, before = _change_velocity(members, call, c, q), 0.0, 0.0
+            # From here, the rows of the formulas hold the terms to sum.
+            counted = totals.counts(control.ranks, hooks.chosen[q])
+            hooks.scratch[VALUE, q] = total if counted else 0.0
+            hooks.scratch[BEFORE, q] = work if counted else 0.0
+            if counted and before != 0:
                 totals.add_to(control.totals, slot + c, before)
         totals.add_many(control.totals, totals.WORK, hooks.scratch[BEFORE], count)
         if slot >= 0:
@@ -388,15 +391,15 @@ def _change_nodes(what, call, count):
 
 
 def _called(call, state, force, values):
-    """Call a node function: (mass, v, v*), force, and values of formulas."""
+    """Call a node function with (mass, v, v*), force, and values of formulas."""
     hook = call.hooks.table[call.h]
     return _call_node_function(hook.address, *state, force, *values, call.dt, call.share)
 
 
 @noinline
-def _change_force(what, call, c, q):
-    """Change the force on a node; return the total. `_work_at_nodes` finds its work."""
-    kin, sums, hooks, n = what.kin, what.nodes.sums, call.hooks, call.hooks.chosen[q]
+def _change_force(members, call, c, q):
+    """Change a node's force; return the total. `_work_at_nodes` finds the work."""
+    kin, sums, hooks, n = members.kin, members.nodes.sums, call.hooks, call.hooks.chosen[q]
     mass, values = sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
     v, old = sums[n, arrays.of_momentum(kin) + c] / mass, sums[n, arrays.of_force(kin) + c]
     _, _, force, total = _called(call, (mass, v, v), old, values)
@@ -406,32 +409,32 @@ def _change_force(what, call, c, q):
 
 
 @noinline
-def _change_update(what, call, c, q):
-    """Change v* of a node; return total, work, and force of hooks that held it before.
+def _change_update(members, call, c, q):
+    """Change v* of a node; return total, work, and force of previous holders.
 
     Work is impulse times the mean of the velocities before and after it; or of the holding hook, as
     a node stopped by a bound did not move with the wall before.
     """
-    kin, nodes, hooks, n = what.kin, what.nodes, call.hooks, call.hooks.chosen[q]
-    hook, dt, kept, work, before = hooks.table[call.h], call.dt, what.kept, 0.0, 0.0
+    kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
+    hook, dt, kept, work, before = hooks.table[call.h], call.dt, members.kept, 0.0, 0.0
     mass, values = nodes.sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
     old_star, change = nodes.update[n, c], arrays.of_change(kin) + c
     old = old_star - nodes.update[n, change]
     force = nodes.sums[n, arrays.of_force(kin) + c]
     v, star, _, total = _called(call, (mass, old, old_star), force, values)
-    # Points take the change v* - v: changing v is an impulse, too.
+    # Points take v* - v: changing v is an impulse too.
     total += kept * mass * (old - v) / dt
     holds = star == values[0]
     if holds:
         before = _take_over(call, n, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may still change the velocity of a free node, and a rigid body of any node.
+    # Contact may still change the velocity of a free node, a rigid body that of any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
     if late and (hook.holds == 0 or _is_taken(rigid, n)):
         hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
-    elif not _moves_as_told(hooks, n):
+    elif not _is_of_rigid(hooks, n):
         work = 0.5 * impulse * moved
     clock = call.control.clock[0]
     clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
@@ -441,14 +444,14 @@ def _change_update(what, call, c, q):
 
 
 @noinline
-def _change_velocity(what, call, c, q):
-    """Change the deforming velocity of a node; return the total."""
-    kin, nodes, hooks, n = what.kin, what.nodes, call.hooks, call.hooks.chosen[q]
+def _change_velocity(members, call, c, q):
+    """Change a node's deforming velocity; return the total."""
+    kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
-    # Strain before the forces belongs to the last step, and to hooks that held then.
+    # Strain before the forces belongs to the last step, and its holding hooks.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
-    # Before the forces, v* belongs to the previous step.
+    # Before the forces, v* is of the last step.
     remaps = hook.stage == arrays.POST_VELOCITIES_TO_GRID
     star = last if remaps or (strains_first and last == value) else v
     state, force = (nodes.sums[n, arrays.MASS], v, star), nodes.sums[n, arrays.of_force(kin) + c]
@@ -458,45 +461,45 @@ def _change_velocity(what, call, c, q):
 
 
 @noinline
-def _rub_at_nodes(what, call, count):
+def _rub_at_nodes(members, call, count):
     hooks = call.hooks
-    if what.target == arrays.ON_VELOCITY:
-        # Otherwise v* belongs to the step before.
+    if members.target == arrays.ON_VELOCITY:
+        # Otherwise v* is of the last step.
         if hooks.table[call.h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
-                stick(what.kin, what.nodes, hooks.programs[call.h], hooks.chosen[q])
+                stick(members.kin, members.nodes, hooks.programs[call.h], hooks.chosen[q])
         return
     evaluate(call, FRICTION, count, VALUE, 0.0)
     for q in range(count):
-        rub(what, call, hooks.chosen[q], hooks.scratch[VALUE, q])
+        rub(members, call, hooks.chosen[q], hooks.scratch[VALUE, q])
 
 
 @noinline
-def _work_at_nodes(what, call, count):
+def _work_at_nodes(members, call, count):
     """Sum the work of loads on the chosen nodes, and clear them.
 
-    Force times the mean of the velocities before and after the step, which include stress,
-    constraints and contact of the step: else the error would be of first order.
+    Force times the mean of the velocities before and after the step, with its stress, constraints
+    and contact: else the error would be of first order.
     """
-    update, change = what.nodes.update, arrays.of_change(what.kin)
+    update, change = members.nodes.update, arrays.of_change(members.kin)
     hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[VALUE]
-    for c in range(what.kin.dimension):
+    for c in range(members.kin.dimension):
         for q in range(count):
             n = hooks.chosen[q]
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n)
-            counts = counts and not _moves_as_told(hooks, n)
+            counts = counts and not _is_of_rigid(hooks, n)
             terms[q] = dt * load * (update[n, c] - 0.5 * update[n, change + c]) if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 
 
 @act.on(WholeNodes)
-def _act_on_whole_nodes(what, task, call, count):
-    tag, nodes, kin = what.tag, what.nodes, what.kin
+def _act_on_whole_nodes(members, task, call, count):
+    tag, nodes, kin = members.tag, members.nodes, members.kin
     hooks, control, dt, h = call.hooks, call.control, call.dt, call.h
     if hooks.table[h].uses_place:
-        locate_nodes(what.grids, hooks, count)
+        locate_nodes(members.grids, hooks, count)
     rows, first = (VALUE, BEFORE, THIRD), arrays.of_force(kin)
     for c in range(len(tag.values)):
         evaluate(call, c, count, rows[c], 0.0)
@@ -505,22 +508,22 @@ def _act_on_whole_nodes(what, task, call, count):
         values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
         force = tuple([nodes.sums[n, first + c] for c in range(kin.dimension)])
         star = tuple([nodes.update[n, c] for c in range(kin.dimension)])
-        found = kinds.results(tag, what, kinds.Member(n, kin, kin, values, dt))
-        numbers = kinds.written(tag, what, n, found)
-        own = totals.counts(control.ranks, n)
+        results = kinds.results(tag, members, kinds.Member(n, kin, kin, values, dt))
+        numbers = kinds.written(tag, members, n, results)
+        counted = totals.counts(control.ranks, n)
         for c in range(kin.dimension):
             load = nodes.sums[n, first + c] - force[c]
-            if not what.before_update:
+            if not members.before_update:
                 load = nodes.sums[n, arrays.MASS] * (nodes.update[n, c] - star[c]) / dt
             hooks.loads[n, c] += load  # see _work_at_nodes
-        if own and hooks.table[h].slot >= 0:
+        if counted and hooks.table[h].slot >= 0:
             for c in range(len(numbers)):
                 totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
     return 0
 
 
 def without_whole(hooks):
-    """Omit functions of whole points, so that loops are not compiled again for each."""
+    """Omit functions of whole points: loops are not compiled again for each."""
     return arrays.with_items(hooks, whole=())
 
 
@@ -530,10 +533,10 @@ def known_to_hooks(nodes):
 
 
 def hooked_nodes(s, target, kept):
-    """Return the nodes that node functions change; `kept` is the FLIP coefficient."""
+    """Return the nodes for node functions; `kept` is the FLIP coefficient."""
     nodes = s.nodes
-    known = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
-    return HookedNodes(target, planar(s.kin), s.grids, known, s.ranges, kept)
+    trimmed = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
+    return HookedNodes(target, planar(s.kin), s.grids, trimmed, s.ranges, kept)
 
 
 def whole_nodes(s, tag, stage, target):
@@ -541,66 +544,66 @@ def whole_nodes(s, tag, stage, target):
     return WholeNodes(target, planar(s.kin), s.grids, s.nodes, s.ranges, 0.0, tag, early)
 
 
-def node_hooks(stage, what, hooks, s, dt):
-    """Call the node functions of `stage` on `what` of `hooked_nodes`; of `LOADS`, sum the work."""
-    own = [tag for tag in hooks.whole if tag.of_nodes]
-    whole = tuple([whole_nodes(s, tag, stage, what.target) for tag in own])
-    _node_hooks(stage, what, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))
+def node_hooks(stage, members, hooks, s, dt):
+    """Call the node functions of `stage` on `hooked_nodes`; for `LOADS`, sum the work."""
+    tags = [tag for tag in hooks.whole if tag.of_nodes]
+    whole = tuple([whole_nodes(s, tag, stage, members.target) for tag in tags])
+    _node_hooks(stage, members, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))
 
 
 @kernel
-def _node_hooks(stage, what, whole, call):
-    what, hooks, control, dt = hold(what), call.hooks, call.control, call.dt
-    if what.target == LOADS:
+def _node_hooks(stage, members, whole, call):
+    members, hooks, control, dt = hold(members), call.hooks, call.control, call.dt
+    if members.target == LOADS:
         if hooks.loads.size > 0:
-            _act_on_all(what, ACT, call)
+            _act_on_all(members, ACT, call)
             totals.carry(control.totals[totals.WORK])
         return
-    if what.target == arrays.ON_UPDATE:
-        _clear_held(what, hooks.held)
+    if members.target == arrays.ON_UPDATE:
+        _clear_held(members, hooks.holders)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
         _clear_total(hooks, h, control)
         share = 1.0
         if hooks.table[h].uses_share:
-            heavy = _act_on_part(what, COUNT, Call(hooks, control, dt, h, share), NONE, NONE + 1)
+            heavy = _act_on_part(members, COUNT, Call(hooks, control, dt, h, share), NONE, NONE + 1)
             share = 1.0 / max(totals.number_of_all(control.ranks, control, heavy), 1)
-        own = Call(hooks, control, dt, h, share)
+        hook_call = Call(hooks, control, dt, h, share)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
-                # Before the forces (usf) v* belongs to the step before.
-                if one.tag.row == h and what.target != arrays.ON_VELOCITY:
-                    _act_on_all(one, ACT, own)
+                # Before the forces (usf) v* is of the last step.
+                if one.tag.row == h and members.target != arrays.ON_VELOCITY:
+                    _act_on_all(one, ACT, hook_call)
         else:
-            _act_on_all(what, ACT, own)
+            _act_on_all(members, ACT, hook_call)
         publish_total(hooks, h, control)
-    # Friction follows, when it is known which walls hold a node.
+    # Friction follows: now it is known which walls hold a node.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
         rubs = hooks.programs[h, FRICTION].begin >= 0
         if rubs:
-            _act_on_all(what, RUB, Call(hooks, control, dt, h, 1.0))
-        if rubs or (hooks.table[h].holds and hooks.held.size > 0):
+            _act_on_all(members, RUB, Call(hooks, control, dt, h, 1.0))
+        if rubs or (hooks.table[h].holds and hooks.holders.size > 0):
             publish_total(hooks, h, control)
 
 
 @point_function(otherwise=True)
 def at_nodes(hooks, stage, target, s):
-    """Let fixes act on nodes."""
+    """Apply fixes to nodes."""
 
 
 @at_nodes.on(arrays.Hooks)
 def _at_nodes_hooks(hooks, stage, target, s):
     clock = s.control.clock[0]
     node_hooks(stage, hooked_nodes(s, target, clock.kept), hooks, s, kick(s))
-    clock.set_low = clock.set_high = 0.0  # of temperatures only
+    clock.set_low = clock.set_high = 0.0  # for temperatures only
 
 
 @point_function(otherwise=True)
 def add_work(hooks, s):
-    """Sum the work of the loads on nodes."""
+    """Sum the work of loads on nodes."""
 
 
 @add_work.on(arrays.Hooks)
@@ -611,17 +614,17 @@ def _add_work_hooks(hooks, s):
 # --- points -----------------------------------------------------------------------------------
 
 
-def choose_points(what, call, p, end):
-    """Choose up to a block of members, with places; return their number, where to continue."""
+def choose_points(members, call, p, end):
+    """Choose up to a block of members, with places; return number, where to continue."""
     hooks, h = call.hooks, call.h
-    begin, ids, where = hooks.table[h].begin, what.ids, hooks.scratch
+    begin, ids, where = hooks.table[h].begin, members.ids, hooks.scratch
     count = 0
     while p < end and count < BLOCK:
         if begin < 0 or hooks.members[begin + (ids[p] >> 6)] >> (ids[p] & 63) & 1 != 0:
             hooks.chosen[count] = p
             if hooks.table[h].uses_place:
                 for c in range(directions(hooks)):
-                    where[c, count] = what.x[c, p]
+                    where[c, count] = members.x[c, p]
                     if hooks.x0.shape[0] > 0:
                         where[3 + c, count] = hooks.x0[ids[p], c]
             count += 1
@@ -630,39 +633,38 @@ def choose_points(what, call, p, end):
 
 
 @act.on(MovingPoints)
-def _act_on_motion(what, task, call, count):
-    v, y, hooks, control, h = what.v, what.y, call.hooks, call.control, call.h
+def _act_on_motion(members, task, call, count):
+    v, y, hooks, control, h = members.v, members.y, call.hooks, call.control, call.h
     d = directions(hooks)
     for c in range(d):
         if hooks.programs[h, c].begin < 0:
             continue
         _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
-        # Forces act while a hook moves a point from its initial velocity in the step.
+        # Forces act while the hook moves a point from its initial velocity in the step.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
             p = hooks.chosen[q]
-            velocity, place, total = _call_point_function(
-                hooks.table[h].address, what.mass[p], v[c, p], what.x[c, p], y[c, p],
+            velocity, position, total = _call_point_function(
+                hooks.table[h].address, members.mass[p], v[c, p], members.x[c, p], y[c, p],
                 hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], call.dt, control.clock[0].kick,
             )  # fmt: skip
             speed = float(v[c, p])
             first = hooks.scratch[BEFORE, q] if leads else speed
-            work = 0.5 * float(what.mass[p]) * (velocity - speed) * (velocity + first)
-            totals.add_to(control.totals, totals.WORK, 0.0 if what.rigid else work)
+            work = 0.5 * float(members.mass[p]) * (velocity - speed) * (velocity + first)
+            totals.add_to(control.totals, totals.WORK, 0.0 if members.rigid else work)
             v[c, p] = velocity
-            # Corners move with their point.
-            for corner in range(what.corners):
-                y[d + d * corner + c, p] += place - y[c, p]
-            y[c, p] = place
+            for corner in range(members.corners):
+                y[d + d * corner + c, p] += position - y[c, p]
+            y[c, p] = position
             if slot >= 0:
                 totals.add_to(control.totals, slot + c, total)
     return 0
 
 
 @act.on(HeatedPoints)
-def _act_on_warmth(what, task, call, count):
+def _act_on_warmth(members, task, call, count):
     hooks, control, h = call.hooks, call.control, call.h
     evaluate(call, 0, count, VALUE, 0.0)
     if hooks.programs[h, 1].begin >= 0:
@@ -671,23 +673,22 @@ def _act_on_warmth(what, task, call, count):
     clock = control.clock[0]
     for q in range(count):
         p = hooks.chosen[q]
-        before = what.supply[0, p]
+        before = members.supply[0, p]
         share, supply, T = _call_heat_function(
-            hooks.table[h].address, what.capacity[0, p], what.temperature[0, p],
-            face(what.kin, what.volume[0, p], load_vector(what.kin, what.x, p)),
+            hooks.table[h].address, members.capacity[0, p], members.temperature[0, p],
+            face(members.kin, members.volume[0, p], load_vector(members.kin, members.x, p)),
             before, hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], call.dt,
         )  # fmt: skip
-        what.share[0, p] = min(what.share[0, p], share)
-        what.supply[0, p] = supply
-        what.temperature[0, p] = T
+        members.share[0, p] = min(members.share[0, p], share)
+        members.supply[0, p] = supply
+        members.temperature[0, p] = T
         if slot >= 0:
             totals.add_to(control.totals, slot, supply - before)
         # The prescribed temperature is the bound, not the resulting one.
         if hooks.table[h].holds > 0:
             T = hooks.scratch[BEFORE, q]
-        elif what.capacity[0, p] > 0:
-            # The heating rate is a bound for all points.
-            rate = supply / what.capacity[0, p]
+        elif members.capacity[0, p] > 0:
+            rate = supply / members.capacity[0, p]
             clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
         if share == 0 or hooks.table[h].holds > 0:
             clock.coldest, clock.hottest = min(clock.coldest, T), max(clock.hottest, T)
@@ -695,22 +696,22 @@ def _act_on_warmth(what, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Return formulas of time now and at the end of the step (0 without), and contact times."""
-    found = []
+    """Return formulas of time now and at the end of the step (else 0), and contact times."""
+    values = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):
             if c < len(tag.values):
                 evaluate(call, c, 1, VALUE, shift)
-                found.append(call.hooks.scratch[VALUE, 0])
+                values.append(call.hooks.scratch[VALUE, 0])
             else:
-                found.append(0.0)
+                values.append(0.0)
     clock = call.control.clock[0]
-    return (*found, clock.contact_dt, clock.contact_kick, clock.kick)
+    return (*values, clock.contact_dt, clock.contact_kick, clock.kick)
 
 
 @act.on(WholePoints)
-def _act_on_whole_points(what, task, call, count):
-    tag, points, kin = what.tag, what.points, what.kin
+def _act_on_whole_points(members, task, call, count):
+    tag, points, kin = members.tag, members.points, members.kin
     hooks, control, dt, h = call.hooks, call.control, call.dt, call.h
     rows = (VALUE, BEFORE, THIRD)
     led = _of_time(tag, kin, call) if tag.of_time else ()
@@ -718,21 +719,21 @@ def _act_on_whole_points(what, task, call, count):
         evaluate(call, c, count, rows[c], 0.0)
     for q in range(count):
         p = hooks.chosen[q]
-        law, state = state_at(kin, points, what.laws, p)
+        law, state = state_at(kin, points, members.laws, p)
         values = led
         if not tag.of_time:
             values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
         old = load_vector(kin, points.v, p)
-        found = kinds.results(tag, what, kinds.Member(p, law, state, values, dt))
-        numbers = kinds.written(tag, what, p, found)
+        results = kinds.results(tag, members, kinds.Member(p, law, state, values, dt))
+        numbers = kinds.written(tag, members, p, results)
         new = load_vector(kin, points.v, p)
         work = 0.5 * float(points.mass[p]) * dot(new - old, new + old)
-        totals.add_to(control.totals, totals.WORK, 0.0 if is_rigid(what.laws) else float(work))
+        totals.add_to(control.totals, totals.WORK, 0.0 if is_rigid(members.laws) else float(work))
         if hooks.table[h].slot >= 0:
             for c in range(len(numbers)):
                 totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
-        if len(what.heat):
-            supply, capacity = what.heat
+        if len(members.heat):
+            supply, capacity = members.heat
             if capacity[0, p] > 0:
                 rate = float(supply[0, p]) / float(capacity[0, p])
                 clock = control.clock[0]
@@ -741,18 +742,18 @@ def _act_on_whole_points(what, task, call, count):
 
 
 @kernel
-def _point_hooks(stage, what, whole, call):
+def _point_hooks(stage, members, whole, call):
     hooks, control, dt = call.hooks, call.control, float(call.dt)
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
-        own = Call(hooks, control, dt, h, 1.0)
+        hook_call = Call(hooks, control, dt, h, 1.0)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
                 if one.tag.row == h:
-                    _act_on_all(one, ACT, own)
+                    _act_on_all(one, ACT, hook_call)
         else:
-            _act_on_all(what, ACT, own)
+            _act_on_all(members, ACT, hook_call)
 
 
 @kernel
@@ -766,7 +767,7 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 
 
 def point_hooks(stage, then, hooks, s, arguments_of):
-    """Call the point functions of `stage` in each block; `arguments_of`: what_of, heat_of."""
+    """Call the point functions of `stage` in each block; `arguments_of`: `what_of`, `heat_of`."""
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)
     of_points = [tag for tag in hooks.whole if not tag.of_nodes]
@@ -803,13 +804,13 @@ def clear_forces(kin, force, count):
 
 
 def corners_that_move(s):
-    """Count the corners stored after the position of a point, which move with it."""
+    """Count the corners stored after a point's position, which move with it."""
     return placed(s.basis, s.kin) if s.frame.moves else 0
 
 
 @point_function(otherwise=True)
 def at_points(hooks, stage, then, s):
-    """Let fixes act on points; `then` is 1 if their new positions are known, else 0."""
+    """Apply fixes to points; `then` is 1 if their new positions are known, else 0."""
 
 
 @at_points.on(arrays.Hooks)

@@ -5,25 +5,25 @@ formula block by block and call the function by address: a new list of fixes com
 functions.
 
 Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``:
-`value` and `before` are the formula at the time of the step and one step earlier; `share` is 1 /
-number of members with mass; `dt` is the time for which forces act, half of the last step plus half
-of this one. Totals are summed and published, plus the momentum that a change of v before the update
-adds to points, over dt. Of several hooks that hold a node, the last to bring v_star to its value
-decides, and gets the others' totals of that node. Of the deforming velocity, if mapped separately
-from v_star, v is set; before the forces (usf, usavg) by the hooks of the update, where those that
-hold make it their v_star.
+`value` and `before` are the formula at the step's time and one step earlier; `share` is 1 / number
+of members with mass; `dt` is the time forces act, half of the last step plus half of this one.
+Totals are summed and published, plus the momentum that a change of v before the update adds to
+points, over dt. Of several hooks holding a node, the last to set v_star to its value decides, and
+gets the others' totals there. Of the deforming velocity, if mapped separately from v_star, v is
+set; before the forces (usf, usavg) by the hooks of the update, where those that hold set it to
+their v_star.
 
 Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``: `dt` is the time
-of the move, `kick` the time for which forces act.
+of the move, `kick` the time forces act.
 
 Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``, of points
-where heat flows: `value` and `other` are the first and second formula, `face` is the area of the
-point, `supply` its heat per time, `share` the fraction of the nodal temperature change that it
-takes. The total is the heat supplied. If a hook holds, `other` is the target temperature. Node
-functions of heat see capacity, temperature before and after the step, and heat flow.
+where heat flows: `value` and `other` are the first and second formula, `face` the point's area,
+`supply` its heat per time, `share` the fraction of the nodal temperature change it takes. The total
+is the heat supplied. If a hook holds, `other` is the target temperature. Node functions of heat see
+capacity, temperature before and after the step, and heat flow.
 
-Functions of whole points (:func:`vector_hook`) see vectors, fields and the state of the law, and
-are compiled into the loop.
+Functions of whole points (:func:`vector_hook`) see vectors, fields and the law's state, and are
+compiled into the loop.
 """
 
 import sys
@@ -72,29 +72,28 @@ class CompiledHook(NamedTuple):
     """A function that the compiled loop applies to components of members."""
 
     function: Callable
-    where: str  # nodes (also of heat), points, heated points, or whole points
+    where: str  # "nodes" (also of heat), "points", "heated points", `WHOLE_POINTS`, `WHOLE_NODES`
     publishes: bool  # its totals become ID_x, ID_y, ID_z
-    uses_before: bool  # needs the formulas one step earlier as well
-    uses_share: bool  # needs one over the number of members with mass
+    uses_before: bool  # also needs the formulas one step earlier
+    uses_share: bool  # needs 1 / number of members with mass
     holds: bool  # sets or bounds v_star; prescribes a temperature
-    tag: Callable | None = None  # of whole points: makes the tag of the function
+    tag: Callable | None = None  # makes the tag of a function of whole points
     reads: tuple = ()
     writes: tuple = ()
     internal: bool = False  # not for plug-ins, nor on cards
 
     @property
     def on_nodes(self) -> bool:
-        """True for hooks on nodes."""
         return self.where in ("nodes", WHOLE_NODES)
 
     @property
     def signature(self) -> Any:
-        """The Numba type of its function."""
+        """The Numba type of the function."""
         return FUNCTIONS[self.where]
 
 
 WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
-# What compiled hooks act on at each stage; those on whole points act where any on points do.
+# What hooks act on at each stage; hooks on whole points wherever points are.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
     **dict.fromkeys(POINT_STAGES, "points"),
@@ -127,7 +126,7 @@ def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False
 
 
 class Member(NamedTuple):
-    """A point, or a node, that a function of whole members acts on."""
+    """A point or node for a function of whole members."""
 
     p: Index
     law: Tag
@@ -137,26 +136,26 @@ class Member(NamedTuple):
 
 
 @point_function()
-def results(tag, what, one):
-    """Return the results of a function of whole points for a `Member`: a tuple."""
+def results(tag, members, one):
+    """Return the results of a function of whole members for a `Member`, a tuple."""
 
 
 @point_function()
-def written(tag, what, p, found):
-    """Write the results of a function of whole points; return the numbers to publish."""
+def written(tag, members, p, values):
+    """Write the results; return the numbers to publish."""
 
 
 WORDS = {
-    "mass": lambda what, law, state, p: what.points.mass[p],
-    "velocity": lambda what, law, state, p: load_vector(what.kin, what.points.v, p),
-    "position": lambda what, law, state, p: load_vector(what.kin, what.x, p),
-    "volume": lambda what, law, state, p: volume_of(what.kin, what.points, law, state, p),
+    "mass": lambda members, law, state, p: members.points.mass[p],
+    "velocity": lambda members, law, state, p: load_vector(members.kin, members.points.v, p),
+    "position": lambda members, law, state, p: load_vector(members.kin, members.x, p),
+    "volume": lambda members, law, state, p: volume_of(members.kin, members.points, law, state, p),
 }
 
 
-def _node_velocity(what, law, state, n):
-    nodes, kin = what.nodes, what.kin
-    if what.before_update:
+def _node_velocity(members, law, state, n):
+    nodes, kin = members.nodes, members.kin
+    if members.before_update:
         first, mass = arrays.of_momentum(kin), nodes.sums[n, arrays.MASS]
         return kin.Vector._make([nodes.sums[n, first + c] / mass for c in range(kin.dimension)])
     change = arrays.of_change(kin)
@@ -164,16 +163,16 @@ def _node_velocity(what, law, state, n):
     return kin.Vector._make(numbers)
 
 
-def _at_node(what, array, n, first):
-    return what.kin.Vector._make([array[n, first + c] for c in range(what.kin.dimension)])
+def _at_node(members, array, n, first):
+    return members.kin.Vector._make([array[n, first + c] for c in range(members.kin.dimension)])
 
 
 NODE_WORDS = {
-    "mass": lambda what, law, state, n: what.nodes.sums[n, arrays.MASS],
+    "mass": lambda members, law, state, n: members.nodes.sums[n, arrays.MASS],
     "velocity": _node_velocity,
-    "velocity_update": lambda what, law, state, n: _at_node(what, what.nodes.update, n, 0),
-    "force": lambda what, law, state, n: _at_node(
-        what, what.nodes.sums, n, arrays.of_force(what.kin)
+    "velocity_update": lambda members, law, state, n: _at_node(members, members.nodes.update, n, 0),
+    "force": lambda members, law, state, n: _at_node(
+        members, members.nodes.sums, n, arrays.of_force(members.kin)
     ),
 }
 # Stages of hooks on whole nodes, and what they can change besides fields.
@@ -184,10 +183,10 @@ def _field_reader(item: Any, number: Callable) -> Callable:
     shape = item.shape
     as_vector = shape is vector
 
-    def of_field(what, law, state, n):
-        numbers = tuple([number(what, k, n) for k in range(shape(what.kin))])
+    def of_field(members, law, state, n):
+        numbers = tuple([number(members, k, n) for k in range(shape(members.kin))])
         if as_vector:
-            return what.kin.Vector._make(numbers)
+            return members.kin.Vector._make(numbers)
         return numbers[0] if len(numbers) == 1 else numbers
 
     return of_field
@@ -196,34 +195,36 @@ def _field_reader(item: Any, number: Callable) -> Callable:
 def _node_reader(item: Any) -> Callable:
     if not isinstance(item, type):
         return NODE_WORDS.get(item, NODE_WORDS["mass"])  # others were refused
-    return _field_reader(item, lambda what, k, n: field(what.nodes.fields, item)[n, k])
+    return _field_reader(item, lambda members, k, n: field(members.nodes.fields, item)[n, k])
 
 
-def _write_update(what, n, new):
-    change = arrays.of_change(what.kin)
-    for c in range(what.kin.dimension):
-        what.nodes.update[n, change + c] += new[c] - what.nodes.update[n, c]
-        what.nodes.update[n, c] = new[c]
+def _write_update(members, n, new):
+    change = arrays.of_change(members.kin)
+    for c in range(members.kin.dimension):
+        members.nodes.update[n, change + c] += new[c] - members.nodes.update[n, c]
+        members.nodes.update[n, c] = new[c]
 
 
 def _node_writer(item: Any) -> Callable:
     if isinstance(item, type):
-        return lambda what, n, new: put_at(field(what.nodes.fields, item), n, 0, flat((new,)))
+        return lambda members, n, new: put_at(field(members.nodes.fields, item), n, 0, flat((new,)))
     if item == "force":
-        return lambda what, n, new: put_at(what.nodes.sums, n, arrays.of_force(what.kin), new)
+        return lambda members, n, new: put_at(
+            members.nodes.sums, n, arrays.of_force(members.kin), new
+        )
     return _write_update
 
 
 def _reader(item: Any) -> Callable:
     if isinstance(item, type):
-        return _field_reader(item, lambda what, k, p: field(what.points.fields, item)[k, p])
-    return WORDS.get(item) or (lambda what, law, state, p: item(law, what.kin, state))
+        return _field_reader(item, lambda members, k, p: field(members.points.fields, item)[k, p])
+    return WORDS.get(item) or (lambda members, law, state, p: item(law, members.kin, state))
 
 
 def _writer(item: Any) -> Callable:
     if isinstance(item, type):
-        return lambda what, p, new: store(field(what.points.fields, item), p, (new,))
-    return lambda what, p, new: store(what.points.v, p, (new,))
+        return lambda members, p, new: store(field(members.points.fields, item), p, (new,))
+    return lambda members, p, new: store(members.points.v, p, (new,))
 
 
 def vector_hook(
@@ -248,7 +249,7 @@ def vector_hook(
     where = WHOLE_NODES if nodes else WHOLE_POINTS
     if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
         return CompiledHook(function, where, publishes, False, False, False, None, reads, writes)
-    # In the function's module, so that it can be imported, and its kernels cached.
+    # In the function's module: importable, so kernels are cached.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
     while hasattr(module, name):  # it serves another hook, too
@@ -260,15 +261,15 @@ def vector_hook(
     made.of_nodes, made.of_time = nodes, False  # type: ignore[attr-defined]
     alone = len(writes) + publishes == 1
 
-    def results_of(tag, what, one):
-        items = [read(what, one.law, one.state, one.p) for read in readers]
-        found = function(*items, one.values, one.dt)
-        return (found,) if alone else found
+    def results_of(tag, members, one):
+        items = [read(members, one.law, one.state, one.p) for read in readers]
+        values = function(*items, one.values, one.dt)
+        return (values,) if alone else values
 
-    def written_of(tag, what, p, found):
+    def written_of(tag, members, p, values):
         for k, write in enumerate(writers):
-            write(what, p, found[k])
-        return flat(found[len(writers) :])
+            write(members, p, values[k])
+        return flat(values[len(writers) :])
 
     results.on(made)(results_of)
     written.on(made)(written_of)

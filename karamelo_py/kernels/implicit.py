@@ -1,10 +1,9 @@
 """Implicit steps: nodal forces after trial displacements, and their derivatives.
 
-Weights and gradients are those at the beginning of the step, fixed while Newton's method iterates.
-With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H) (I + H)^-T gives the forces V0 P
-grad N. Its derivatives dP/dH (:mod:`karamelo_py.compiler.slopes`) give the whole stiffness V0 grad
-N dP/dH grad N: geometry, and all that a law does while it yields (Charlton, Coombs & Augarde 2017
-fix gradients in the same way).
+Weights and gradients at the beginning of the step stay fixed in Newton's iterations (as in
+Charlton, Coombs & Augarde 2017). With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H)
+(I + H)^-T gives the forces V0 P grad N. Its derivatives dP/dH (:mod:`karamelo_py.compiler.slopes`)
+give the whole stiffness V0 grad N dP/dH grad N: geometry, and all that a law does while it yields.
 """
 
 from typing import NamedTuple
@@ -41,7 +40,7 @@ GROUP = 8
 
 
 class Seen(NamedTuple):
-    """Nodes of the points of a block, those with a nonzero weight or gradient."""
+    """Nodes that a block's points see, with nonzero weight or gradient."""
 
     count: np.ndarray  # (n,) int32: number of nodes
     nodes: np.ndarray  # (n, s) int32: indices among unknown nodes (int64: in the grid)
@@ -52,7 +51,7 @@ class Seen(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes that one point sees: the blocks of K, row after row."""
+    """Pairs of nodes seen by one point: the blocks of K, row by row."""
 
     codes: np.ndarray  # (m,) int64: positions of the nodes in the grid; differences identify pairs
     middle: int  # column of the difference 0 in `rank`
@@ -97,14 +96,14 @@ def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
 
 
 def points_of(count, k):
-    """Find the first of `count` points in the k-th part."""
+    """Return the first of `count` points of a part."""
     groups = (count + GROUP - 1) // GROUP
     return min(GROUP * (groups * k // PARTS), count)
 
 
 @by_threads
 def see(frame, at, matter, seen, part):
-    """Find the nodes that points see, with weights and gradients at the present positions."""
+    """Find the nodes that points see, with weights and gradients at present positions."""
     (basis, _, grids, of, where), seen = at_hand(at), at_hand(seen)
     kin, points, laws = at_hand(matter)
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
@@ -118,7 +117,7 @@ def see(frame, at, matter, seen, part):
                 gives = gives | (g != 0)
             if gives:
                 slot = count
-                if isinstance(basis, AtCorners):  # several may see the same node
+                if isinstance(basis, AtCorners):  # corners may see one node
                     for other in range(count):
                         if seen.nodes[p, other] == node:
                             slot = other
@@ -147,25 +146,25 @@ def gradient_at(kin, seen, p, k):
 
 @by_threads
 def strain(kin, seen, u, response, part):
-    """Find H of each point, from displacements (m, d)."""
+    """Compute H of each point from displacements (m, d)."""
     seen, response = at_hand(seen), at_hand(response)
     count = seen.nodes.shape[0]
     most = 0.0
     for p in range(points_of(count, part), points_of(count, part + 1)):
         H = zero(kin, u[0, 0])
-        own = zero_vector(kin, u[0, 0])
+        displacement = zero_vector(kin, u[0, 0])
         for k in range(seen.count[p]):
             node = seen.nodes[p, k]
             moved = vector(kin, [u[node, i] for i in range(kin.dimension)])
             H = H + outer(moved, gradient_at(kin, seen, p, k))
-            own = own + seen.weights[p, k] * moved
+            displacement = displacement + seen.weights[p, k] * moved
         store(response.increment, p, H)
-        most = max(most, own.largest())
+        most = max(most, displacement.largest())
     response.furthest[part] = most
 
 
 def strained_point(matter, response, p):
-    """Load law and state of a point before the step, H, and its reference volume."""
+    """Load law and state before the step, H, and reference volume of a point."""
     kin, points, laws = matter
     law, state = state_at(kin, points, laws, p)
     mass = points.mass[p]
@@ -174,13 +173,12 @@ def strained_point(matter, response, p):
 
 
 def nominal_stress(law, kin, state, H, dt):
-    """Return P relative to the positions before the step, per reference volume."""
+    """Return P per reference volume, relative to the positions before the step."""
     after = advance(law, kin, state, large(H) if by_rates(law) else H, dt)
     return kirchhoff_stress(law, kin, after).nominal(I + H)
 
 
 def stress_and_tangent(law, kin, state, H, dt):
-    """Return P and dP/dH."""
     P = nominal_stress(law, kin, state, seeded(H), dt)
     return P._make([x.value for x in P]), tuple([slopes_of(x, len(H)) for x in P])
 
@@ -191,7 +189,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @by_threads
 def respond(matter, dt, response, part):
-    """Find the stress of each point after its increment."""
+    """Compute each point's stress after its increment."""
     matter, response = at_hand(matter), at_hand(response)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
@@ -204,7 +202,7 @@ def respond(matter, dt, response, part):
 
 @by_threads
 def respond_to_changes(matter, dt, response, tangent, part):
-    """Find the derivatives of the stress of some points."""
+    """Compute the stress derivatives of some points."""
     matter, response = at_hand(matter), at_hand(response)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
@@ -214,8 +212,8 @@ def respond_to_changes(matter, dt, response, tangent, part):
         p = points_from(lanes, first + q, first + last)
         law, state, H, volume = strained_point(matter, response, p)
         _, slopes = stress_and_tangent(law, kin, state, H, dt)
-        own = points_from(lanes, q, last)
-        store(tangent.values, own, tuple([volume * s for row in slopes for s in row]))
+        columns = points_from(lanes, q, last)
+        store(tangent.values, columns, tuple([volume * s for row in slopes for s in row]))
 
 
 @kernel
@@ -228,12 +226,12 @@ def keep_stress(matter, stress):
 
 
 # --- at the nodes -----------------------------------------------------------------------------
-# A node sums over its points in order: threads divide the nodes.
+# A node sums over its points in order; threads divide nodes.
 
 
 @kernel
 def list_points(seen):
-    """List the points that see each node (`Seen.starts` and `Seen.entries`)."""
+    """Fill `Seen.starts` and `Seen.entries`."""
     starts, entries = seen.starts, seen.entries
     m, count, width = starts.size - 1, seen.nodes.shape[0], seen.nodes.shape[1]
     for p in range(count):
@@ -253,7 +251,7 @@ def list_points(seen):
 
 @kernel
 def spread(seen, places):
-    """Find the largest distance along a direction between nodes (at places) of one point."""
+    """Return the largest distance between nodes (at places) of one point, along a direction."""
     most = 0
     for p in range(seen.nodes.shape[0]):
         for i in range(places.shape[1]):
@@ -267,7 +265,7 @@ def spread(seen, places):
 
 @by_threads
 def mark_pairs(seen, pairs, part):
-    """Mark existing pairs of nodes by 0 in `Pairs.rank`."""
+    """Set `Pairs.rank` to 0 for existing pairs."""
     seen, pairs = at_hand(seen), at_hand(pairs)
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -292,7 +290,7 @@ def add_forces(kin, seen, stress, f, part):
 
 
 def along(kin, row):
-    """Return the direction that a row of a tensor acts along: of the hoop row, the radius."""
+    """Return the direction a tensor row acts along: the radius for the hoop row."""
     return row if row < kin.dimension else 0
 
 

@@ -62,7 +62,7 @@ def cofactors(A):
 
 @by_threads
 def grow(matter, response, averages, part):
-    """Find the volume of each point before and after its increment, and its derivatives."""
+    """Compute volumes before and after the increment, and their derivatives."""
     matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
     kin, points, _ = matter
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
@@ -74,7 +74,7 @@ def grow(matter, response, averages, part):
 
 
 def averaged_stress(law, kin, state, change, dt):
-    """Return P and q per reference volume, after an increment H with averaged volume ratio."""
+    """Return P and q per reference volume after an increment H, with averaged volume ratio."""
     H, ratio = change
     A = I + H
     dl = scaled_increment(Updated(), kin, H, (), ratio / det(A))
@@ -89,7 +89,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @by_threads
 def respond_averaged(matter, dt, response, averages, part):
-    """Find P and q of each point, and their derivatives."""
+    """Compute P and q of each point, and their derivatives."""
     matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
@@ -113,7 +113,7 @@ def respond_averaged(matter, dt, response, averages, part):
 
 @kernel
 def keep_averaged_stress(matter, response, averages):
-    """Store P and q of the present state, before positions change."""
+    """Store P and q of the present state."""
     kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
@@ -156,7 +156,7 @@ def sum_at_nodes(seen, values, sums, part):
 
 @by_threads
 def average(seen, nodes, values, part):
-    """Find the average (1, n) at points of the values of nodes (m,)."""
+    """Fill ``values`` (1, n) with averages at points of nodal values (m,)."""
     seen = at_hand(seen)
     count = seen.nodes.shape[0]
     for p in range(points_of(count, part), points_of(count, part + 1)):

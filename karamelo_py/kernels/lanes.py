@@ -1,4 +1,4 @@
-"""The number of points that a visit processes at once: one, or four or eight in lanes."""
+"""The number of points processed at once: one, or four or eight in lanes."""
 
 from typing import Any, NamedTuple
 
@@ -17,20 +17,20 @@ class OneByOne(NamedTuple):
 
 
 def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose lanes for a loop over points; one by one if interpreted, or if a part has no lanes."""
+    """Choose lanes for a loop over points; none if interpreted, or if a part has none."""
     return OneByOne()
 
 
 @implements(lanes_with, by_type=True)
 def _lanes_with(parts, laws, mass):
-    known = (*(part.instance_class for part in parts), *classes_in(laws))
-    in_lanes = all(getattr(part, "in_lanes", False) for part in known)
+    classes = (*(part.instance_class for part in parts), *classes_in(laws))
+    in_lanes = all(getattr(part, "in_lanes", False) for part in classes)
     made = lanes_for(mass.dtype.bitwidth) if in_lanes else OneByOne
     return lambda parts, laws, mass: made()
 
 
 def points_from(lanes: Tag, q: int, end: int) -> Index:
-    """Return point `q`, or the points in lanes from there on, before `end`."""
+    """Return point `q`, or the points in lanes from there, before `end`."""
     if isinstance(lanes, OneByOne):
         return index(q)
     return group(lanes, q, min(lanes.width, end - q))
@@ -47,7 +47,7 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Choose the lanes of the update: twice as many in stretches, as chains of operations wait."""
+    """Choose the update's lanes: twice as many in stretches, as dependent operations wait."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 

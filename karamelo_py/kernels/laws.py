@@ -1,7 +1,6 @@
 """Laws in the precision of a run, and in tables.
 
-A law is a NamedTuple of numbers, rows of numbers, or such NamedTuples
-(:mod:`karamelo_py.points.laws`).
+A law is a NamedTuple of numbers, number rows, or such NamedTuples (:mod:`karamelo_py.points.laws`).
 """
 
 from collections.abc import Sequence
@@ -39,19 +38,19 @@ def _table(column: Sequence, real: type) -> Any:
 
 def law_on(law: Any, h: float, T0: float | None) -> Any:
     """Set the fields ``cell_size`` and ``initial_temperature`` of a law and its parts."""
-    known = {"cell_size": h, "initial_temperature": T0}
+    values = {"cell_size": h, "initial_temperature": T0}
     return type(law)(
         *(
             law_on(value, h, T0)
             if isinstance(value, tuple)
             else value
-            if known.get(name) is None
-            else known[name]
+            if values.get(name) is None
+            else values[name]
             for name, value in zip(law._fields, law, strict=True)
         )
     )
 
 
 def elastic_law(law: Any) -> Any:
-    """Return the law of the stress, of one that adds a temperature or relaxation."""
+    """Return the stress law of a law that adds a temperature or relaxation, else the law."""
     return elastic_law(law.elastic) if hasattr(law, "elastic") else law

@@ -1,7 +1,7 @@
 """Pairs of touching points of two bodies, found with linked cells, and their forces.
 
-One thread sums forces in the order of the points' ids: they are independent of threads and of the
-sorting of points. In double precision.
+In double precision, on one thread: sums are in the order of the ids, whatever the number of threads
+and the order in memory.
 """
 
 from math import inf, sqrt
@@ -27,20 +27,19 @@ from karamelo_py.points.kinematics import zero_vector
 
 
 class TwoBodies(NamedTuple):
-    """The points of two bodies by id; the second body starts at `first2`."""
+    """Points of two bodies by id; the second starts at `first2`."""
 
     x: np.ndarray  # (n, d)
     v: np.ndarray  # (n, d)
     mass: np.ndarray  # (n,)
     radius: np.ndarray  # (n,)
     force: np.ndarray  # (n, d)
-    grip: np.ndarray  # (n, d + 2), of the first body: see `points.bodies.rub`; (n, 0) without mu
+    grip: np.ndarray  # (n, d + 2) of the first body: see `points.bodies.rub`; (n, 0) without
+    #                   friction
     first2: int
 
 
 class OneOfTwo(NamedTuple):
-    """Ids of the points of two bodies: from and to before."""
-
     begin1: int
     end1: int
     begin2: int
@@ -54,7 +53,7 @@ class Push(NamedTuple):
     kin: Tag
     reach: float  # points touch if they are closer than this in every direction
     step: float  # time that points have moved for
-    dt: float  # `dt` and `kick` set the stiffness
+    dt: float  # set the stiffness, with `kick`
     kick: float
 
 
@@ -62,7 +61,7 @@ class Cells(NamedTuple):
     """Scratch of the search."""
 
     start: np.ndarray  # (c + 1,) int64: room for c cells
-    cell: np.ndarray  # (n,) int64: the cell of each point, or -1 if nothing can touch it
+    cell: np.ndarray  # (n,) int64: the cell of each point; -1: nothing can touch it
     order: np.ndarray  # (n,) int64: points of the second body by cell
     corner: np.ndarray  # (3,) float64: lower corner of the cells
     length: np.ndarray  # (3,) float64: lengths of their region
@@ -94,9 +93,9 @@ def _radius(matter, x, p):
 
 @kernel
 def extend(matter, x, ids, extents):
-    """Extend the extents of two bodies by the points of a block at `x` (w, n).
+    """Extend the extents of two bodies by a block's points at `x` (w, n).
 
-    `extents` (2, 7): for each body the largest of -x, -y, -z, x, y, z and of the radii.
+    `extents` (2, 7): per body the largest -x, -y, -z, x, y, z and radius.
     """
     matter = at_hand(matter)
     points = matter.points
@@ -111,7 +110,7 @@ def extend(matter, x, ids, extents):
 
 @kernel
 def pick(matter, x, ids, corners, rows):
-    """Find the points of two bodies between `corners` (2, d); fill `rows`, return their number."""
+    """Fill `rows` with the points of two bodies between `corners` (2, d); return their number."""
     matter, count = at_hand(matter), 0
     points = matter.points
     for p in range(points.id.size):
@@ -126,7 +125,7 @@ def pick(matter, x, ids, corners, rows):
 
 @kernel
 def collect(matter, x, rows, out):
-    """Collect id, mass, radius, position and velocity of points in `out` (n, 3 + 2 d)."""
+    """Put id, mass, radius, position and velocity of points in `out` (n, 3 + 2 d)."""
     matter = at_hand(matter)
     points, d = matter.points, matter.kin.dimension
     for i in range(rows.size):
@@ -157,7 +156,7 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cover the region where the bodies may touch by cells; return their width, 0 if none."""
+    """Cover by cells where the bodies may touch; return the width of a cell, 0 if nowhere."""
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
     if not width > 0:
@@ -166,7 +165,7 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # In this form, NaN means that there are none.
+        # NaN: none.
         length = min(hi1, hi2) + width - cells.corner[k]
         if not 0 <= length < inf:
             return 0.0
@@ -187,7 +186,7 @@ def _lay_cells(d, bodies, cells, reach):
 
 @noinline
 def _find_cells(d, bodies, cells, width):
-    """Find the cell of every point, and sort the second body's points by it, stably."""
+    """Find each point's cell; sort the second body's points by cell, stably."""
     n, m = bodies.first2, bodies.mass.size
     used = cells.count[0] * cells.count[1] * cells.count[2]
     cells.start[: used + 1] = 0
@@ -214,7 +213,7 @@ def _find_cells(d, bodies, cells, width):
 
 @noinline
 def _push_between(push, bodies, i, j):
-    """Return the normal force on point `i` from point `j`, 0 if they do not touch."""
+    """Return the normal force on point `i` from point `j`; 0 if they do not touch."""
     law, kin = push.law, push.kin
     x, none = bodies.x, zero_vector(kin, 0.0)
     dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)
@@ -240,10 +239,10 @@ def _add(bodies, i, j, force, total):
 
 @noinline
 def _touch(push, bodies, cells, i, j):
-    """Add the normal force between two points, if they touch; return 1 if so, else 0.
+    """Add the normal force between two points; return 1 if they touch, else 0.
 
-    `cells.contact` sums, for the friction on point `i`: the load, the normal force, and the
-    stiffness of each partner times its tangential velocity.
+    `cells.contact` sums for the friction on `i`: load, normal force, and each partner's stiffness
+    times tangential velocity.
     """
     kin, contact = push.kin, cells.contact
     force, d = _push_between(push, bodies, i, j), kin.dimension
@@ -266,7 +265,7 @@ def _touch(push, bodies, cells, i, j):
 
 @noinline
 def _rub(push, bodies, i, contact):
-    """Compute the friction on point `i`, replacing the velocity in `contact`."""
+    """Replace the velocity in `contact` by the friction on point `i`."""
     kin = push.kin
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
@@ -284,18 +283,18 @@ def _rub(push, bodies, i, contact):
 
 @noinline
 def _pass_on(push, bodies, cells, i, j):
-    """Apply a partner's part of the friction of point `i`, in proportion to the load."""
+    """Apply a partner's part of the friction of `i`, proportional to its load."""
     kin, contact, d = push.kin, cells.contact, push.kin.dimension
     square = _push_between(push, bodies, i, j).squared()
     if square > 0:
-        part = sqrt(square) / contact[0]
-        force = kin.Vector._make([part * contact[1 + d + k] for k in range(d)])
+        fraction = sqrt(square) / contact[0]
+        force = kin.Vector._make([fraction * contact[1 + d + k] for k in range(d)])
         _add(bodies, i, j, force, cells.total)
 
 
 @kernel
 def push_apart(push, bodies, cells):
-    """Add the forces of all touching pairs; return their number. `cells.total` gets their sum."""
+    """Add the forces of all touching pairs, their sum to `cells.total`; return their number."""
     bodies, cells = at_hand(bodies), at_hand(cells)
     d = push.kin.dimension
     cells.total[:] = 0.0
@@ -322,7 +321,7 @@ def push_apart(push, bodies, cells):
                 _rub(push, bodies, i, contact)
             for a in range(max(cx - 1, 0), min(cx + 2, nx)):
                 for b in range(max(cy - 1, 0), min(cy + 2, ny)):
-                    # Cells along the last direction are adjacent, and so are their points.
+                    # Cells along the last direction are adjacent in `order`.
                     first = (a * ny + b) * nz + max(cz - 1, 0)
                     last = (a * ny + b) * nz + min(cz + 1, nz - 1)
                     begin = cells.start[first - 1] if first > 0 else 0

@@ -1,6 +1,6 @@
 """A scene on several processes: where kernels of one call the others.
 
-They call a Python function by address. It leaves what it receives in the arrays of the kernels.
+They call a Python function by address, which puts what it receives in the kernels' arrays.
 """
 
 from typing import NamedTuple
@@ -20,15 +20,15 @@ _call = caller_of(CALL)
 
 
 class Linked(NamedTuple):
-    """This process has some tiles of the scene."""
+    """This process has some of the tiles."""
 
     address: int  # of ``(what, a, b) -> number``
     foreign: np.ndarray  # (N,) uint8: 1 if another process counts the terms of a node
 
 
 @kernel
-def _ask(address, what, a, b):
-    return _call(address, what, a, b)
+def _ask(address, request, a, b):
+    return _call(address, request, a, b)
 
 
 @totals.collect.on(Linked)
@@ -81,9 +81,9 @@ def _agree_on_heat_linked(ranks, control):
 
 
 @kernel
-def _ask_if(due, address, what, a, b):
+def _ask_if(due, address, request, a, b):
     if due:
-        _call(address, what, a, b)
+        _call(address, request, a, b)
 
 
 @totals.take_over.on(Linked)

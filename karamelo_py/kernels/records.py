@@ -21,7 +21,6 @@ def put_at(array, i, first, values):
 
 
 def clear_first(array, i):
-    """Set the first component of record `i` to zero, unless `array` is None."""
     if array is not None:
         array[i, 0] = 0
 
@@ -52,9 +51,9 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
 def accumulate_affine(array, nodes, first, weights, field):
     """Add an affine field times the weights to nodes: components from `first` on.
 
-    `field` is the value at the first node, and the slopes. The value grows by ``slopes[d]`` to the
-    next node in direction `d` (nodes form a square or cube, last direction fastest); without slopes
-    it is constant.
+    `field`: the value at the first node, and slopes: the value grows by ``slopes[d]`` to the next
+    node in direction `d` (nodes form a square or cube, last direction fastest); without slopes it
+    is constant.
     """
     value, slopes = field
     width = _width(nodes, slopes)
@@ -66,7 +65,7 @@ def accumulate_affine(array, nodes, first, weights, field):
 
 
 def move_record(target, source, first, like, keep):
-    """Add components of a record of `source` to one of `target` and zero them; `keep`: add."""
+    """Move components of a record of `source` to one of `target`, or add them if `keep`."""
     array, i = target
     other, j = source
     for k in range(first, first + len(like)):
@@ -83,7 +82,6 @@ def prefetch_records(array: Any, i: Any) -> None:
 
 
 def _width(nodes: Any, slopes: Any) -> int:
-    """Return the number of nodes per direction."""
     return round(len(nodes) ** (1 / max(1, len(slopes))))
 
 
@@ -91,7 +89,7 @@ def _size(array: Any) -> int:
     return array.dtype.bitwidth // 8
 
 
-_fma = llvm.of_library("llvm.fma")  # a b + c of vectors, rounded once
+_fma = llvm.of_library("llvm.fma")  # a b + c, rounded once
 
 
 def _transposed(builder: ir.IRBuilder, rows: list) -> list:
@@ -110,13 +108,13 @@ def _transposed(builder: ir.IRBuilder, rows: list) -> list:
 
 
 def _record(builder: ir.IRBuilder, kind: Any, pointer: ir.Value, components: int) -> ir.Value:
-    """Cast an address to that of a vector of components."""
+    """Cast a pointer to one to a vector of components."""
     vector = ir.VectorType(llvm.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())
 
 
 def _chunks(count: int) -> list[tuple[int, int]]:
-    """Split components into register-wide chunks: (first, number), with 4, 2 or 1; 3 count as 4."""
+    """Split components into (first, number), number 4, 2 or 1; 3 count as 4."""
     out, first = [], 0
     while first < count:
         left = count - first
@@ -126,7 +124,7 @@ def _chunks(count: int) -> list[tuple[int, int]]:
 
 
 def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> list:
-    """Return lanes of `count` components from the records of the points."""
+    """Return lanes of `count` components from the points' records."""
     if count == 1:
         return [pack(builder, [lane(builder, row, 0) for row in rows], lanes)]
     parts = [_transposed(builder, rows[k : k + 4]) for k in range(0, lanes.width, 4)]
@@ -147,7 +145,6 @@ def _gathered(builder: ir.IRBuilder, lanes: Lanes, first: Any, like: Any, read: 
 
 @intrinsic
 def _gather_row(array, nodes, first, like):
-    """Load components of node records, as many as `like` has."""
     lanes = Lanes(array.dtype, nodes.width)
     made = types.UniTuple(lanes, len(like))
 
@@ -163,7 +160,7 @@ def _gather_row(array, nodes, first, like):
 
 @intrinsic
 def _gather_weighted(array, nodes, first, weights, like):
-    """Load the weighted sums of node records, summed before they become lanes."""
+    """Load weighted sums of node records, summed before they become lanes."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
@@ -210,7 +207,7 @@ def _row(array, i, first, like):
 
 @intrinsic
 def _scatter(array, nodes, first, values):
-    """Add to components of node records, lane by lane; first summed if all go to one node."""
+    """Add to node records lane by lane; summed first if all go to one node."""
     lanes = Lanes(array.dtype, max(lanes_of(value) for value in values))
     at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
@@ -230,8 +227,8 @@ def _scatter(array, nodes, first, values):
                 total = builder.fadd(builder.load(here, align=size), number)
                 builder.store(total, here, align=size)
 
-    place = nodes if lanes_of(nodes) else types.int64
-    return types.void(array, place, types.int64, at_once), codegen
+    index_type = nodes if lanes_of(nodes) else types.int64
+    return types.void(array, index_type, types.int64, at_once), codegen
 
 
 @implements(move_record)
@@ -247,11 +244,11 @@ def _move(*kinds):
         here, i, there, j, first, _, keep = values
         size = _size(array)
 
-        def place(kind, table, node):
+        def address(kind, table, node):
             pointer = llvm.item_pointer(builder, kind, table, [node, first])
             return _record(builder, kind, pointer, len(like))
 
-        to, of = place(array, here, i), place(other, there, j)
+        to, of = address(array, here, i), address(other, there, j)
         before = builder.load(to, align=size)
         zero = ir.Constant(before.type, None)
         kept = builder.select(keep, before, zero)
@@ -263,7 +260,7 @@ def _move(*kinds):
 
 
 def _records(builder: ir.IRBuilder, parts: list) -> list:
-    """Make four records of four, two or one components from lanes."""
+    """Return four records of four, two or one components from lanes."""
     if len(parts) == 4:
         return _transposed(builder, parts)
     if len(parts) == 2:
@@ -289,7 +286,7 @@ def _accumulate_affine(array, nodes, first, weights, field):
 
 @intrinsic
 def _scatter_affine(*kinds):
-    """Make records of the points as vectors once per point, not per node; weights from memory."""
+    """Scatter with records made once per point, not per node; weights from memory."""
     array, nodes, _, weights, value, slopes = kinds
     lanes, width = weights[0], _width(nodes, slopes)
 
@@ -306,23 +303,23 @@ def _scatter_affine(*kinds):
             count = widest if left > 4 else _chunks(left)[0][1]
             column = builder.add(first, I64(begin))
             one = Lanes(array.dtype, count)
-            # By the position of the node in the first directions.
+            # By the node's position in the first directions.
             at = {(): _records_of(builder, components[some], lanes, count)}
             grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
 
-            def field_at(*place, at=at, grow=grow):
-                if place not in at:
-                    *outer, last = place
-                    at[place] = field_at(*outer, last - 1) if last else field_at(*outer)
+            def field_at(*steps, at=at, grow=grow):
+                if steps not in at:
+                    *outer, last = steps
+                    at[steps] = field_at(*outer, last - 1) if last else field_at(*outer)
                     if last:
-                        pairs = zip(at[place], grow[len(outer)], strict=True)
-                        at[place] = [builder.fadd(*pair) for pair in pairs]
-                return at[place]
+                        pairs = zip(at[steps], grow[len(outer)], strict=True)
+                        at[steps] = [builder.fadd(*pair) for pair in pairs]
+                return at[steps]
 
             for k, node in enumerate(llvm.unpack(builder, places)):
-                place = tuple(k // width**d % width for d in reversed(range(len(grow))))
+                steps = tuple(k // width**d % width for d in reversed(range(len(grow))))
                 total = pointer = None
-                for j, record in enumerate(field_at(*place)):
+                for j, record in enumerate(field_at(*steps)):
                     if total is None or lanes_of(nodes[k]):
                         pointer = at_lane(builder, array, table, nodes[k], node, j, column)
                         pointer = _record(builder, array, pointer, count)
@@ -338,7 +335,7 @@ def _scatter_affine(*kinds):
 
 
 def _records_of(builder: ir.IRBuilder, parts: list, lanes: Lanes, count: int) -> list:
-    """Make a record of `count` components for each lane."""
+    """Return a record of `count` components for each lane."""
     parts = [*parts, *[ir.Constant(llvm.register_type(lanes), None)] * 8][:count]
     rows = []
     for k in range(0, lanes.width, 4):
@@ -354,10 +351,9 @@ def _records_of(builder: ir.IRBuilder, parts: list, lanes: Lanes, count: int) ->
 
 
 def _kept_in_memory(builder: ir.IRBuilder, vectors: list) -> Callable:
-    """Store vectors in memory that is opaque to LLVM; return a function of vector and lane.
+    """Store vectors in memory opaque to LLVM; return the address by vector and lane.
 
-    It gives the address of a number. Broadcasting from memory is part of the load; from a register
-    it costs a shuffle.
+    A broadcast from memory is part of the load; from a register it costs a shuffle.
     """
     room = llvm.room(builder, ir.ArrayType(vectors[0].type, len(vectors)))
     room.align = 64

@@ -1,7 +1,7 @@
 """Rigid bodies on a common grid: nodes near them take their velocity.
 
 Rigid points scatter to separate sums (`RigidSums`): the nodal sums belong to other solids, whatever
-the density of a rigid body. The force needed for its velocity acts on these.
+a rigid body's density. The force for its velocity acts on these.
 """
 
 from typing import NamedTuple
@@ -27,8 +27,8 @@ class RigidBodies(NamedTuple):
 
     node_fields = (RigidSums,)
 
-    force: np.ndarray  # (n,) slot of the published force on the solid of each point, by id, or -1
-    torque: np.ndarray  # (n,) the same of the torque
+    force: np.ndarray  # (n,) slot of the force on the solid of each point, by id, or -1
+    torque: np.ndarray  # (n,) the same for the torque
     slots: np.ndarray  # (r,) slots of forces and torques
 
 
@@ -40,8 +40,8 @@ def _at_nodes(s):
 def _impose(at, dt, control, n):
     """Set the velocity of a node with rigid points; store the force for that in `rigid`.
 
-    Its work on other points is as for a prescribed velocity. The change v* - v includes that force:
-    else FLIP points never acquire the velocity of the body.
+    Work as for a prescribed velocity. The change v* - v includes that force: else FLIP points never
+    acquire the body's velocity.
     """
     kin, nodes, rigid = at
     d = kin.dimension
@@ -55,7 +55,7 @@ def _impose(at, dt, control, n):
         impulse = change = 0.0
         if mass > 0:
             impulse = velocity - nodes.update[n, k]
-            # From the points' momentum: a fix may have held the node, and left no change.
+            # From the points' momentum: a fix may have held the node, leaving no change.
             change = velocity - nodes.sums[n, of_momentum(kin) + k] / mass
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity
@@ -72,7 +72,7 @@ def _impose_on_strain(at, n):
 
 
 def _add_forces(s, block, p):
-    """Add the force on a rigid point, and its torque about the origin."""
+    """Add the force on a rigid point, and the torque about the origin."""
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
     grid = record(s.grids, points.grid[p])
@@ -108,7 +108,6 @@ def _publish_sums(s):
         publish(s.control, slot, 3)
 
 
-# The forces on rigid points, from those on nodes.
 PUBLISH = Once(_begin_sums), each_point(_add_forces, Rigid), Once(_publish_sums)
 RigidBodies.rows = (each_node(_impose_node), *PUBLISH)  # type: ignore[attr-defined]
 RigidBodies.rows_before = RigidBodies.rows_after = (  # type: ignore[attr-defined]

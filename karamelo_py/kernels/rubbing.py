@@ -21,7 +21,7 @@ class Rubbing(NamedTuple):
 
 @kernel
 def rub_points(kin, mu, rubbing, grip, force):
-    """Add the friction of n points to their forces (n, d); update their `grip` (n, d + 2)."""
+    """Add the friction of n points to `force` (n, d); update `grip` (n, d + 2)."""
     normal, load, pull, stop = rubbing
     d, none = kin.dimension, zero_vector(kin, 0.0)
     for i in range(load.size):
@@ -29,8 +29,8 @@ def rub_points(kin, mu, rubbing, grip, force):
         hold = along(vector_at(kin, grip, i, 0, none) + vector_at(kin, pull, i, 0, none), n)
         stopping = along(vector_at(kin, stop, i, 0, none), n)
         memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
-        found, (hold, mean, unused) = rub(mu, load[i], memory, stopping)
+        friction, (hold, mean, unused) = rub(mu, load[i], memory, stopping)
         for k in range(d):
-            force[i, k] += found[k]
+            force[i, k] += friction[k]
             grip[i, k] = hold[k]
         grip[i, d], grip[i, d + 1] = mean, unused

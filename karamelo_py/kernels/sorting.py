@@ -23,14 +23,14 @@ class TileGrid(NamedTuple):
 
 
 class Neighbourhood(NamedTuple):
-    """Nodes that a point may see before it has moved `reach` cells."""
+    """Nodes that a point may see before moving `reach` cells."""
 
     top: np.ndarray  # (g, d) the last node of each grid
     per_cell: int
-    beyond: int  # nodes seen beyond the cell's
-    least: int  # points at a wall see all nodes up to this one, as many as others
+    beyond: int  # nodes seen beyond the cell
+    least: int  # points at a wall see all nodes up to this one
     reach: float
-    offset: float  # of the first node seen now, see points.basis.first_node
+    offset: float  # of the first node seen, see points.basis.first_node
 
 
 class SortKeys(NamedTuple):
@@ -45,22 +45,22 @@ class SortedOrder(NamedTuple):
     """Order and boxes of n points, sorted by threads in parts."""
 
     width: int  # of groups of points
-    ends: np.ndarray  # (parts, T); the last row: where the points of each tile end
-    share: np.ndarray  # (parts + 1,) first tile of each part with equally many points
-    boxes: np.ndarray  # (2, T, d) first and last nodes that points of each tile may see
+    ends: np.ndarray  # (parts, T) ends of tiles; the last row is final
+    share: np.ndarray  # (parts + 1,) first tile of each part of about equally many points
+    boxes: np.ndarray  # (2, T, d) first and last nodes that a tile's points may see
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
-    order: np.ndarray  # (n,) previous numbers of the points
+    order: np.ndarray  # (n,) previous numbers of points
     tile: np.ndarray  # (n,) tiles
     room: np.ndarray  # (2, n) scratch
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Find the cell of a point at `at` cells, clamped: a hook may have moved a point anywhere."""
+    """Return the cell of a point at `at` cells, clamped: a hook may have moved it anywhere."""
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
 def _seen(grid, around, g, direction, at):
-    """Find the first and last node of grid `g` that a point at `at` cells may see along one."""
+    """Return the first and last node that a point of grid `g`, at `at` cells, may see."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]
@@ -71,7 +71,7 @@ def _seen(grid, around, g, direction, at):
 
 @by_threads
 def find_tiles(at, tiles, ends, tile, k):
-    """Find the `tile` (n,) of each point of a part, and counts `ends` (parts, T) by tile."""
+    """Fill `tile` (n,) for a part of the points, and counts `ends` (parts, T)."""
     (_, kin, grids, of, x), tiles = at_hand(at), at_hand(tiles)
     parts = ends.shape[0]
     for t in range(ends.shape[1]):
@@ -89,27 +89,27 @@ def find_tiles(at, tiles, ends, tile, k):
 
 
 @noinline
-def _begin_tiles(found):
+def _begin_tiles(sorting):
     """Set where each part's points begin in each tile; divide the tiles by points."""
-    ends, share, points = found.ends, found.share, found.order.size
+    ends, share, points = sorting.ends, sorting.share, sorting.order.size
     parts = ends.shape[0]
-    place = shares = 0
+    position = shares = 0
     for t in range(ends.shape[1]):
-        begin = place
+        begin = position
         for k in range(parts):
             count = ends[k, t]
-            ends[k, t] = place
-            place += count
-        while shares < parts and 2 * points * shares <= (begin + place) * parts:
+            ends[k, t] = position
+            position += count
+        while shares < parts and 2 * points * shares <= (begin + position) * parts:
             share[shares] = t
             shares += 1
     share[shares:] = ends.shape[1]
 
 
 @shared_out
-def _order_parts(found, k):
+def _order_parts(sorting, k):
     """Place the k-th part of the points (counting sort); `ends` moves from begin to end."""
-    ends, tile, order = found.ends, found.tile, found.order
+    ends, tile, order = sorting.ends, sorting.tile, sorting.order
     parts = ends.shape[0]
     for p in range(tile.size * k // parts, tile.size * (k + 1) // parts):
         t = tile[p]
@@ -118,13 +118,17 @@ def _order_parts(found, k):
 
 
 @shared_out
-def _order_in_all_tiles(at, by, found, k):
-    """Sort a tile's points by first node, then id: cells that fill groups of `width` first."""
-    (_, kin, grids, of, x), (tiles, around, ids), found = at_hand(at), at_hand(by), at_hand(found)
-    boxes, bins, cell, order = found.boxes, found.bins, found.room, found.order
-    ends, cells = found.ends[found.ends.shape[0] - 1], bins.shape[2]
+def _order_in_all_tiles(at, by, sorting, k):
+    """Sort a tile's points by first node, then id: cells filling groups of `width` first."""
+    (_, kin, grids, of, x), (tiles, around, ids), sorting = (
+        at_hand(at),
+        at_hand(by),
+        at_hand(sorting),
+    )
+    boxes, bins, cell, order = sorting.boxes, sorting.bins, sorting.room, sorting.order
+    ends, cells = sorting.ends[sorting.ends.shape[0] - 1], bins.shape[2]
     d = kin.dimension
-    for t in range(found.share[k], found.share[k + 1]):
+    for t in range(sorting.share[k], sorting.share[k + 1]):
         begin, end = ends[t - 1] if t > 0 else 0, ends[t]
         if begin == end:
             continue
@@ -136,28 +140,28 @@ def _order_in_all_tiles(at, by, found, k):
             grid = record(grids, of[p])
             number = 0
             for i in range(d):
-                place = in_cells(grid, i, x[i, p])
-                first = max(int(place + around.offset), 0)
+                position = in_cells(grid, i, x[i, p])
+                first = max(int(position + around.offset), 0)
                 number = number * tiles.size[i] + first % tiles.size[i]
-                low, high = _seen(grid, around, of[p], i, place)
+                low, high = _seen(grid, around, of[p], i, position)
                 boxes[0, t, i] = low if q == begin else min(boxes[0, t, i], low)
                 boxes[1, t, i] = high if q == begin else max(boxes[1, t, i], high)
             cell[0, q] = number
             cell[1, q] = p
             bins[k, 0, number] += 1
-        # Cells of whole groups, then the others. From here on bins hold begin and end.
-        place = begin
+        # Cells of whole groups, then the rest; bins become begin and end.
+        position = begin
         for rest in (False, True):
             for c in range(cells):
                 here = bins[k, 0, c]
-                if bins[k, 1, c] < 0 and (rest or here % found.width == 0):
-                    bins[k, 0, c] = bins[k, 1, c] = place
-                    place += here
+                if bins[k, 1, c] < 0 and (rest or here % sorting.width == 0):
+                    bins[k, 0, c] = bins[k, 1, c] = position
+                    position += here
         for q in range(begin, end):
             c, p = cell[0, q], cell[1, q]
             last = bins[k, 1, c]
             bins[k, 1, c] += 1
-            # Insertion sort: nearly all were in this order before.
+            # Insertion sort: nearly all are in order.
             while last > bins[k, 0, c] and ids[order[last - 1]] > ids[p]:
                 order[last] = order[last - 1]
                 last -= 1
@@ -166,7 +170,7 @@ def _order_in_all_tiles(at, by, found, k):
 
 @by_threads
 def find_rows(at, around, tiling, parts, k):
-    """Find `Tiling.rows` of the k-th part of the tiles in 3D."""
+    """Fill `Tiling.rows` for a part of the tiles (3D)."""
     (_, _, grids, _, x), around, tiling = at_hand(at), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]
@@ -189,7 +193,6 @@ def find_rows(at, around, tiling, parts, k):
 
 @shared_out
 def _pick_all_rows(rows, order, room, parts, k):
-    """Copy the k-th part of rows to `room`, in order."""
     begin, end = order.size * k // parts, order.size * (k + 1) // parts
     for r in range(rows.shape[0]):
         if rows[r, 1] == 4:
@@ -210,7 +213,7 @@ def _put_all_rows(rows, room, parts, k):
 
 @noinline
 def _permute(mode, rows, order, room, parts):
-    """Permute rows by `order`, a few at a time, without a copy of a whole field."""
+    """Permute rows by `order`, a few at a time: no copy of a whole field."""
     first = 0
     while first < rows.shape[0]:
         last = min(first + room.shape[0], rows.shape[0])
@@ -220,13 +223,13 @@ def _permute(mode, rows, order, room, parts):
         first = last
 
 
-def _sort(mode, at, by, found, rows):
-    parts = found.ends.shape[0]
-    find_tiles(mode, parts, at, by.tiles, found.ends, found.tile)
-    _begin_tiles(found)
-    _order_parts(mode, parts, found)
-    _order_in_all_tiles(mode, parts, at, by, found)
-    _permute(mode, rows, found.order, found.room, parts)
+def _sort(mode, at, by, sorting, rows):
+    parts = sorting.ends.shape[0]
+    find_tiles(mode, parts, at, by.tiles, sorting.ends, sorting.tile)
+    _begin_tiles(sorting)
+    _order_parts(mode, parts, sorting)
+    _order_in_all_tiles(mode, parts, at, by, sorting)
+    _permute(mode, rows, sorting.order, sorting.room, parts)
     return 0
 
 
@@ -234,9 +237,9 @@ _sort_by_team = by_team(_sort)
 
 
 @kernel
-def sort_points(mode, at, by, found, rows):
+def sort_points(mode, at, by, sorting, rows):
     """Sort points by tile, then by first node; `rows` has the addresses of all their rows."""
-    _sort_by_team(mode, at, by, found, rows)
+    _sort_by_team(mode, at, by, sorting, rows)
 
 
 @kernel

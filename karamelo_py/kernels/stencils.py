@@ -21,17 +21,17 @@ from karamelo_py.points.kinematics import from_columns
 
 # --- sums that are affine around a point: mass, momentum, force of MLS ------------------------
 #
-# In lanes they are arranged like the nodes' records once per point, not once per node: half of the
-# work of a scatter in 2D, two thirds in 3D.
+# In lanes, arranged like node records once per point, not per node: half of a scatter's work in 2D,
+# two thirds in 3D.
 
 
 def _beside(a, b):
-    """Append `b` to `a`, padded with zeros to four components."""
+    """Concatenate `a`, padded with zeros to four components, and `b`."""
     return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
 
 
 def joined(lanes, kin, parts):
-    """Join momentum and force as one part, if both have increments and a register holds both."""
+    """Join momentum and force if both have increments and a register holds both."""
     if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, a, to_a = parts[0]
@@ -52,13 +52,13 @@ def give_affine(lanes, w, stencil, parts):
 
 
 def gathered_by_arms(w):
-    """(a,), if a point stores a sum_I N_I v*_I (X_I - x)^T away from walls; else ()."""
+    """(a,) if a point stores a sum_I N_I v*_I (X_I - x)^T away from walls, else ()."""
     return transfers.by_arms(w.transfer, inverse_spread(w.basis, w.grid))
 
 
 @point_function(otherwise=True)
 def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
-    """Return the total over all nodes of a stencil; () to gather node by node."""
+    """Return the total over all nodes of a stencil, or () to gather node by node."""
     return ()
 
 
@@ -67,11 +67,11 @@ def _gathered_at_once_move(task, w, stencil, total):
     factor = gathered_by_arms(w)
     if not len(factor):
         return ()
-    found = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
-    # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: of rows, then of
+    velocities = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
+    # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: by rows, then
     # planes, as weights are products.
-    sums = tuple([(v,) for v, _ in found])
-    changes = tuple([dv for _, dv in found])
+    sums = tuple([(v,) for v, _ in velocities])
+    changes = tuple([dv for _, dv in velocities])
     for line in reversed(stencil.lines):
         rows = range(0, len(sums), len(line.weights))
         sums = tuple([_with_moment(line.weights, sums[k:]) for k in rows])
@@ -85,7 +85,7 @@ def _gathered_at_once_move(task, w, stencil, total):
 
 
 def _tails(weights, vectors):
-    """Return suffix sums of weights times vectors: of the last one, the last two, ... all."""
+    """Return suffix sums of weights times vectors, shortest first."""
     last = len(weights) - 1
     sums = (weights[last] * vectors[last],)
     for k in range(last - 1, -1, -1):
@@ -96,7 +96,7 @@ def _tails(weights, vectors):
 def _with_moment(weights, row):
     """Return sum_k w_k v_k and sum_k k w_k v_k of a row (Horner: the sum of suffix sums).
 
-    `row` (nodes, vectors): the moment is of the first vectors; of the others, only the sum.
+    `row` (nodes, vectors): the moment is of the first vectors only.
     """
     first, *others = zip(*row[: len(weights)], strict=True)
     *tails, total = _tails(weights, first)
@@ -116,15 +116,15 @@ def affine_parts(quantities, w, stencil, loads):
 
 
 def all_by_corners(parts, w):
-    """Return True if all parts are linear in the weight or gradient (see `not_at_corners`)."""
+    """Return True if all parts are linear in weight or gradient (see `not_at_corners`)."""
     asked = transfers.add_moment, transfers.nodal_momentum, transfers.gradient_weight
-    there = {
+    present = {
         "moments": any(function.defined(type(w.transfer)) for function in asked),
         "loss": field(w.nodes.fields, EnergyLoss) is not None,
         "anything": True,
     }
     unless = [type(part).not_at_corners for part in parts]
-    return not any(there[name] for names in unless for name in names)
+    return not any(present[name] for names in unless for name in names)
 
 
 def _seeing(basis, w):
@@ -170,7 +170,7 @@ def _even(w, stencil, asked):
 
 @point_function(otherwise=True)
 def gather_nodes(stencil: tuple, lanes: Tag, tasks: tuple, w: Work, totals: tuple) -> tuple:
-    """Add the contributions of all nodes of the stencil to the totals of the tasks."""
+    """Add the contributions of all stencil nodes to the tasks' totals."""
     return _gather(tasks, w, stencil, totals)
 
 
@@ -180,7 +180,7 @@ def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
         return _gather(tasks, w, stencil, totals)
     if isinstance(lanes, OneByOne):
         return _gather_parts(tasks, w, stencil, totals)
-    # Sorted points mostly see the same nodes: records are loaded once for all lanes.
+    # Sorted points mostly see the same nodes: one load for all lanes.
     if product.sees_same_nodes(stencil):
         return _gather_parts(tasks, w, product.with_one_node(stencil), totals)
     _ask_ahead(tasks, w, stencil)
@@ -202,7 +202,7 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
 
 
 def _ask_ahead(tags, w, stencil):
-    """Prefetch node records after the last of a stencil."""
+    """Prefetch records after the last node of a stencil."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
     for array in [type(tag).records for tag in tags]:
         if array:
@@ -211,15 +211,19 @@ def _ask_ahead(tags, w, stencil):
 
 def _gather_parts(tasks, w, stencil, totals):
     pairs = zip(tasks, totals, strict=True)
-    found = [gathered_at_once(task, w, stencil, total) for task, total in pairs]
-    rest = [k for k, total in enumerate(found) if not len(total)]
-    own = _gather(tuple([tasks[k] for k in rest]), w, stencil, tuple([totals[k] for k in rest]))
-    return tuple([own[rest.index(k)] if k in rest else total for k, total in enumerate(found)])
+    at_once = [gathered_at_once(task, w, stencil, total) for task, total in pairs]
+    rest = [k for k, total in enumerate(at_once) if not len(total)]
+    one_by_one = _gather(
+        tuple([tasks[k] for k in rest]), w, stencil, tuple([totals[k] for k in rest])
+    )
+    return tuple(
+        [one_by_one[rest.index(k)] if k in rest else total for k, total in enumerate(at_once)]
+    )
 
 
 @point_function(otherwise=True)
 def scatter_nodes(stencil: tuple, lanes: Tag, quantities: tuple, w: Work, loads: tuple) -> None:
-    """Scatter the loads of the quantities to all nodes of the stencil."""
+    """Scatter the loads to all stencil nodes."""
     _scatter(quantities, w, stencil, loads)
 
 
@@ -228,14 +232,14 @@ def _scatter_nodes_stencil(stencil, lanes, quantities, w, loads):
     if isinstance(lanes, OneByOne):
         _scatter(quantities, w, stencil, loads)
         return
-    parts, given = affine_parts(quantities, w, stencil, loads), (quantities, loads)
+    parts, sources = affine_parts(quantities, w, stencil, loads), (quantities, loads)
     if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
         _scatter(quantities, w, stencil, loads)
     elif product.sees_same_nodes(stencil):
-        _scatter_parts(lanes, w, product.with_one_node(stencil), given, parts)
+        _scatter_parts(lanes, w, product.with_one_node(stencil), sources, parts)
     else:
         _ask_ahead(quantities, w, stencil)
-        _scatter_parts(lanes, w, stencil, given, parts)
+        _scatter_parts(lanes, w, stencil, sources, parts)
 
 
 @scatter_nodes.on(CornerStencil)
@@ -260,8 +264,8 @@ def _scatter_block(lanes, quantities, w, block, loads):
     _scatter_parts(lanes, at, block, (quantities, loads), parts)
 
 
-def _scatter_parts(lanes, w, stencil, given, parts):
-    quantities, loads = given
+def _scatter_parts(lanes, w, stencil, sources, parts):
+    quantities, loads = sources
     affine = tuple([part for part in parts if len(part)])
     if len(affine):
         give_affine(lanes, w, stencil, affine)

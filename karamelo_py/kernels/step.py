@@ -1,7 +1,7 @@
-"""The rows of a step, compiled or in plain Python, and the loop over steps.
+"""The rows of a step, compiled or interpreted, and the loop over steps.
 
-Many steps run in one compiled call. Where hooks are written in Python, the same source runs
-interpreted and calls them between rows.
+Many steps run in one compiled call. With hooks written in Python, the same source runs interpreted
+and calls them between rows.
 """
 
 import functools
@@ -25,7 +25,7 @@ from karamelo_py.points.laws import wave_speed_squared
 
 
 class Fused(NamedTuple):
-    """As few visits of the points as possible; no hooks on points between them."""
+    """As few visits of the points as possible; no hooks on points in between."""
 
 
 class Staged(NamedTuple):
@@ -33,20 +33,19 @@ class Staged(NamedTuple):
 
 
 def rows_of(scheme: Any, visits: Any) -> list[Any]:
-    """List the rows of a step."""
     return table.fused(scheme.rows) if visits is Fused else table.staged(scheme.rows)
 
 
 def first_rows(scheme: Any, visits: Any) -> list[Any]:
-    """List what precedes the first fused step: the scatter of its last visit."""
+    """List the rows before the first fused step: the scatter of its last visit."""
     if visits is not Fused:
         return []
     return [rows_of(scheme, Fused)[-1]._replace(gathers=False, only_if_more=False, moves=False)]
 
 
 def untaken(rows: Iterable[Any], backend: type) -> list[str]:
-    """Name the kinds of rows that a back end cannot take."""
-    # Others become these before they are taken.
+    """Name the kinds of rows without an implementation on a back end."""
+    # Rows become others before they are taken.
     combined = table.Gather, table.Scatter, table.SceneTask, table.Repeated
     kinds = dict.fromkeys(type(row) for row in rows if not isinstance(row, combined))
     return [kind.__name__ for kind in kinds if not take.defined(kind, backend)]
@@ -57,7 +56,7 @@ class InStep(NamedTuple):
 
     mode: Tag  # one thread, or several
     hooks: Tag  # of the fixes
-    more: bool  # another step follows: a fused one leaves its sums on the nodes
+    more: bool  # another step follows: leave its sums on the nodes (fused)
 
 
 class StepKind(NamedTuple):
@@ -141,7 +140,7 @@ _begin_rows: Any = functools.cache(first_rows)
 
 
 def step(kind: StepKind, s: Setup, hooks: Tag, more: bool) -> bool:
-    """Take a step; with `more` a fused one leaves the next sums. Return whether no point failed."""
+    """Take a step; if `more`, a fused one leaves the next sums. Return whether no point failed."""
     scheme, visits, mode = kind
     return _take_all(_step_rows(type(scheme), type(visits)), s, InStep(mode, hooks, more))
 
@@ -165,7 +164,7 @@ def _begin(kind, s):
 
 
 def take_rows(rows: tuple, s: Setup, mode: Tag, hooks: Tag) -> bool:
-    """Take a part of a step from Python; return whether no point failed."""
+    """Take some rows from Python; return whether no point failed."""
     return _take_all(_alone(rows), s, InStep(mode, hooks, False))
 
 
@@ -173,17 +172,16 @@ _alone: Any = functools.cache(table.one_by_one)
 
 
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)
-PATIENCE = 50  # steps above the stable limit before a run is stopped
-SMALLEST = 1e-6  # fraction of the first stable step at which a run is stopped: it would never end
+PATIENCE = 50  # steps above the stable limit that stop a run
+SMALLEST = 1e-6  # fraction of the first stable step below which a run stops
 
 
 def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
     """Take up to `count` steps, to the end time at most; return why it stopped.
 
-    DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt next
-    to 0), GAINED (spurious energy), HEATED (temperatures that no source explains), or SORT: a point
-    may soon leave the nodes of its tile. SORT depends on the points only, not on where a run is
-    resumed.
+    DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt near
+    0), GAINED (spurious energy), HEATED (unexplained temperatures), or SORT: a point may soon leave
+    the nodes of its tile. SORT depends on the points only, not on where a run resumes.
     """
     values = s.control.values
     clock = s.control.clock[0]
@@ -236,7 +234,7 @@ def _fastest(frame, kin, points, laws, control):
 
 
 def measure(s: Setup) -> None:
-    """Store the rate of the present state in the clock, for the first dt."""
+    """Store the present rate in the clock, for the first dt."""
     s.control.clock[0].rate = 0.0
     for block in s.blocks:
         _fastest(s.frame, s.kin, block.points, block.laws, s.control)

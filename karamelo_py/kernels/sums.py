@@ -7,18 +7,17 @@ from karamelo_py.compiler import at_hand, index
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Buffers, Nodes, Tag
-from karamelo_py.kernels.equations import found
+from karamelo_py.kernels.equations import node_array
 from karamelo_py.kernels.records import move_record, put_at
 
 
 def adds(quantity: NamedTuple) -> bool:
-    """Return True if a quantity adds to the values at nodes."""
     return type(quantity).adds  # type: ignore[attr-defined]
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """List the column ranges of the quantities; adjacent ones are joined."""
-    ends: dict[tuple[Any, int], int] = {}  # the first column of each array that ends there
+    """List column ranges of the quantities, adjacent ones joined."""
+    ends: dict[tuple[Any, int], int] = {}  # first column of each array that ends there
     for one in [one for quantity in quantities for one in type(quantity).gives]:
         array, first = one.into.array, one.into.first(kin)
         ends[array, one.into.end(kin)] = ends.pop((array, first), first)
@@ -26,7 +25,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[Any, int, bool]]:
-    """List each column of the quantities, of arrays that are present; those that add last."""
+    """List the columns of the quantities in arrays that are present; adding ones last."""
     turns = sorted(quantities, key=adds)
     sums = [(one.into, adds(quantity)) for quantity in turns for one in type(quantity).gives]
     return [
@@ -38,7 +37,7 @@ def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[An
 
 
 def arrays_given(quantities: tuple, kin: Tag) -> int:
-    """Sum the kinds of arrays of the quantities: 1 the sums, 2 velocities, 4 fields."""
+    """Encode the arrays of the quantities: 1 sums + 2 velocities + 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields
@@ -53,34 +52,34 @@ def _columns(quantities: tuple, kin: NamedTuple) -> Iterator[tuple]:
 def _take_record(quantities, kin, into, out_of, keep):
     (nodes, n), (buffers, m) = into, out_of
     for name, first, end, add in _columns(quantities, kin):
-        array = found(nodes, name)
+        array = node_array(nodes, name)
         if array is not None:
             like = (0,) * (end - first)
-            move_record((array, n), (found(buffers, name), m), first, like, add or keep)
+            move_record((array, n), (node_array(buffers, name), m), first, like, add or keep)
 
 
 def _clear_record(quantities, kin, nodes, n):
     for name, first, end, add in _columns(quantities, kin):
-        array = found(nodes, name)
+        array = node_array(nodes, name)
         if array is not None and not add:
             put_at(array, n, first, (0,) * (end - first))
 
 
 @by_threads
 def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
-    """Sum the quantities at the nodes of a part, tile after tile, box after box."""
+    """Sum the quantities at a part of the nodes, tile by tile, box by box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts
     for part in range(first[share], first[share + 1]):
-        what, count = parts[part, 9], parts[part, 4]
+        action, count = parts[part, 9], parts[part, 4]
         for i in range(parts[part, 2]):
             for j in range(parts[part, 3]):
                 n = parts[part, 0] + i * parts[part, 5] + j * parts[part, 6]
                 m = parts[part, 1] + i * parts[part, 7] + j * parts[part, 8]
-                if what == arrays.CLEAR:
+                if action == arrays.CLEAR:
                     for k in range(count):
                         _clear_record(quantities, kin, nodes, index(n + k))
                 else:
                     for k in range(count):
                         into, out_of = (nodes, index(n + k)), (buffers.nodes, index(m + k))
-                        _take_record(quantities, kin, into, out_of, what == arrays.ADD)
+                        _take_record(quantities, kin, into, out_of, action == arrays.ADD)

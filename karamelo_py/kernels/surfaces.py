@@ -1,8 +1,8 @@
-"""Faces in trees of boxes: the distance of a position from the nearest, and if they enclose it.
+"""Faces in trees of boxes: distance to the nearest, and whether they enclose a position.
 
-Faces are simplices: points in 1D, segments in 2D, triangles in 3D; leaves of a binary tree of
+Faces are simplices (points in 1D, segments in 2D, triangles in 3D), leaves of a binary tree of
 boxes. Node k has the children 2k and 2k + 1: a walk needs no stack. A position is enclosed if the
-faces wind around it: each face that a ray along the last axis crosses counts 1 or -1, by its side.
+faces wind around it: each face crossed by a ray along the last axis counts 1 or -1, by its side.
 Faces with a common edge find the same crossings bit for bit, and whether an edge is reached is a
 comparison without rounding: no position is counted twice or omitted. (Winding number: Sunday 2001;
 triangles: Ericson 2005, section 5.1.5.)
@@ -23,25 +23,25 @@ TINY = float(np.finfo(float).tiny)
 
 
 class Surface(NamedTuple):
-    """Faces in a tree of boxes, whose nodes are counted from 1."""
+    """Faces in a tree of boxes, nodes numbered from 1."""
 
     low: np.ndarray  # (2 l, d) corners of the boxes; the last l nodes are leaves
     high: np.ndarray
     faces: np.ndarray  # (m, d, d): face, corner, direction
-    odd: bool  # an odd number of crossings encloses: faces have no sides
+    odd: bool  # enclosed by an odd number of crossings: faces have no sides
 
 
 class Convex(NamedTuple):
-    """The part of space below planes and in a ball, or a cylinder, which may be infinite."""
+    """The region below planes and in a ball or (infinite) cylinder."""
 
-    planes: np.ndarray  # (k, d + 1): normals into it, and their products with a place
-    across: np.ndarray  # (d,) 1 along the axes across which it is round, else 0
+    planes: np.ndarray  # (k, d + 1): inward normals, and their products with a place
+    across: np.ndarray  # (d,) 1 along axes across which it is round, else 0
     centre: np.ndarray  # (d,)
     radius: float
 
 
 def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surface:
-    """Put `faces` (m, d, d) into a tree, whose boxes are wider by `margin`."""
+    """Put `faces` (m, d, d) into a tree with boxes wider by `margin`."""
     count, _, d = faces.shape
     middle = faces.mean(axis=1)
     extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
@@ -66,7 +66,7 @@ def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surfac
 
 @noinline
 def _behind(k):
-    """Return the node visited after node `k` and its subtree; 0 after the last."""
+    """Return the node after node `k` and its subtree; 0 after the last."""
     k += 1
     while k & 1 == 0:
         k >>= 1
@@ -83,7 +83,7 @@ def _from_line(a, b, x):
 
 
 def _share_along(way, local):
-    """Return the fraction of a segment at its point nearest to a place."""
+    """Return the fraction of a segment at the point nearest to a place."""
     return min(max(dot(way, local) / max(way.squared(), TINY), 0.0), 1.0)
 
 
@@ -128,11 +128,11 @@ def _from_triangle(kin, surface, i, x):
 
 @noinline
 def _from_box(kin, surface, k, x):
-    found = 0.0
+    square = 0.0
     for c in range(kin.dimension):
         away = max(max(surface.low[k, c] - x[c], x[c] - surface.high[k, c]), 0.0)
-        found += away * away
-    return found
+        square += away * away
+    return square
 
 
 def _nearer(kin, surface, k, x, best):
@@ -144,15 +144,15 @@ def _nearer(kin, surface, k, x, best):
 
 @noinline
 def distance(kin, surface, x, reach):
-    """Return the distance of `x` from the nearest face, `reach` at most."""
+    """Return the distance to the nearest face, `reach` at most."""
     leaves = surface.low.shape[0] // 2
     best = reach * reach
     k = 1
-    while k < leaves:  # to a near face, so that the walk enters few boxes
-        here, there = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
-        if min(here, there) >= best:
+    while k < leaves:  # descend to a near face first: the walk then enters few boxes
+        left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
+        if min(left, right) >= best:
             break
-        k = 2 * k if here <= there else 2 * k + 1
+        k = 2 * k if left <= right else 2 * k + 1
     if k >= leaves:
         best = _nearer(kin, surface, k, x, best)
     k = 1
@@ -193,17 +193,17 @@ def _place_on_triangle(kin, surface, i, x):
     size = normal.squared()
     if _is_above((a, b, c), normal, size, x):
         return x - dot(x - a, normal) / size * normal
-    found, best = _on_line(a, b, x), _from_line(a, b, x)
+    closest, best = _on_line(a, b, x), _from_line(a, b, x)
     if _from_line(b, c, x) < best:
-        found, best = _on_line(b, c, x), _from_line(b, c, x)
+        closest, best = _on_line(b, c, x), _from_line(b, c, x)
     if _from_line(c, a, x) < best:
-        found = _on_line(c, a, x)
-    return found
+        closest = _on_line(c, a, x)
+    return closest
 
 
 @noinline
 def nearest(kin, surface, x, reach):
-    """Return the place on the nearest face, which is nearer to `x` than `reach`."""
+    """Return the place on the nearest face, which must be nearer than `reach`."""
     leaves = surface.low.shape[0] // 2
     best, face = reach * reach, 0
     k = 1
@@ -227,7 +227,7 @@ def _crossed(a, b, place):
     (ax, ay), (bx, by), (x, y) = a, b, place
     if (ay > y) == (by > y):
         return 0
-    if ay < by:  # the same for both faces of an edge
+    if ay < by:  # same operations for both faces of an edge
         return 1 if x < ax + (y - ay) / (by - ay) * (bx - ax) else 0
     return -1 if x < bx + (y - by) / (ay - by) * (ax - bx) else 0
 
@@ -253,19 +253,19 @@ def _crossing_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
     flat = [(corner[0], corner[1]) for corner in (a, b, c)]
     place = x[0], x[1]
-    found = _crossed(flat[0], flat[1], place)
-    found += _crossed(flat[1], flat[2], place)
-    found += _crossed(flat[2], flat[0], place)
-    if found == 0:
+    winding = _crossed(flat[0], flat[1], place)
+    winding += _crossed(flat[1], flat[2], place)
+    winding += _crossed(flat[2], flat[0], place)
+    if winding == 0:
         return 0
     normal = _cross(b - a, c - a)
     low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
-    # A triangle seen edge-on has any height between its ends: the position is next to it.
+    # Edge-on, any height between its ends: the position is next to it.
     height = low
     if normal[2] != 0:
         fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
         height = min(max(a[2] - fall / normal[2], low), high)
-    return found if height > x[2] else 0
+    return winding if height > x[2] else 0
 
 
 @noinline
@@ -273,7 +273,7 @@ def encloses(kin, surface, x):
     """Return True if the faces enclose `x`."""
     leaves, count = surface.low.shape[0] // 2, surface.faces.shape[0]
     last = kin.dimension - 1
-    found = 0
+    winding = 0
     k = 1
     while k > 0:
         near = x[last] <= surface.high[k, last]
@@ -285,9 +285,9 @@ def encloses(kin, surface, x):
             if near:
                 first = LEAF * (k - leaves)
                 for i in range(first, min(first + LEAF, count)):
-                    found += _crossing(kin, surface, i, x)
+                    winding += _crossing(kin, surface, i, x)
             k = _behind(k)
-    return found & 1 != 0 if surface.odd else found != 0
+    return winding & 1 != 0 if surface.odd else winding != 0
 
 
 def _place(kin, x, p):
@@ -304,29 +304,29 @@ _depths = by_threads(_depths_of_some)
 
 
 def depths(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
-    """Return depths (n,) of positions (n, d) in a surface, `reach` at most, below 0 outside."""
+    """Return depths (n,) of positions (n, d) in a surface: at most `reach`, < 0 outside."""
     return _of(_depths, surface, x, float(reach))
 
 
-def _distances_of_some(shape, x, reach, found, n):
+def _distances_of_some(shape, x, reach, out, n):
     kin, surface = at_hand(shape)
     for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
-        found[p] = distance(kin, surface, _place(kin, x, p), reach)
+        out[p] = distance(kin, surface, _place(kin, x, p), reach)
 
 
 _distances = by_threads(_distances_of_some)
 
 
 def distances(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
-    """Return distances (n,) of positions (n, d) from the nearest face, `reach` at most."""
+    """Return distances (n,) of positions (n, d) from the nearest face, at most `reach`."""
     return _of(_distances, surface, x, float(reach))
 
 
 def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
     d = surface.low.shape[1]
-    places, found = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
-    kernel(Serial(), -(-len(x) // CHUNK), (KINEMATICS[d](), surface), places, *more, found)
-    return found
+    places, out = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
+    kernel(Serial(), -(-len(x) // CHUNK), (KINEMATICS[d](), surface), places, *more, out)
+    return out
 
 
 # --- shapes: what regions are for kernels -------------------------------------------------------
@@ -335,36 +335,36 @@ def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
 class HalfSpace(NamedTuple):
     """One side of a plane."""
 
-    normal: np.ndarray  # (d,) into it
+    normal: np.ndarray  # (d,) inward
     offset: float  # its product with a place on the plane
 
 
 class Joined(NamedTuple):
-    """The union of some shapes."""
+    """Union of shapes."""
 
     parts: tuple
 
 
 class Common(NamedTuple):
-    """The intersection of some shapes."""
+    """Intersection of shapes."""
 
     parts: tuple
 
 
 class Outside(NamedTuple):
-    """The complement of a shape."""
+    """Complement of a shape."""
 
     part: NamedTuple
 
 
 @point_function()
 def depth(shape, kin, x, reach):
-    """Return the depth of `x` in a shape, below 0 outside; exact below `reach`."""
+    """Return the depth of `x` in a shape, < 0 outside; exact below `reach`."""
 
 
 @point_function(otherwise=True)
 def slopes(shape, kin, x, reach, within_and_step):
-    """Return the differences of depth from a step before `x`, at depth `within`, to a step on."""
+    """Return depth a step after minus a step before `x`, per axis; `within` is the depth at `x`."""
     return _slopes_across(shape, kin, x, reach, within_and_step[1])
 
 
@@ -382,25 +382,27 @@ def _slopes_at_surface(shape, kin, x, reach, within_and_step):
 
 @noinline
 def _slopes_across(shape, kin, x, reach, step):
-    found = []
+    differences = []
     for k in range(kin.dimension):
         aside = kin.Vector._make([step if c == k else 0.0 for c in range(kin.dimension)])
-        found.append(depth(shape, kin, x - aside, reach) - depth(shape, kin, x + aside, reach))
-    return kin.Vector._make(found)
+        differences.append(
+            depth(shape, kin, x - aside, reach) - depth(shape, kin, x + aside, reach)
+        )
+    return kin.Vector._make(differences)
 
 
 @depth.on(Surface)
 def _depth_in_surface(shape, kin, x, reach):
-    found = distance(kin, shape, x, reach)
-    return found if encloses(kin, shape, x) else -found
+    away = distance(kin, shape, x, reach)
+    return away if encloses(kin, shape, x) else -away
 
 
 @depth.on(HalfSpace)
 def _depth_in_half_space(shape, kin, x, reach):
-    found = -shape.offset
+    height = -shape.offset
     for c in range(kin.dimension):
-        found += shape.normal[c] * x[c]
-    return found
+        height += shape.normal[c] * x[c]
+    return height
 
 
 @depth.on(Convex)
@@ -408,23 +410,23 @@ def _depth_in_convex(shape, kin, x, reach):
     square = 0.0
     for c in range(kin.dimension):
         square += shape.across[c] * (x[c] - shape.centre[c]) ** 2
-    found = min(shape.radius - sqrt(square), reach)
+    least = min(shape.radius - sqrt(square), reach)
     for i in range(shape.planes.shape[0]):
         below = -shape.planes[i, kin.dimension]
         for c in range(kin.dimension):
             below += shape.planes[i, c] * x[c]
-        found = min(found, below)
-    return found
+        least = min(least, below)
+    return least
 
 
 @depth.on(Joined)
 @depth.on(Common)
 def _depth_in_parts(shape, kin, x, reach):
     choose = max if isinstance(shape, Joined) else min
-    found = depth(shape.parts[0], kin, x, reach)
+    combined = depth(shape.parts[0], kin, x, reach)
     for part in shape.parts[1:]:
-        found = choose(found, depth(part, kin, x, reach))
-    return found
+        combined = choose(combined, depth(part, kin, x, reach))
+    return combined
 
 
 @depth.on(Outside)

@@ -1,8 +1,8 @@
 """Sweeps over the points, tile by tile, and over the nodes in use.
 
-The points of a tile scatter to a separate buffer: a dense box of the nodes that they may reach.
-Then each tile of nodes sums the boxes that reach it. Threads divide tiles, without atomics; sums
-have one order, whatever the number of threads.
+The points of a tile scatter to a separate buffer: a dense box of the nodes they may reach. Then
+each tile of nodes sums the boxes that reach it. Threads divide tiles, without atomics; sums have
+one order, whatever the number of threads.
 """
 
 from math import inf
@@ -43,15 +43,15 @@ from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.transfers import in_step
 
 ROUNDING = 1e-3  # rounding of distances, in cells
-STRETCH = 64  # points, whose totals and arrays fit in the nearest cache
+STRETCH = 64  # points whose totals and arrays fit in the nearest cache
 
 
 class Visit(NamedTuple):
-    """Tags of the tasks of a visit of points, then of the quantities it scatters."""
+    """Tags of a visit of points: tasks, then quantities to scatter."""
 
     tasks: tuple
     quantities: tuple
-    weights: Tag  # of the scatter: `OldWeights` or `PresentWeights`
+    weights: Tag  # of the scatter: old or present
 
 
 class Extent(NamedTuple):
@@ -60,7 +60,7 @@ class Extent(NamedTuple):
     dt: Number
     gathers: bool
     scatters: bool
-    moves: bool  # new places go to the other of the two arrays
+    moves: bool  # new places go to the other array
 
 
 class Context(NamedTuple):
@@ -77,7 +77,7 @@ class Context(NamedTuple):
     now: int
     room: Number  # cells that points may still move within their tile's box
     stride: Number  # cells that they may move at all
-    common: tuple  # (d,) velocity that speeds are measured from
+    common: tuple  # (d,) reference velocity for speeds
     then: int  # index of the array of new places
     gathers: bool  # whether tasks are done
     scatters: bool  # whether quantities are scattered
@@ -86,11 +86,11 @@ class Context(NamedTuple):
 
 
 class OldWeights(NamedTuple):
-    """Weights of the gather, at the place before the move."""
+    """Weights at the place before the move, as in the gather."""
 
 
 class PresentWeights(NamedTuple):
-    """Weights at the place after the move."""
+    """Weights after the move."""
 
 
 def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
@@ -107,7 +107,7 @@ def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
-    """Return True while points scatter to their tile's box; others do after they are sorted."""
+    """Return True while points fit their tile's box; else they scatter after sorting."""
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
@@ -131,7 +131,7 @@ def scatter_point(visit: Visit, lanes: Tag, pt: PointView, out: Work) -> None:
 
 
 class TileVisit(NamedTuple):
-    """A visit of the points from `begin` to before `end`, those of a tile."""
+    """A visit of a tile's points, `begin` to before `end`."""
 
     visit: Visit
     s: Context
@@ -144,10 +144,10 @@ class TileVisit(NamedTuple):
 
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
-    """Visit the points of the t-th occupied tile of a block in the context `s`.
+    """Visit the points of the t-th occupied tile of a block.
 
-    One kernel serves a scheme's fused and its single stages. From the first point on that failed,
-    or left its box, a tile scatters nothing more: the run ends, or points are sorted and scatter.
+    One kernel serves a scheme's fused and single stages. After the first point that failed or left
+    its box, a tile scatters nothing more: the run ends, or points are sorted and scatter.
     """
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
@@ -170,7 +170,7 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
 
 
 def _without_gather(tile, p, moved):
-    """Return the move of a point that only scatters: infinite outside the grid."""
+    """Return the move of a point that only scatters; infinite outside the grid."""
     s, w = tile.s, tile.w
     if not s.frame.moves:
         return moved
@@ -178,7 +178,7 @@ def _without_gather(tile, p, moved):
 
 
 def _visit_at_once(tile):
-    """Gather, update and scatter points one by one, or a few at once in lanes."""
+    """Gather, update and scatter points one by one, or a few in lanes."""
     visit, s, lanes, w, out, begin, end = tile
     dt = s.dt
     furthest = fastest = zero_of(lanes, dt)
@@ -206,7 +206,7 @@ def _visit_at_once(tile):
 
 
 def _visit_in_stretches(tile):
-    """Gather, update and scatter a stretch of points in a loop each (see `one_loop_each`)."""
+    """Gather, update and scatter a stretch of points in a loop each (`one_loop_each`)."""
     visit, s, lanes, w, out, begin, end = tile
     dt, wide = s.dt, lanes_of_update(lanes, visit)
     like = empty_all(visit.tasks, w, zero_vector(s.kin, dt))
@@ -265,7 +265,7 @@ def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
 
 def context_of(s: Setup, extent: Extent) -> Context:
     clock, (dt, gathers, scatters, moves) = s.control.clock[0], extent
-    # A little more, so that points are sorted whenever one did not fit (see run.tiles).
+    # A little more: points are sorted whenever one did not fit (see run.tiles).
     room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
     return Context(
         s.frame, s.kin, s.basis, in_step(s.transfer, clock.kept), s.averaging, s.grids, s.nodes,
@@ -276,25 +276,19 @@ def context_of(s: Setup, extent: Extent) -> Context:
     )  # fmt: skip
 
 
-# Parts of a sweep, by the class of its mode.
-
-
 @point_function(otherwise=True)
 def sweep_points(mode: Tag, visit: Visit, s: Context, block: Block) -> None:
-    """Sweep over the points of one block."""
     visit_shares(mode, block.tiling.count[1], visit, s, block, 0)
 
 
 @point_function(otherwise=True)
 def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
-    """Sum the quantities at the nodes, if due."""
     count = s.buffers.count[0] if due else 0
     sum_shares(mode, count, quantities, s.kin, s.nodes, s.buffers)
 
 
 @point_function(otherwise=True)
 def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
-    """Do `task` at every node in use."""
     _visit_nodes(mode, s.ranges[0, 0], task, (s.kin, s.nodes, s.ranges), dt)
 
 
@@ -303,7 +297,7 @@ def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
 
 @point_function(otherwise=True)
 def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context) -> None:
-    """Sweep over the points of all blocks, and begin to send to other processes."""
+    """Sweep over all blocks; begin to send to other processes."""
     for block in s.blocks:
         sweep_points(mode, visit, context, block)
 
@@ -320,7 +314,7 @@ def sweep(s: Setup, mode: Tag, visit: Visit, extent: Extent) -> None:
 
 
 def sum_given(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
-    """Sum the quantities at the nodes, from here and other processes, if due."""
+    """Sum the quantities at the nodes, from all processes, if due."""
     if len(quantities):
         take_over(s.control.ranks, due & (s.buffers.count[1] == 0))
         sum_buffers(mode, quantities, s, due)

@@ -1,11 +1,10 @@
 """Rows of schemes, and the fused and staged steps made of them.
 
-The class attribute ``rows`` of a scheme lists its stages once. From these follow the staged step,
-in which fixes act on points between stages; the fused step with as few visits of the points as
-possible, whose first scatter joins the last visit of the previous step; the text of `karamelo-py
-check`; and the memory traffic of `karamelo-py bench`.
-
-F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
+A scheme's class attribute ``rows`` lists its stages once. From it follow the staged step, in which
+fixes act on points between stages; the fused step with as few visits of the points as possible,
+whose first scatter joins the last visit of the previous step; the text of `karamelo-py check`; and
+the memory traffic of `karamelo-py bench`. F-bar, XPIC, heat and contact are rows that a scene adds
+(`plain`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -28,53 +27,53 @@ from karamelo_py.points.transfers.xpic import XPIC
 
 
 class Processor(NamedTuple):
-    """Back end: loops of the threads of a processor."""
+    """Back end: loops on the threads of a processor."""
 
 
 @point_function(tags=2)
 def take(row: Any, backend: Any) -> Any:
     """Take a row on a back end, `Processor` or `~.compiler.gpu.Card`: ``take.on(Row, Card)``.
 
-    Processor: ``(row, s, step)`` of a `Setup` and an `~.kernels.step.InStep`, traced; may return
+    Processor: traced ``(row, s, step)`` of a `Setup` and an `~.kernels.step.InStep`; may return
     whether no point failed. Card: ``(row, steps)`` of a `~.run.gpu.StepsOnCard`; yields launches.
     """
 
 
 class AtPoints(NamedTuple):
-    """Fixes act on points; `then` is 1 if their new positions are known, else 0."""
+    """Fixes act on points; `then` is 1 if new positions are known, else 0."""
 
     stage: int
     then: int
 
 
 class AtNodes(NamedTuple):
-    """Fixes act on nodes; `target` is one of `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`."""
+    """Fixes act on nodes; `target`: `arrays.ON_SUMS`, `ON_UPDATE` or `ON_VELOCITY`."""
 
     stage: int
     target: int
 
 
 class Gather(NamedTuple):
-    """Grid to points: a task for a fraction of dt, of this step or the last."""
+    """Grid to points: a task for a fraction of dt."""
 
     task: NamedTuple
     share: float = 1.0
-    of_last_step: bool = False  # the velocity before the update belongs to the last step
+    of_last_step: bool = False  # of the last step: the velocity before the update
 
 
 class Scatter(NamedTuple):
-    """Points to grid: quantities, with the weights before the move or after it."""
+    """Points to grid, with weights before or after the move."""
 
     quantities: tuple
     weights: NamedTuple = PresentWeights()
 
 
 class NodeTask(NamedTuple):
-    """A task at every node in use: a tag, or a function of the setup that returns one."""
+    """A task at every node in use: a tag, or a function of the setup returning one."""
 
     task: Any
     at: Any = None  # function of the setup: one with other nodes
-    length: Any = None  # function of the setup: the time interval, if not `kick`
+    length: Any = None  # function of the setup: the time interval, not `kick`
 
 
 class EachNode(NamedTuple):
@@ -99,7 +98,7 @@ class Once(NamedTuple):
 
 
 class WorkOfLoads(NamedTuple):
-    """The work of the loads on nodes is summed."""
+    """Sum the work of the loads on nodes."""
 
 
 class Repeated(NamedTuple):
@@ -117,7 +116,7 @@ class SceneTask(NamedTuple):
 
 
 class Check(NamedTuple):
-    """New positions are checked again, after fixes that may have changed them."""
+    """Check new positions again, after fixes on them."""
 
 
 class Sweep(NamedTuple):
@@ -128,10 +127,10 @@ class Sweep(NamedTuple):
     of_last_step: bool = False
     gathers: bool = True
     scatters: bool = True
-    moves: bool = True  # new positions go to the other of the two arrays
+    moves: bool = True  # new positions go to the other array
     only_if_more: bool = False  # the scatter belongs to the next step
     at: Any = None  # function of the setup: one with other nodes
-    reported: Any = take_reports  # accepts the reports of the points in the clock; None: nothing
+    reported: Any = take_reports  # accepts the points' reports; None: nothing does
 
 
 def each_node(function: Any) -> EachNode:
@@ -154,22 +153,22 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of one visit: strain depends on a move before it, and the step of its v."""
-    own: type = strain.Strain
+    """List the tasks of one visit; strain depends on a move before it, and the step of its v."""
+    kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
-        own = strain.StrainInMove
+        kind = strain.StrainInMove
     elif any(g.of_last_step for g in gathers):
-        own = strain.StrainOfLastStep
-    return tuple(own() if type(g.task) is strain.Strain else g.task for g in gathers)
+        kind = strain.StrainOfLastStep
+    return tuple(kind() if type(g.task) is strain.Strain else g.task for g in gathers)
 
 
 def _kinds(tags: Any) -> Any:
-    """Return the classes of tags, since tags without numbers are all equal tuples."""
+    """Return the classes of tags: tags without numbers are all equal tuples."""
     return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step with the fewest visits; the sums are on the nodes before it."""
+    """List the rows of a step with the fewest visits; sums are on the nodes before it."""
     kept = [row for row in rows if not isinstance(row, AtPoints | Check)]
     first = next(k for k, row in enumerate(kept) if isinstance(row, Scatter))
     next_sums = kept.pop(first)
@@ -177,10 +176,10 @@ def fused(rows: Iterable[Any]) -> list[Any]:
     waiting: list[Gather] = []
 
     def sweep(scatter: Scatter | None, more: bool = False) -> None:
-        found = scatter or Scatter((), OldWeights())
-        visit = Visit(_tasks(waiting), found.quantities, found.weights)
+        scattering = scatter or Scatter((), OldWeights())
+        visit = Visit(_tasks(waiting), scattering.quantities, scattering.weights)
         share, of_last_step = waiting[0][1:] if waiting else (1.0, False)
-        # The scatter of the next step reads the new positions.
+        # The next step's scatter reads new positions.
         moves = bool(waiting) or more
         scatters = scatter is not None
         out.append(Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more))
@@ -199,7 +198,7 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step one by one, as parts of the fused step's visits where possible."""
+    """List the rows one by one, as parts of the fused step's visits where possible."""
     rows = list(rows)
     return one_by_one(rows, [row.visit for row in fused(rows) if isinstance(row, Sweep)])
 
@@ -207,9 +206,11 @@ def staged(rows: Iterable[Any]) -> list[Any]:
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
     """List rows as separate visits, or as parts of `loops`."""
 
-    def loop_of(own: Visit) -> Visit:
-        part = slice(0, 1) if own.tasks else slice(1, 3)
-        return next((visit for visit in loops if _kinds(visit[part]) == _kinds(own[part])), own)
+    def loop_of(single: Visit) -> Visit:
+        items = slice(0, 1) if single.tasks else slice(1, 3)
+        return next(
+            (visit for visit in loops if _kinds(visit[items]) == _kinds(single[items])), single
+        )
 
     def alone(row: Any) -> Any:
         if isinstance(row, Gather):
@@ -236,7 +237,7 @@ def says(row: Any, setup: Any) -> str | None:
 
 
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
-    """Yield the rows of a scene with those that it adds; F-bar adds a visit before strains."""
+    """Yield a scene's rows with those it adds; F-bar adds a visit before strains."""
     for row in rows:
         if isinstance(row, SceneTask):
             yield from plain(row.rows(s), s)
@@ -247,7 +248,7 @@ def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
 
 
 class Insulated(NamedTuple):
-    """No heat flows between points."""
+    """No heat flow."""
 
     rows = ()
 
@@ -286,8 +287,8 @@ def _hold_node(s, n):
 
 
 def hold_axis(s: Setup) -> tuple:
-    """Hold the nodes on an axis of symmetry."""
-    # v_r = 0 at r = 0, where N / r is unbounded; and normals of contact are along the axis.
+    """Hold the nodes on an axis of symmetry: v_r = 0, where N / r is unbounded."""
+    # Contact normals there are along the axis.
     return (EachNode(_hold_node, _hold_axis),) if s.kin.hoops else ()
 
 
@@ -306,7 +307,7 @@ def _next_term(k: int) -> tuple:
 
 
 def average_volumes(row: Sweep) -> tuple:
-    """Average the volume change of the coming strain at the nodes (F-bar)."""
+    """Average the coming strain's volume change at the nodes (F-bar)."""
     if not (row.gathers and any(isinstance(task, strain.Strain) for task in row.visit.tasks)):
         return ()
     trial = strain.TrialStrainOfLastStep() if row.of_last_step else strain.TrialStrain()
@@ -331,9 +332,8 @@ def light_node(s):
     """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
     At most 1: a fraction below m / m_p would be less than what comes back to the node through the
-    points' velocities, and the strain of the node would run ahead of its stress. No limit in the
-    total frame with moments, which return all of the node's velocity: there any limit makes it
-    grow.
+    points' velocities, and the node's strain would run ahead of its stress. No limit in the total
+    frame with moments, which return all of the node's velocity: any limit makes it grow.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
@@ -355,7 +355,7 @@ LOSS = SceneTask(
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
 CONTACT = SceneTask(lambda s: s.contact.rows, "contact of v*")
 WORK_OF_LOADS = WorkOfLoads()
-# The deforming velocity must satisfy contact, too, if it is not v*.
+# The deforming velocity must satisfy contact too, unless it is v*.
 CONTACT_BEFORE = SceneTask(lambda s: s.contact.rows_before)
 CONTACT_AFTER = SceneTask(lambda s: s.contact.rows_after)
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
@@ -365,7 +365,7 @@ BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((MassMomentum(), InternalForce()))
 MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
-# For schemes that strain first: the nodal velocity before the forces act.
+# Schemes that strain first: nodal velocity before the forces act.
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
     AXIS,
@@ -393,7 +393,7 @@ MOVE = (
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
 )
-# The velocity of the moved points, mapped to the nodes again.
+# The moved points' velocity, mapped to the nodes again.
 MOMENTUM_AGAIN = (
     Scatter((MomentumAgain(),), OldWeights()),
     NodeTask(nodes.MomentumToVelocity()),

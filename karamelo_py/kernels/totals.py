@@ -1,4 +1,4 @@
-"""Sums that do not depend on the order of their terms: reactions, work, energies.
+"""Sums independent of the order of their terms: reactions, work, energies.
 
 A total is a superaccumulator: a fixed-point number as wide as the range of doubles, in limbs of 32
 bits with room for carries. Terms are added without rounding; a published total is right within a
@@ -19,17 +19,16 @@ LOST = LIMBS - 1  # counts terms that are NaN or infinite
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
 MANY = 1 << 10  # terms whose integers can be summed without overflow
-COARSE, FINE = 1e-200, 1e200  # range of the largest term, if terms are summed as integers
-MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # bits without the sign, ordered like the numbers
+COARSE, FINE = 1e-200, 1e200  # range of the largest term where terms are summed as integers
+MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign, ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# Rows of the totals; published values use their slots, the first of which (time, timestep, dt) are
-# not sums.
+# Rows of the totals, in slots of published values (time, timestep, dt) that are not sums.
 KINETIC, STORED, WORK = 0, 1, 2
 
 
 class Alone(NamedTuple):
-    """One process has the whole scene."""
+    """One process has all of the scene."""
 
 
 def _grow(totals, row, limb, number):
@@ -41,7 +40,7 @@ def _grow(totals, row, limb, number):
 
 @noinline
 def add_to(totals, row, x):
-    """Add `x` to a total, without rounding."""
+    """Add `x` without rounding."""
     if x == 0.0:
         return
     bits = np.float64(x).view(np.int64)
@@ -67,11 +66,11 @@ def add_to(totals, row, x):
 def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
-    As integers of two sizes, except for terms 2^30 times smaller than the largest. A number added
-    to 1.5 2^52 has its integer part in its last bits: both loops sum bits, in any order, and
+    As integers of two sizes, except terms 2^30 times smaller than the largest. A number added to
+    1.5 2^52 has its integer part in its last bits: both loops sum bits, in any order, and
     vectorise.
     """
-    if many_threads():  # each has a term or two
+    if many_threads():  # a term or two each
         for q in range(count):
             add_to(totals, row, terms[q])
         return
@@ -86,7 +85,7 @@ def add_many(totals, row, terms, count):
             add_to(totals, row, terms[q])
         return
     unit = ldexp(1.0, frexp(largest)[1] - 30)
-    per_unit, part = 1.0 / unit, unit / 2.0**52
+    per_unit, fraction = 1.0 / unit, unit / 2.0**52
     least = np.float64(unit).view(np.int64)
     high = low = small = 0
     for q in range(count):
@@ -104,22 +103,22 @@ def add_many(totals, row, terms, count):
                 add_to(totals, row, terms[q])
     add_to(totals, row, high * unit)
     above = low >> 32
-    add_to(totals, row, above * (2.0**32 * part))
-    add_to(totals, row, (low - (above << 32)) * part)
+    add_to(totals, row, above * (2.0**32 * fraction))
+    add_to(totals, row, (low - (above << 32)) * fraction)
 
 
 @noinline
-def hand_over(own, totals, row):
-    """Add a row of a thread's totals to the common totals, and zero it."""
+def hand_over(private, totals, row):
+    """Move a row of a thread's totals to the common totals."""
     for k in range(LIMBS):
-        if own[row, k] != 0:
-            add_among(totals, row, k, own[row, k])
-            own[row, k] = 0
+        if private[row, k] != 0:
+            add_among(totals, row, k, private[row, k])
+            private[row, k] = 0
 
 
 @kernel
 def carry(total):
-    """Carry digits to 0 to 2^32 - 1, the last one signed."""
+    """Carry: digits in [0, 2^32 - 1], the last one signed."""
     for k in range(LOST - 1):
         carry = total[k] >> 32
         total[k] -= carry << 32
@@ -128,7 +127,7 @@ def carry(total):
 
 @kernel
 def rounded(total):
-    """Return the value of a total (LIMBS,), which is left in digits."""
+    """Return the value of a total (LIMBS,), whose digits are carried."""
     if total[LOST] > 0:
         return np.nan
     carry(total)
@@ -162,7 +161,7 @@ def add_all(totals, row, terms):
 
 @kernel
 def add_rows(totals, rows, terms):
-    """Add each of the `terms` to the total in its row."""
+    """Add each term to the total in its row."""
     for q in range(terms.size):
         add_to(totals, rows[q], terms[q])
 
@@ -175,7 +174,7 @@ def collect(ranks, control, first, count):
 
 @point_function(otherwise=True)
 def counts(ranks, n):
-    """Return True if this process adds the terms of node `n` to totals."""
+    """Return True if this process counts the terms of node `n`."""
     return True
 
 
@@ -187,12 +186,12 @@ def number_of_all(ranks, control, number):
 
 @point_function(otherwise=True)
 def agree_on_reports(ranks, control):
-    """Find the largest move and rate, and any failed point, of all processes."""
+    """Agree on the largest move and rate, and any failed point."""
 
 
 @point_function(otherwise=True)
 def agree_on_heat(ranks, control):
-    """Find the lowest and highest temperatures of all processes."""
+    """Agree on the extreme temperatures."""
 
 
 @point_function(otherwise=True)

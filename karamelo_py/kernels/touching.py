@@ -1,6 +1,6 @@
 """Contact of points with the surface of a shape, which may move, in the loop over points.
 
-A point is a ball. Its force is along the steepest descent of its depth.
+A point is a ball; its force is along the steepest descent of its depth.
 """
 
 from collections.abc import Callable
@@ -19,8 +19,8 @@ from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
 SOFT = 0.1  # fraction of the penetration removed in a step
-ASIDE = 0.05  # of the reach: distance at which depths are compared
-LEVEL = 1e-3  # of that: a depth that changes by less has no direction
+ASIDE = 0.05  # of the reach: step of depth differences
+LEVEL = 1e-3  # of that: below this change of depth, no direction
 CALL = types.int64(types.int64)
 
 _call = caller_of(CALL)
@@ -34,39 +34,39 @@ class Touch(NamedTuple):
     shape: NamedTuple
     mu: float
     reach: float  # largest known depth
-    lost: int  # address of a function, called with a point without a way out
+    lost: int  # address of a function called for a point without a way out
 
     of_nodes = False
-    of_time = True  # its formulas are of time, also at the end of the step
+    of_time = True  # formulas of time, also at the end of the step
 
 
 def direction_of(falls, step):
-    """Return the unit direction of a depth's differences over two steps; 0 if level."""
+    """Return the unit direction of depth differences over two steps; 0 if level."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 
 
 @point_function()
-def grip_of(tag, what):
-    """Return the array of the memory of friction, or None."""
+def grip_of(tag, members):
+    """Return the array of friction memory, or None."""
 
 
 @grip_of.on(Touch)
-def _grip_of_none(tag, what):
+def _grip_of_none(tag, members):
     return None
 
 
 @noinline
-def force_of(tag, what, volume, one):
-    """Return the force (d,) of a shape on a point, a `~.hooks.Member`."""
-    kin, d, (p, _, _, values, dt) = what.kin, what.kin.dimension, one
+def force_of(tag, members, volume, one):
+    """Return a shape's force (d,) on a point, a `~.hooks.Member`."""
+    kin, d, (p, _, _, values, dt) = members.kin, members.kin.dimension, one
     none = zero_vector(kin, 0.0)
     way = none._make(values[:d])
-    place = none._make([float(x) for x in load_vector(kin, what.x, p)])
-    ball = radius(kin, float(volume), place)
-    x = place - way
-    grip = grip_of(tag, what)
-    # Most points are far away: a short reach is cheap.
+    position = none._make([float(x) for x in load_vector(kin, members.x, p)])
+    ball = radius(kin, float(volume), position)
+    x = position - way
+    grip = grip_of(tag, members)
+    # Most points are far: a short reach is cheap.
     within = depth(tag.shape, kin, x, 1.001 * ball)
     if within <= -ball:
         if grip is not None and grip[d, p] != 0:
@@ -77,14 +77,14 @@ def force_of(tag, what, volume, one):
     step = ASIDE * tag.reach
     normal = direction_of(slopes(tag.shape, kin, x, tag.reach, (within, step)), step)
     if normal.squared() == 0:
-        if within > 0 and _call(tag.lost, what.ids[p]) == 0:
+        if within > 0 and _call(tag.lost, members.ids[p]) == 0:
             raise RuntimeError("a point has no way out")
         return none
     velocity = (1 / dt) * (none._make(values[d : 2 * d]) - way)
-    slip = velocity - none._make([float(v) for v in load_vector(kin, what.points.v, p)])
+    slip = velocity - none._make([float(v) for v in load_vector(kin, members.points.v, p)])
     contact_dt, contact_kick, kick = values[2 * d :]
-    stiffness = float(what.points.mass[p]) / (contact_dt * contact_kick)
-    # A spring that removes all penetration within a step would throw bodies back.
+    stiffness = float(members.points.mass[p]) / (contact_dt * contact_kick)
+    # Removing all penetration within a step would throw bodies back.
     push = SOFT * (within + ball) + contact_dt * dot(slip, normal)
     load = stiffness * max(push, 0.0)
     if grip is None:
@@ -92,7 +92,7 @@ def force_of(tag, what, volume, one):
     hold = none._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
     slid = none
-    if mean > 0:  # positions: velocities of points have noise
+    if mean > 0:  # from positions: velocities are noisy
         slid = none._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + SOFT * stiffness * slid, normal)
@@ -103,7 +103,7 @@ def force_of(tag, what, volume, one):
 
 
 def touch_kind(grip: type | None) -> type[Touch]:
-    """Return the class of a touch with such a grip."""
+    """Return the class of a touch with this grip."""
     if grip is None:
         return Touch
     name = f"Touch{grip.__name__}"
@@ -112,8 +112,8 @@ def touch_kind(grip: type | None) -> type[Touch]:
         kind = type(name, (Touch,), {"__module__": __name__})
 
         @grip_of.on(kind)
-        def _grip_of(tag, what):
-            return field(what.points.fields, grip)
+        def _grip_of(tag, members):
+            return field(members.points.fields, grip)
 
         return kind
 
@@ -128,14 +128,14 @@ def touch_hook(tag: Callable) -> hooks.CompiledHook:
 
 
 @hooks.results.on(Touch)
-def _results_of_touch(tag, what, one):
-    volume = volume_of(what.kin, what.points, one.law, one.state, one.p)
-    return force_of(tag, what, volume, one)
+def _results_of_touch(tag, members, one):
+    volume = volume_of(members.kin, members.points, one.law, one.state, one.p)
+    return force_of(tag, members, volume, one)
 
 
 @hooks.written.on(Touch)
-def _written_of_touch(tag, what, p, found):
-    force = field(what.points.fields, Force)
-    for c in range(what.kin.dimension):
-        force[c, p] += found[c]
-    return found
+def _written_of_touch(tag, members, p, values):
+    force = field(members.points.fields, Force)
+    for c in range(members.kin.dimension):
+        force[c, p] += values[c]
+    return values

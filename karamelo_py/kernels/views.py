@@ -1,7 +1,7 @@
-"""Views of a point, `pt`, and of a node that it sees, `node`: what equations read.
+"""Views of a point, `pt`, and of a node it sees, `node`: what equations read.
 
-Views exist while a kernel is traced; no kernel contains them. docs/house/kernels.md lists their
-attributes, with shapes and units.
+They exist only while a kernel is traced. docs/house/kernels.md lists their attributes, with shapes
+and units.
 """
 
 from collections import namedtuple
@@ -36,7 +36,7 @@ from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
 
 
 class Work(NamedTuple):
-    """Arrays and tags of a visit of points; made once per tile."""
+    """Arrays and tags of a visit; made once per tile."""
 
     frame: Tag
     kin: Tag
@@ -46,10 +46,10 @@ class Work(NamedTuple):
     averaging: Tag
     nodes: Nodes
     points: Points
-    laws: NamedTuple  # parameters of the materials, an array (m,) each
+    laws: NamedTuple  # parameters of materials, (m,) each
     places: Places
     common: tuple  # (d,) velocity that speeds are measured from
-    kick: Number  # how long forces act in the step
+    kick: Number  # time that forces act
 
 
 @algebra
@@ -74,7 +74,7 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
 
     def v_star(self, like):
-        """v* and v* - v, like the vector `like`; one record in 2D, two in 3D."""
+        """v* and v* - v, in the type of `like`; one record in 2D, two in 3D."""
         kin, records, i = self.w.kin, self.w.nodes.update, self.i
         first, d = of_change(kin), kin.dimension
         if many_threads() and not isinstance(i, Weighted):  # adjacent records
@@ -117,7 +117,6 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
 
     @property
     def nodes(self):
-        """The nodes of the stencil."""
         w = self.w
         return tuple([node_of(w, self.stencil, k) for k in range(support(w.basis, w.kin))])
 
@@ -126,12 +125,12 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
         return field(self.w.points.fields, kind)
 
     def load(self, kind, like):
-        """Load as many components of a field as `like` has; () if it is absent."""
+        """Load as many components of a field as `like` has; () if absent."""
         return load(self.of(kind), self.p, like)
 
 
 def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
-    """Load a place (w,): position, and shape of the domain."""
+    """Load a place (w,): position, and domain shape."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
 
 
@@ -153,7 +152,7 @@ def volume_of(kin: Tag, points: Points, law: Tag, state: tuple, p: Index) -> Num
 
 
 def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Index) -> tuple:
-    """Return F of a point if the frame needs it, else (); `material` is law and state."""
+    """Return F of a point if the frame needs it, else (); `material`: law and state."""
     if frame.moves:
         return ()
     law, state = material
@@ -162,7 +161,7 @@ def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Ind
 
 
 def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
-    """Prefetch the next points in 3D, if they have more arrays than hardware prefetchers follow."""
+    """Prefetch the next points in 3D, if more arrays than hardware prefetchers follow."""
     d, fields = w.kin.dimension, w.points.fields
     moment = len(zero_moment(w.transfer, w.kin, like))
     if d == 3 and (apart or moment):

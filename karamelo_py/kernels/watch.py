@@ -1,14 +1,12 @@
 """The monitor of energy and temperatures, at intervals of steps, in the compiled loop.
 
 Kinetic plus stored plus dissipated energy minus the work of loads cannot grow. Velocities belong to
-the middles of steps and stresses to their ends: two consecutive steps give energies at one time, to
-second order. Sums run over points in the order of tiles, on any number of threads.
+the middles of steps, stresses to their ends: two consecutive steps give energies at one time, to
+second order. Sums are in the order of tiles, on any number of threads. Growth is relative to the
+energy without drift (motion of the centres of mass): drift, however large, cannot hide vibrations.
 
-Growth is relative to the energy without drift (motion of the centres of mass): drift cannot hide
-vibrations, however large it is.
-
-The same looks measure the number of cells that stressed material moves through, weighted by elastic
-energy (`note_crossing`): a linear basis in the updated frame loses stress by that.
+The same looks measure how many cells stressed material moves through, weighted by elastic energy
+(`note_crossing`): a linear basis in the updated frame loses stress by that.
 """
 
 from math import exp, inf, sqrt
@@ -35,14 +33,14 @@ from karamelo_py.points.laws import (
 )
 
 LOOK = 10  # steps between two looks
-FEW = 3  # looks compared without a full window: the present and the two before
-LOOKS = 10  # looks that are averaged, in a window of 100 steps
-GROWTH = 0.01  # of the largest energy so far, in a window: more is a warning
+FEW = 3  # looks compared before a window is full
+LOOKS = 10  # looks averaged in a window, 100 steps
+GROWTH = 0.01  # of the largest energy, in a window: more is a warning
 WITHIN = 0.1  # of the unit, since the start: more is a warning
-DRIFTING = 1e-3  # of the energy of drifting bodies: relevant vibrations have more
+DRIFTING = 1e-3  # fraction of drift energy in the unit: relevant vibrations have more
 BOUND = 10.0  # times initial energy and work of loads: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
-COARSE = 1000.0  # round-off errors: a strain of this size is noise, too
+COARSE = 1000.0  # round-off of strains: as large as this are noise
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
 HEAT_NOISE = 1e-4  # of a temperature: tolerated if all are equal
 OVERSHOOT = 0.1  # of the range of temperatures from the sources: more stops the run
@@ -56,7 +54,7 @@ def solid_of(firsts, number):
 
 
 def energies_of(kin, points, laws, p):
-    """Return mass, velocity, and energies of a point: kinetic, elastic, elastic plus dissipated."""
+    """Return mass, velocity, kinetic, elastic, and elastic plus dissipated energy of a point."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
@@ -70,8 +68,8 @@ def energies_of(kin, points, laws, p):
 def _look_at_shares(matter, tiling, firsts, k):
     (kin, points, laws), tiling = at_hand(matter), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
-    for place in range(tiling.share[k], tiling.share[k + 1]):
-        t = tiling.order[place]
+    for position in range(tiling.share[k], tiling.share[k + 1]):
+        t = tiling.order[position]
         start, end = tiling.range[t, 0], tiling.range[t, 1]
         solid = solid_of(firsts, points.id[start])
         begin, behind = firsts[solid], firsts[solid + 1]
@@ -83,7 +81,7 @@ def _look_at_shares(matter, tiling, firsts, k):
             kinetic, stored = added(kinetic, of_motion), added(stored, of_strain)
             weighed = (mass, *[mass * x for x in v], elastic, *[elastic * x for x in v])
             more = zip(total, weighed, strict=True)
-            total = tuple([added(part, x) for part, x in more])
+            total = tuple([added(old, x) for old, x in more])
             if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
         put_at(tiling.report, t, ENERGIES, (kinetic, stored, solid, *total))
@@ -106,7 +104,7 @@ def _take_work(work, control):
 
 
 def sum_energies(s, mode):
-    """Sum kinetic, stored plus dissipated energy, and work, in the clock; of rigid bodies none."""
+    """Sum kinetic, stored plus dissipated energy, and work, in the clock; not of rigid bodies."""
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         if not is_rigid(block.laws):
@@ -127,7 +125,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, motion, tiling, control):
-    """Add mass and momentum of solids to the totals, then elastic energy, also times velocity."""
+    """Add the solids' mass and momentum, then elastic energy and this times velocity."""
     (ids, masses, v), firsts, sums = motion, control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
@@ -160,10 +158,10 @@ def _add_momentum(control, solid, d):
 
 
 def _sum_drift(s):
-    """Sum kinetic energies of the centres of mass in the clock, after `sum_energies`."""
+    """Sum kinetic energies of centres of mass in the clock, after `sum_energies`."""
     control, d = s.control, s.kin.dimension
-    own = control.values.size
-    control.totals[own:] = 0
+    first_row = control.values.size
+    control.totals[first_row:] = 0
     for block in s.blocks:
         points = block.points
         if not is_rigid(block.laws):
@@ -172,10 +170,10 @@ def _sum_drift(s):
 
 
 def take_drift(s):
-    """Read the totals of mass and momentum of the solids."""
+    """Read the totals of the solids' mass and momentum."""
     control, d = s.control, s.kin.dimension
-    own = control.values.size
-    totals.collect(control.ranks, control, own, control.totals.shape[0] - own)
+    first_row = control.values.size
+    totals.collect(control.ranks, control, first_row, control.totals.shape[0] - first_row)
     energy = 0.0
     for k in range(control.firsts.size - 1):
         mass = control.answer[k * (1 + d)]
@@ -187,7 +185,7 @@ def take_drift(s):
 
 
 def note_crossing(control, d):
-    """Add the cells that elastic energy has moved through since the last look.
+    """Add the cells that elastic energy moved through since the last look.
 
     Energy that leaves takes its path along; new energy has none. Vibrations renew it in the time of
     a wave there and back: transient waves count by what they move while they last.
@@ -219,7 +217,7 @@ def _sum_before(s, mode, step):
 
 
 def note_before(clock, step):
-    """Store the present energies for the look at the next step."""
+    """Store the energies for the look at the next step."""
     clock.stored_before = clock.stored
     clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step
@@ -241,11 +239,11 @@ def unit_of(clock):
 
 @kernel
 def judge(control):
-    """Update the balance with the present sums; return whether energy is within its bound."""
+    """Update the balance; return whether energy is within its bound."""
     clock = control.clock[0]
-    # The mean of the balances at the middle and the end of a step, each with the other energy
-    # interpolated. With the phase omega dt of a step, each oscillates by (omega dt)^2/8, in
-    # opposite phase, and the mean by (omega dt)^3/16.
+    # Mean of the balances at the middle and the end of a step, the other energy interpolated. With
+    # the phase omega dt of a step, each oscillates by (omega dt)^2/8, in opposite phase, and the
+    # mean by (omega dt)^3/16.
     moving = clock.kinetic - clock.work
     balance = moving + clock.level * (clock.moving_before - moving)
     balance += clock.stored_before + clock.level * (clock.stored - clock.stored_before)
@@ -259,26 +257,26 @@ def judge(control):
     clock.largest_energy = max(
         clock.largest_energy, abs(clock.kinetic), abs(clock.stored), clock.supplied
     )
-    own = max(abs(clock.stored), clock.kinetic - clock.of_drift)
-    clock.largest_own = max(clock.largest_own, own)
+    vibrating = max(abs(clock.stored), clock.kinetic - clock.of_drift)
+    clock.largest_own = max(clock.largest_own, vibrating)
     way = 0.0
     for i in range(3):
         way += clock.carried[0, i] * clock.carried[0, i]
     if clock.elastic > 0:
         way = sqrt(way) / clock.elastic
-        part = clock.elastic * (exp(2 * PER_CELL * way) - 1) / unit_of(clock)
-        if part > clock.lost:
-            clock.lost = part
+        loss = clock.elastic * (exp(2 * PER_CELL * way) - 1) / unit_of(clock)
+        if loss > clock.lost:
+            clock.lost = loss
             clock.crossed = way
-    # Means, as a single look also shows the shortest waves.
+    # Means: a single look also shows the shortest waves.
     unit = unit_of(clock)
     if clock.looks == FEW:
         clock.first_few = clock.first_mean = clock.largest_mean = (
             balance + clock.last_balance + clock.last_but_one
         ) / FEW
     if clock.looks >= 2 * FEW:
-        # The minimum of a few: in collisions a look or two may be wrong. Stored, so that the result
-        # does not depend on the last look.
+        # The minimum of a few: a look or two may be wrong in collisions. Stored: the result does
+        # not depend on the last look.
         least = min(balance, clock.last_balance, clock.last_but_one)
         clock.grown = max(clock.grown, growth(clock.first_few, least, unit))
     clock.sum_of_balance += balance
@@ -291,9 +289,9 @@ def judge(control):
         clock.windows = clock.windows + 1 if clock.growth > GROWTH else 0
         clock.grown = max(clock.grown, growth(clock.first_mean, mean, unit))
         clock.largest_mean = max(clock.largest_mean, mean)
-    given = abs(clock.first_balance) + clock.supplied
+    reference = abs(clock.first_balance) + clock.supplied
     # In this form, NaN is noticed.
-    return balance - clock.first_balance <= max(BOUND * given, clock.energy_floor)
+    return balance - clock.first_balance <= max(BOUND * reference, clock.energy_floor)
 
 
 @kernel
@@ -312,7 +310,7 @@ def _range_of_heat(kin, points, laws, control):
 
 
 def measure_heat(s):
-    """Store the lowest and highest temperature of all points in the clock."""
+    """Store the extreme temperatures of all points in the clock."""
     clock = s.control.clock[0]
     clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
     for block in s.blocks:
@@ -320,7 +318,7 @@ def measure_heat(s):
 
 
 def look_at_heat(s):
-    """Return whether temperatures are within what fixes, sources and the initial state allow."""
+    """Return whether temperatures are within what fixes, sources and initial state allow."""
     clock = s.control.clock[0]
     if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
@@ -363,7 +361,7 @@ def look(s, mode):
 
 
 def look_at_end(s, mode):
-    """Check the energy at the end of an implicit step: velocities and stresses are of one time."""
+    """Check the energy after an implicit step: velocities and stresses are of one time."""
     clock = s.control.clock[0]
     if clock.watch_energy == 0:
         return True

@@ -260,8 +260,8 @@ class StepsOnCard:
         s = heat.at_its_nodes(self.s) if of_heat else self.s
         own = [h for h, row in enumerate(self.table) if row.stage == stage]
         yield from self._clear_again(stage, own)
-        if own and target == arrays.ON_UPDATE and self.hooks.held.size:
-            yield self.launch(fixes.clear_held, self.nodes, self.hooks.held)
+        if own and target == arrays.ON_UPDATE and self.hooks.holders.size:
+            yield self.launch(fixes.clear_held, self.nodes, self.hooks.holders)
         nodes_of, length = fixes.hooked_nodes(target, of_heat), step_size if of_heat else kick
         for h in own:
             row = self.table[h]

@@ -20,7 +20,7 @@ def alike(hooks: Tag, others: Tag) -> bool:
         return type(hooks) is type(others)
     tables = ("table", "programs", "members", "code", "constants", "x0")
     pairs = ((getattr(hooks, name), getattr(others, name)) for name in tables)
-    sizes = hooks.held.shape == others.held.shape and hooks.loads.shape == others.loads.shape
+    sizes = hooks.holders.shape == others.holders.shape and hooks.loads.shape == others.loads.shape
     whole = [*map(type, hooks.whole)] == [*map(type, others.whole)] and hooks.whole == others.whole
     return sizes and whole and all(np.array_equal(one, other) for one, other in pairs)
 

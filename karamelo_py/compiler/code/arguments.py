@@ -20,7 +20,7 @@ from karamelo_py.compiler.trace.session import session
 class _Array(NamedTuple):
     """A living array; NumPy does not resize referenced ones."""
 
-    alive: weakref.ref  # another array may get the id of a deleted one
+    alive: weakref.ref  # ids of deleted arrays are reused
     shape: tuple[int, ...]
     writeable: bool
     kind: int  # equal for arrays of one type
@@ -77,7 +77,7 @@ class Plan(NamedTuple):
 
 
 class ArgumentBuffer:
-    """Words of arguments: held tuples one after another, inner first."""
+    """Words of arguments: held tuples in turn, inner ones first."""
 
     __slots__ = ("kinds", "words")
 
@@ -88,7 +88,7 @@ class ArgumentBuffer:
         self.words += words
 
     def _of(self, items: tuple) -> tuple[list, bool]:
-        """Return the words of a tuple, and whether it contains arrays."""
+        """Return a tuple's words, and whether it contains arrays."""
         words: list = []
         arrays = False
         kinds = self.kinds
@@ -125,9 +125,9 @@ class ArgumentBuffer:
         return words, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments to memory; return it and the address of the outermost tuple.
+        """Write the arguments to memory; return it and the outermost tuple's address.
 
-        `at` is the address that the memory will be copied to, if any.
+        `at`: the address that the memory will be copied to.
         """
         memory = bytearray(max(plan.text.size, 1))
         if at is None:
@@ -147,7 +147,7 @@ def _aligned(at: int, to: int) -> int:
 
 
 def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, int]:
-    """Add offsets and formats of the words of a type; return its end and alignment."""
+    """Add offsets and formats of a type's words; return end and alignment."""
     if isinstance(kind, ir.ArrayType | ir.Aggregate):
         items = [kind.element] * kind.count if isinstance(kind, ir.ArrayType) else kind.elements
         to = max([_lay(item, 0, [])[1] for item in items], default=1)
@@ -171,7 +171,7 @@ def plan_for(arguments: tuple) -> Plan:
     end = 0
 
     def lay(kind: Any) -> int:
-        """Return the offset of a held tuple, which follows its inner tuples."""
+        """Return the offset of a held tuple, after its inner tuples."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in kind]
         model = kind.register_type().pointee
@@ -193,7 +193,7 @@ def plan_for(arguments: tuple) -> Plan:
 
 
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
-    """Return the size of a result in bytes, and a function that reads it."""
+    """Return a result's size in bytes, and its reader."""
     places: list[tuple[int, str]] = []
     size, _ = _lay(llvm.memory_type(kind), 0, places)
 

@@ -65,7 +65,7 @@ def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
             return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
         raise TypeError("lanes of several types")
     lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
-    # Integers would truncate a real operand: `real(i, x)` converts lanes to reals.
+    # Integer lanes would truncate a real operand; `real(i, x)` converts them.
     if isinstance(other, types.Float) and _is_whole(lanes):
         raise TypeError("whole lanes and a real number")
     return lanes
@@ -76,7 +76,7 @@ def _is_whole(kind: types.Type) -> bool:
 
 
 def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None) -> Callable:
-    """Make an operation on a number cast to a type: ``write(builder, kind, value)``."""
+    """Return an operation on a number cast to a type: ``write(builder, kind, value)``."""
 
     def operation(a: types.Type) -> Operation | None:
         kind = kind_of(a)
@@ -162,7 +162,10 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 
 
 def _whole_division(remainder: bool) -> Callable:
-    """Make Python's integer division; x // 0 is 0."""
+    """Return Python's integer division; x
+
+    0 is 0.
+    """
 
     def write(builder: ir.IRBuilder, kind: types.Type, *values: ir.Value) -> ir.Value:
         of = _whole_parts if _is_whole(kind) else _real_parts
@@ -279,7 +282,7 @@ def _size(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
 
 
 def _extreme(sign: str) -> Callable:
-    """Make Python's min or max: the first of equal numbers."""
+    """Return Python's min or max: the first of equal numbers."""
 
     def operation(*kinds: types.Type) -> Operation | None:
         if len(kinds) < 2:
@@ -307,7 +310,7 @@ def _to(kind: types.Type) -> Callable:
 
 
 def _real_of(kind: types.Type) -> types.Type | None:
-    """Return the real type that a type converts to; None for integer lanes."""
+    """Return the real type for a type; None for integer lanes."""
     if isinstance(kind, Lanes):
         return None if _is_whole(kind) else kind
     return kind if isinstance(kind, types.Float) else types.float64
@@ -365,7 +368,7 @@ def _scaled(factor: float) -> Callable:
 
 
 def _numpy_extreme(sign: str) -> Callable:
-    """Make NumPy's minimum or maximum; NaN if an operand is."""
+    """Return NumPy's minimum or maximum; NaN if an operand is."""
 
     def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
@@ -399,7 +402,7 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
-    """Call Python's gamma, whose bits do not depend on the C library."""
+    """Call Python's gamma: its bits do not depend on the C library."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it
@@ -476,7 +479,7 @@ OPERATIONS: dict[Any, Callable] = {
 }
 
 
-# NumPy's names of the same, and of functions that convert to reals.
+# NumPy's names, and functions that convert to reals.
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,

@@ -1,6 +1,6 @@
 """Exceptions in kernels, raised again by Python after the kernel.
 
-Each call by Python has a `Failure`; LLVM functions pass its address as their last argument.
+Each call by Python has a `Failure`, whose address LLVM functions get as last argument.
 """
 
 import ctypes
@@ -44,7 +44,7 @@ def note(error: BaseException, at: int) -> None:
 
 
 def noting(function: Callable) -> Callable:
-    """Record exceptions of a Python function called by kernels, including Ctrl-C.
+    """Record exceptions of a Python function called by kernels, also Ctrl-C.
 
     Its last argument is the address of the `Failure`.
     """
@@ -90,7 +90,7 @@ def passing(function: ir.Function) -> ir.Function:
 
 
 def failure_at(builder: ir.IRBuilder) -> ir.Value:
-    """Return the address of the present `Failure`, or 0."""
+    """Return the present `Failure`'s address, or 0."""
     function = builder.function
     return function.args[-1] if hasattr(function, "passes_failure") else llvm.I64(0)
 
@@ -120,9 +120,9 @@ def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
 
 
 def go_on(builder: ir.IRBuilder, called: Any, regardless: bool) -> None:
-    """Return at once if a called function has recorded an exception.
+    """Return at once if a called function recorded an exception.
 
-    With `regardless` the function continues and leaves the check to its caller.
+    If `regardless`, continue: the caller checks.
     """
     if not hasattr(called, "raises"):
         return

@@ -12,16 +12,16 @@ from collections.abc import Callable
 
 from llvmlite import binding as llvm
 
-# Loops over up to 27 nodes of a stencil must be unrolled to have weights in registers: quadratic
-# splines in 3D are 1.7 times as fast. In long loops, a counter for each array costs registers.
+# Loops over up to 27 stencil nodes must be unrolled for weights in registers: quadratic splines in
+# 3D run 1.7 times as fast. In long loops, a counter per array costs registers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
-# At 0 compiling takes about half of the time, and steps up to four times; bits stay equal.
+# At 0, compiling takes half the time, steps up to four times; bits are equal.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 
 @functools.cache
 def features() -> str:
-    """List the instruction sets of the processor."""
+    """List the processor's instruction sets."""
     with contextlib.suppress(RuntimeError):
         return llvm.get_host_cpu_features().flatten()
     return ""
@@ -29,7 +29,7 @@ def features() -> str:
 
 @functools.cache
 def describe() -> str:
-    """Describe what determines the code besides its text."""
+    """Return what determines the code besides its text."""
     words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
     return repr((*words, features(), OPTIONS, LEVEL))
 
@@ -46,7 +46,7 @@ def _target() -> llvm.TargetMachine:
     llvm.initialize_native_asmprinter()
     _set_options()
     triple = llvm.get_process_triple()
-    # Code stays where it is loaded, so x86 needs no tables.
+    # Code stays where it is loaded: x86 needs no tables.
     where = "static" if triple.startswith(("x86", "i386", "i686")) else "default"
     return llvm.Target.from_triple(triple).create_target_machine(
         opt=LEVEL, cpu=llvm.get_host_cpu_name(), features=features(), reloc=where,
@@ -85,7 +85,7 @@ def compile_text(text: str) -> bytes:
 
 
 def assembly(text: str, triple: str, processor: str, library: bytes | None = None) -> str:
-    """Compile module text to assembly of a GPU; `library` is LLVM bitcode."""
+    """Compile module text to GPU assembly; `library` is LLVM bitcode."""
     _set_options()
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()

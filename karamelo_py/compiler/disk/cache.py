@@ -1,11 +1,11 @@
 """Compiled kernels on disk, in two levels.
 
-A file ``.kernel`` has name, result and callees of a kernel. Its key is a hash of the function, the
+A file ``.kernel`` has a kernel's name, result and callees. Its key is a hash of the function, the
 argument types and the sources of all that write kernels. Without it, the kernel is traced, and its
-machine code looked up by a hash of the LLVM text, in a file ``.code``.
+machine code looked up in a file ``.code`` by a hash of the LLVM text.
 
-Files become code: only those that no other user can write, with a correct checksum, are read. With
-any defect the kernel is compiled, and the user warned once.
+Files become code: only those that no other user can write, with a correct checksum, are read.
+Otherwise the kernel is compiled, and the user warned once.
 """
 
 import contextlib
@@ -45,7 +45,7 @@ _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
 
 class Unknown(Exception):
-    """A kernel depends on a thing without a name in other processes."""
+    """A kernel depends on a thing not named in other processes."""
 
 
 def short_hash(*words: str) -> str:
@@ -54,7 +54,7 @@ def short_hash(*words: str) -> str:
 
 @functools.cache
 def _source(path: Path) -> str:
-    """Hash a source as Python has read it; raise `Unknown` if it is newer."""
+    """Hash a source as Python read it; raise `Unknown` if it is newer."""
     with contextlib.suppress(OSError):
         about = path.stat()
         if max(about.st_mtime, about.st_ctime) < _began:
@@ -70,7 +70,7 @@ def _sources() -> str:
 
 
 def _stamp(name: str) -> str:
-    """Hash a module elsewhere, and the modules not installed that it uses."""
+    """Hash a module from elsewhere, and the uninstalled modules it uses."""
     words: dict[str, str] = {}
     ahead = {name}
     while ahead:
@@ -101,7 +101,7 @@ def _is_own(module: str, top: str) -> bool:
 
 
 def _words(thing: Any) -> str:
-    """Describe the parts of a function, equally in every process."""
+    """Describe a function's parts, equally in every process."""
     if isinstance(thing, _PLAIN):
         return f"{type(thing).__name__} {thing!r}"
     if isinstance(thing, dict):
@@ -133,7 +133,7 @@ def _words(thing: Any) -> str:
 def _class(one: type, by_name: bool = False) -> str:
     """Describe a class by name, fields and plain attributes.
 
-    Raises `Unknown` for a class not found by its name, if it is of a plug-in or `by_name`.
+    Raises `Unknown` for a class not found by its name, if of a plug-in or `by_name`.
     """
     first, *rest = one.__qualname__.split(".")
     named = _names_in(one.__module__).get(first)
@@ -146,7 +146,7 @@ def _class(one: type, by_name: bool = False) -> str:
 
 
 def describe(numba_type: Any) -> str:
-    """Describe a type, equally in every process; tags with their fields."""
+    """Describe a type, equally in every process; tags with fields."""
     how = type(numba_type).__name__  # held or a value
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
@@ -160,7 +160,7 @@ def describe(numba_type: Any) -> str:
 class KernelFiles:
     """The cached kernels of one function, loaded by `load`.
 
-    They are made for a `processor`; `called` are functions that are inlined in them.
+    For a `processor`; `called` are functions inlined in them.
     """
 
     def __init__(
@@ -241,7 +241,7 @@ def code_of(name: str) -> bytes:
 
 
 def _content(path: Path) -> bytes | None:
-    """Read a file, None if impossible; delete a damaged one."""
+    """Read a file; None if impossible; delete a damaged one."""
     try:
         content = files.read(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -264,7 +264,7 @@ def _damaged(path: Path) -> None:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write a file; delete those least recently used above `ROOM` bytes."""
+    """Write a file; delete the least recently used above `ROOM` bytes."""
     try:
         files.write(path, content)
         ages = []

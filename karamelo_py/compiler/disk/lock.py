@@ -1,4 +1,4 @@
-"""Lock by which one process compiles a kernel while others wait for its file.
+"""A lock by which one process compiles a kernel while others wait for its file.
 
 It only saves work: on read-only folders, file systems without locks, and after a timeout, each
 process compiles. The system releases it when its process ends.
@@ -17,7 +17,7 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-PATIENCE = 120.0  # seconds; a process that holds a lock longer is probably stopped
+PATIENCE = 120.0  # seconds; a longer holder is probably stopped
 PAUSE = 0.02  # seconds between two attempts
 
 waiting = contextlib.nullcontext  # context while a process waits, reported as compilation
@@ -46,7 +46,7 @@ def _take(path: Path, stack: contextlib.ExitStack) -> None:
         if not session.waits:
             return
     stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked in the meantime
-    # Waiting processes have this file open, and find the kernel when they get the lock.
+    # Waiting processes have this file open, and find the kernel once they get the lock.
     stack.callback(_take_away, path)
 
 

@@ -1,7 +1,7 @@
-"""Implementations selected by type, and the modules in which they were written.
+"""Implementations selected by type, and the modules they are written in.
 
-The key of a kernel on disk contains the sources of these modules (`cache`). Both lists are filled
-by decorators when modules are imported.
+Keys of kernels on disk contain the sources of these modules (`cache`). Decorators fill both lists
+on import.
 """
 
 import contextvars
@@ -36,13 +36,13 @@ _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("n
 
 @functools.cache
 def is_elsewhere(module: str) -> bool:
-    """Tell whether a module is neither of a library nor in `ROOMS`."""
+    """Return True if a module is neither of a library nor in `ROOMS`."""
     top, _, rest = module.partition(".")
     return top not in LIBRARIES and not (top == _PACKAGE and rest.partition(".")[0] in ROOMS)
 
 
 def modules_of(*things: Any) -> set[str]:
-    """List the modules elsewhere in which functions or classes were written."""
+    """List modules elsewhere in which functions or classes are written."""
     names = [one.__name__ if isinstance(one, python.ModuleType) else "" for one in things]
     names += [one.__module__ for one in things if hasattr(one, "__module__")]
     functions = (one for one in things if isinstance(one, python.FunctionType))
@@ -51,7 +51,7 @@ def modules_of(*things: Any) -> set[str]:
 
 
 def register(made: Callable) -> None:
-    """Put an implementation into all keys, unless the sources of `ROOMS` determine it."""
+    """Put an implementation into all keys, unless determined by the sources of `ROOMS`."""
     is_function = isinstance(made, python.FunctionType)
     has_values = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
     if has_values or modules_of(made):
@@ -59,14 +59,14 @@ def register(made: Callable) -> None:
 
 
 def note(modules: Iterable[str]) -> None:
-    """Record modules elsewhere that the present function contains."""
+    """Record modules elsewhere in the present function."""
     if noted := _noted.get():
         noted[-1].update(modules)
 
 
 @contextmanager
 def modules_noted() -> Iterator[set[str]]:
-    """Collect the modules that are recorded within this context."""
+    """Collect the modules recorded within this context."""
     modules: set[str] = set()
     before = _noted.set((*_noted.get(), modules))
     try:
@@ -76,17 +76,17 @@ def modules_noted() -> Iterator[set[str]]:
 
 
 def name_of(thing: Any) -> str:
-    """Return the name of a function or class as ``module:qualified name``."""
+    """Return ``module:qualified name`` of a function or class."""
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
 def tag_class(numba_type: Any) -> Any:
-    """Return the class of a NamedTuple type, by which point functions are selected, or None."""
+    """Return the class of a NamedTuple type, which selects point functions, or None."""
     return getattr(numba_type, "instance_class", None)
 
 
 def classes_in(numba_type: Any) -> Iterator[type]:
-    """Yield the classes of the tags in a type."""
+    """Yield the classes of tags in a type."""
     if tag_class(numba_type):
         yield numba_type.instance_class
     if isinstance(numba_type, types.BaseTuple):

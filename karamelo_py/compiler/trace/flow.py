@@ -51,8 +51,6 @@ class Counter(NamedTuple):
 
 
 class Phi(NamedTuple):
-    """A number or pointer that depends on the branch taken."""
-
     made: Value | HeldValue
     on: list
 
@@ -88,7 +86,7 @@ class Grows(Untraceable):
 
 
 def is_number_type(thing: Any) -> bool:
-    """Tell whether a thing is a number of an `algebra`."""
+    """Return True if a thing is a number of an `algebra`."""
     return hasattr(type(thing), "constant")
 
 
@@ -112,7 +110,7 @@ class Flow:
         return Edge(self.builder and self.builder.block, names, self.lowering.read)
 
     def split(self, condition: Value) -> tuple[Edge, Edge]:
-        """Start two branches, for a condition that is true or false."""
+        """Start two branches, for a condition true and false."""
         truth = emit(bool, condition)
         blocks = self._block(), self._block()
         if self.builder:
@@ -201,7 +199,7 @@ class Flow:
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
-        """Start a loop; return the variables, with phis for those that change.
+        """Start a loop; return the variables, with phis for changing ones.
 
         `grown` are new types, from `Grows`.
         """
@@ -227,7 +225,7 @@ class Flow:
         return LoopHeader(block, phis, carried, paths), names | carried
 
     def close(self, head: LoopHeader, names: dict[str, Any]) -> None:
-        """Jump back to the start of a loop."""
+        """Jump back to a loop's start."""
         values: list = []
         grown: dict[tuple, Any] = {}
         for name, before in head.names.items():
@@ -241,7 +239,7 @@ class Flow:
     def _close_phis(
         self, head: LoopHeader, before: Any, after: Any, values: list, grown: dict
     ) -> None:
-        """Collect the new values of the phis of `before`."""
+        """Collect new values of the phis of `before`."""
         if isinstance(before, Value | HeldValue):
             path = head.paths[len(values)]
             if is_number_type(after):

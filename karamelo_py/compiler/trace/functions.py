@@ -1,7 +1,7 @@
 """Select functions by argument types, and compile them where they are called.
 
-Each number is a `Value`; every operation on one is lowered at once, into the calling function.
-Tuples and classes are Python's and leave no code. `statements` compiles the text of a function.
+Each number is a `Value`; operations on it are lowered at once, into the calling function. Tuples
+and classes are Python's and leave no code. `statements` compiles a function's text.
 """
 
 import functools
@@ -182,7 +182,7 @@ def _is_plain(thing: Any) -> bool:
 
 
 def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | None:
-    """Determine a function's result type by tracing it without code."""
+    """Return a function's result type by tracing without code."""
     chosen = dispatch
     try:
         lowering = Lowering(_seen)
@@ -204,7 +204,7 @@ def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | Non
 
 
 def traced(dispatch: Callable, kinds: tuple) -> TracedFunction | None:
-    """Return the function for arguments of these types; None if none is selected."""
+    """Return the function for argument types; None if none is selected."""
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
         cached = session.functions
@@ -222,7 +222,7 @@ def traced(dispatch: Callable, kinds: tuple) -> TracedFunction | None:
 
 
 def forget() -> None:
-    """Drop cached selections: a function has a new implementation."""
+    """Drop cached selections after a new implementation."""
     if values.at_work():
         session.functions.clear()
     else:  # another Python thread may be compiling
@@ -230,14 +230,14 @@ def forget() -> None:
 
 
 def outdate_kernels() -> None:
-    """Let kernels be looked up again: functions have changed."""
+    """Let kernels be looked up again: functions changed."""
     session.changes += 1
 
 
 class PointFunction:
     """Function of one point, implemented for classes of its first `tags` arguments.
 
-    Called as plain Python, it chooses by the classes of the arguments; in kernels, by their types.
+    Plain Python calls choose by classes of the arguments, kernels by their types.
     """
 
     def __init__(self, stub: Callable, tags: int, otherwise: bool):
@@ -248,8 +248,8 @@ class PointFunction:
         self._nearest: dict[tuple[type, ...], Callable | None] = {}
 
     def find(self, classes: tuple) -> Callable | None:
-        """Find the implementation for classes, or the nearest of their bases."""
-        nearest = self._nearest  # another thread of Python may add implementations meanwhile
+        """Return the implementation for classes, or the nearest of their bases."""
+        nearest = self._nearest  # another Python thread may add implementations
         if classes not in nearest:
             bases = [c.__mro__ if isinstance(c, type) else (c,) for c in classes]
             matches = (self._table[b] for b in itertools.product(*bases) if b in self._table)

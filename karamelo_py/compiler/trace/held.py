@@ -1,8 +1,8 @@
 """Tuples of arrays stored in memory and passed as one pointer.
 
 A setup has about forty arrays of seven to nine numbers: three hundred arguments, and half of the
-code to compile. So a kernel holds its setup when it starts: a tuple with arrays becomes a pointer
-to its items, and so do nested tuples. Its type is still a tuple type.
+code to compile. So kernels hold their setup: a tuple with arrays becomes a pointer to its items,
+nested tuples too. Its type is still a tuple type.
 """
 
 import hashlib
@@ -39,7 +39,7 @@ class HeldTuple(types.BaseTuple):
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(map(_words, items))})"
-        # Short, because it is part of function names.
+        # Short: part of function names.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
@@ -103,9 +103,9 @@ def item_of(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: int) -
 
 
 def at_hand(value: Any) -> Any:
-    """Copy a held tuple to private memory, so that its items stay in registers.
+    """Copy a held tuple to private memory: its items stay in registers.
 
-    For kernels with loops, before the loops; inside, LLVM cannot know that the items do not change.
+    For kernels, before their loops; inside, LLVM cannot know that items do not change.
     """
     return value
 

@@ -17,7 +17,7 @@ def _indices(index: Any) -> tuple:
 
 
 def is_part(kind: types.Array, index: Any) -> bool:
-    """Tell whether indices select a slice."""
+    """Return True if indices select a slice."""
     places = _indices(index)
     return len(places) < kind.ndim or any(isinstance(one, slice) for one in places)
 
@@ -40,7 +40,7 @@ def _index_type(lowering: Any, thing: Any) -> types.Type:
 
 
 def _index(lowering: Any, thing: Any, count: Any) -> Any:
-    """Compute an index; negative ones count from the end."""
+    """Compute an index, from the end if negative."""
     kind = _index_type(lowering, thing)
     value = lowering.lowered(thing, types.intp)
     is_positive = isinstance(thing, int) and thing >= 0

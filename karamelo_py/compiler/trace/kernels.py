@@ -1,7 +1,7 @@
 """Kernels: loops called by Python and other kernels, traced as a whole and cached on disk.
 
-A kernel is one LLVM function for argument types; its name contains the hash of its text, and other
-kernels refer to it. Python calls its entry with the address of the arguments.
+A kernel is one LLVM function for argument types; other kernels refer to it by its name, which
+contains the hash of its text. Python calls its entry with the arguments' address.
 """
 
 import contextvars
@@ -43,16 +43,16 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 class Unit(NamedTuple):
     """Machine code of a function for argument types."""
 
-    name: str  # its entry for Python has this name plus ENTRY
+    name: str  # the entry for Python adds ENTRY
     result: types.Type
     code: bytes  # an object file; empty if it is to be read from the disk
     needs: tuple  # the units that it calls
-    modules: frozenset[str]  # elsewhere that it consists of, also its needs
+    modules: frozenset[str]  # modules elsewhere in it and its needs
     raises: bool  # whether something in it raises exceptions
 
 
 def load(unit: Unit) -> list[int]:
-    """Load a unit; return the addresses of its function and its entry."""
+    """Load a unit; return the addresses of function and entry."""
     with one_at_a_time:
         loaded = session.loaded
         if unit.name not in loaded:
@@ -98,7 +98,7 @@ lock.waiting = compilation
 
 @contextmanager
 def _no_collections() -> Iterator[None]:
-    """Disable the garbage collector, which would traverse a trace in vain."""
+    """Disable garbage collection, which would traverse a trace in vain."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -114,10 +114,10 @@ def written(
     result: types.Type | None = None,
     entry: Callable | None = None,
 ) -> tuple[ir.Module, types.Type]:
-    """Compile a function for arguments of these types; return module and result type.
+    """Compile a function for argument types; return module and result type.
 
-    The module has attributes `needs`, the units that it calls, and `raises`, as in `Unit`.
-    ``entry(module, main, kinds, result)`` writes an entry other than Python's.
+    The module has `needs`, the units it calls, and `raises`, as in `Unit`. ``entry(module, main,
+    kinds, result)`` writes another entry than Python's.
     """
     with one_at_a_time:
         chosen = traced(function, kinds)
@@ -168,7 +168,7 @@ def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: typ
 
 
 class Kernel:
-    """A function called from Python and other kernels, compiled by types and cached on disk.
+    """A function called from Python and kernels, compiled by types and cached on disk.
 
     Tuples with arrays are passed by reference.
     """
@@ -214,7 +214,7 @@ class Kernel:
         self._planned(ArgumentBuffer(arguments), arguments)
 
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
-        """Return argument layout, entry, and size and reader of the result."""
+        """Return argument layout, entry, and result size and reader."""
         kinds = tuple(written.kinds)
         self._find_changes()
         plans = self._plans
@@ -258,7 +258,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain it, and need not be compiled again for another function.
+    Callers do not contain it: another function does not compile them again.
     """
     key = function, signature, session.changes
     addresses = session.addresses
@@ -273,8 +273,8 @@ def address_of(function: Callable, signature: types.Type) -> int:
 def address_of_python(function: Callable, signature: types.Type) -> Address:
     """Return the address by which kernels call a Python function of integers.
 
-    Its exceptions are raised after the kernel. Store the `Address`, not an int made from it, while
-    kernels may call it.
+    Its exceptions are raised after the kernel. While kernels may call it, store the `Address`, not
+    an int made from it.
     """
     if choices.INTERPRETED:
         callback: Any = functools.partial(function)  # a bound method would be freed at once

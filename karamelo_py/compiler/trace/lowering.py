@@ -17,7 +17,7 @@ from karamelo_py.compiler.trace.choices import tag_class
 from karamelo_py.compiler.trace.held import HeldTuple, item_of
 from karamelo_py.compiler.trace.session import session
 
-MOST_OPERATIONS = 10_000  # of one function; above it, a loop is better left to LLVM
+MOST_OPERATIONS = 10_000  # of one function; above, a loop is better left to LLVM
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
@@ -33,13 +33,13 @@ _TRACED = traced.Value, traced.HeldValue
 
 @functools.cache
 def _is_of_values(one: type) -> bool:
-    """Tell whether a class of types is of values; Numba's abstract classes are slow."""
+    """Return True if a class of types is of values; Numba's abstract classes are slow."""
     others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
     return not issubclass(one, others)
 
 
 class Lowering:
-    """Writes code with a builder, or only determines types without one.
+    """Writes code with a builder, or only determines types.
 
     ``seen(thing)`` replaces globals of traced functions.
     """
@@ -54,7 +54,6 @@ class Lowering:
         self.read: dict[tuple, Any] = {}  # items already read from held tuples in this branch
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
-        """Wrap a value for traced functions."""
         if _is_of_values(type(kind)):
             return traced.Value(kind, value)
         if isinstance(kind, types.Literal):
@@ -92,7 +91,7 @@ class Lowering:
         raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Return the LLVM value of a thing in the type `wanted`."""
+        """Return the LLVM value of a thing in type `wanted`."""
         if isinstance(thing, _TRACED):
             return llvm.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
@@ -110,7 +109,7 @@ class Lowering:
         return traced.Value(kind, self.builder and llvm.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
-        """Return the common type of types, or None."""
+        """Return the common type, or None."""
         first = kinds[0]
         if all(kind == first for kind in kinds):
             return first
@@ -204,7 +203,7 @@ class Lowering:
         return functions[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
-        """Return the result of `run` from the present function."""
+        """Return from the present function with `run`'s result."""
         passed = iter(values)
         with traced.writing(self):
             value = run(
@@ -216,7 +215,6 @@ class Lowering:
                 self.builder.ret(self.lowered(value, result))
 
     def call_own(self, traced: Any, kinds: tuple, arguments: tuple) -> Any:
-        """Call a separate function of this module."""
         if self.builder is None:
             return self.wrapped(traced.result, None)
         function = self.function(traced.name, traced.run, kinds, traced.result)
@@ -233,7 +231,7 @@ class Lowering:
 
 
 def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
-    """Return the LLVM type of a function; empty arguments are not passed."""
+    """Return a function's LLVM type; empty arguments are not passed."""
     gives = ir.VoidType() if llvm.is_empty(result) else llvm.register_type(result)
     arguments = [llvm.register_type(k) for k in kinds if not llvm.is_empty(k)]
     return ir.FunctionType(gives, [*arguments, *more])
@@ -269,5 +267,5 @@ def name_of(function: Callable) -> str:
 
 
 def numbers_of(kinds: tuple) -> tuple[int, ...]:
-    """Return Numba's numbers of types, which compare faster."""
+    """Return Numba's type numbers, which compare faster."""
     return tuple([kind._code for kind in kinds])

@@ -126,7 +126,7 @@ def _truncated(a):
 
 
 def round_off(like: Any) -> Any:
-    """Return the relative error of an operation in the type of `like`."""
+    """Return the relative round-off in the type of `like`."""
     return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
 
 
@@ -144,9 +144,9 @@ def _round_off(like):
 
 
 def index(i: int) -> int:
-    """Return `i` as an array index that is not negative.
+    """Return `i` as a non-negative array index.
 
-    This saves the test for negative indices at every access (10 % of a sweep).
+    Saves the test for negative indices at each access (10 % of a sweep).
     """
     return i
 
@@ -205,7 +205,7 @@ def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> ir.Va
 
 @shared
 def all_lanes(condition: bool) -> bool:
-    """Tell whether a condition holds in all lanes."""
+    """Return True if a condition holds in all lanes."""
     return condition
 
 
@@ -217,7 +217,7 @@ def _all(mask):
 
 @shared
 def any_lane(condition: bool) -> bool:
-    """Tell whether a condition holds in any lane."""
+    """Return True if a condition holds in any lane."""
     return condition
 
 
@@ -316,7 +316,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
         return run(None)
     count = I64(width)
     if not unrolled:
-        # Hides the count from LLVM, so that the loop remains, with one copy of the function.
+        # Hides the count from LLVM: the loop remains, with one copy of the function.
         count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
     with llvm.counted(builder, count) as k:
         result = run(k)

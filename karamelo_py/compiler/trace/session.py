@@ -1,7 +1,7 @@
 """Memory of the compiler: functions, types, arrays and machine code of this process.
 
-There is one, because LLVM's engine, the implementations of point functions and the names by which
-machine code calls other machine code belong to the process, too.
+One per process, like LLVM's engine, the implementations of point functions and the names by which
+machine code calls other machine code.
 """
 
 import itertools
@@ -13,7 +13,7 @@ from weakref import WeakValueDictionary
 
 
 class Session:
-    """Caches; one thread of Python at a time compiles (`one_at_a_time`)."""
+    """Caches; one Python thread at a time compiles (`one_at_a_time`)."""
 
     def __init__(self) -> None:
         self.seen: dict[Any, Any] = {}  # replacements of globals
@@ -36,7 +36,7 @@ one_at_a_time = threading.RLock()
 
 
 def importable(module: str, name: str, make: Callable[[], type]) -> type:
-    """Return the class of this name in a module, where cached kernels find it; or `make` it."""
+    """Return the class of this name in a module, where cached kernels find it; else `make` it."""
     names = vars(sys.modules[module])
     with one_at_a_time:
         if name not in names:

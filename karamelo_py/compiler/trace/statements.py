@@ -1,8 +1,8 @@
-"""Front end: compiles the text of a function, statement by statement.
+"""Front end: compiles a function's text, statement by statement.
 
-Python's own values are computed at once. For a condition known only at run time, both branches are
+Python's own values are computed at once. For conditions known only at run time, both branches are
 written, and variables merge as phis of SSA form. A loop over a known range is unrolled if short or
-if necessary; other loops remain loops.
+necessary; other loops remain loops.
 """
 
 import ast
@@ -46,7 +46,7 @@ _began = time.time()
 
 
 def _is_as_read(code: python.CodeType, text: str) -> bool:
-    """Tell whether a file is unchanged since Python read it."""
+    """Return True if a file is unchanged since Python read it."""
     try:
         about = os.stat(code.co_filename)
     except OSError:
@@ -105,8 +105,8 @@ class AstFunction:
         self.__code__ = code = function.__code__
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
-        # For loops, by all that determines their code: types of initial literals by name; None if a
-        # loop must be unrolled.
+        # For loops, by all that determines their code: types of initial literals by name; None:
+        # unrolled.
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__
@@ -139,7 +139,7 @@ class AstFunction:
 def _bound(
     signature: inspect.Signature, arguments: tuple, keywords: dict, seen: Callable = lambda x: x
 ) -> dict[str, Any]:
-    """Return the initial variables of a call; `seen` replaces defaults."""
+    """Return a call's initial variables; `seen` replaces defaults."""
     bound = signature.bind(*arguments, **keywords)
     passed = {*bound.arguments}
     bound.apply_defaults()
@@ -147,7 +147,7 @@ def _bound(
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Replace values by types; `within` are functions whose closures are read."""
+    """Replace values by types; `within`: functions whose closures are read."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):
@@ -212,7 +212,7 @@ class AstCompiler:
 
     @property
     def branches(self) -> bool:
-        """Tell whether this is in a branch or loop of the kernel."""
+        """Return True in a branch or loop of the kernel."""
         return bool(self.depth or self.returns or self.breaks or self.continues)
 
     # --- branches
@@ -224,7 +224,7 @@ class AstCompiler:
         return [self.edge()] if self.goes else []
 
     def leave(self, edges: list[Edge]) -> None:
-        """End this branch: it continues where `edges` merge."""
+        """End this branch; it continues where `edges` merge."""
         edges.append(self.edge())
         self.goes = False
 
@@ -431,7 +431,7 @@ class AstCompiler:
     def closing(
         self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature
     ) -> Callable:
-        """Mark a function with its text and variables, which determine its code."""
+        """Mark a function with text and variables, which determine its code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
         variables = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
         defaults = [p.default for p in signature.parameters.values()]
@@ -475,7 +475,7 @@ class AstCompiler:
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Compile statements; record the place where one fails."""
+        """Compile statements; record the place of a failure."""
         for statement in statements:
             if not self.goes:
                 return
@@ -598,7 +598,7 @@ class AstCompiler:
             self.unroll(node, through)
 
     def is_rolled(self, node: ast.For, through: range) -> bool:
-        """Tell whether a known range is long and can remain a loop."""
+        """Return True if a known range is long and may remain a loop."""
         if len(through) <= LONG:
             return False
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
@@ -611,7 +611,7 @@ class AstCompiler:
         return loops[key] is not None
 
     def without_code(self, do: Callable[[], None]) -> None:
-        """Determine types only, and restore the state."""
+        """Determine types only; restore the state."""
         go_back, here = self.state(), values.now()
         typed = type(here)(here.seen)
         typed.read = dict(here.read)
@@ -656,7 +656,7 @@ class AstCompiler:
     ) -> None:
         """Compile a loop that ends at run time; `item` maps the count to the loop variable.
 
-        Types are determined first: initial literals become numbers of these types.
+        Types come first: initial literals become numbers of these types.
         """
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
         if self.flow.builder and key not in loops:

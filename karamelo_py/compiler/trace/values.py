@@ -39,7 +39,7 @@ _WORDS = (
 
 
 def _only_at_run_time(use: str) -> Callable:
-    """Make a method for a `use` that needs the value at compile time."""
+    """Return a method for a `use` that needs the value at compile time."""
 
     def ask(*arguments: Any) -> Any:
         raise Untraceable(f"{use} is only known when the kernel runs")
@@ -67,12 +67,12 @@ def writing(lowering: Any) -> Iterator[None]:
 
 
 def at_work() -> bool:
-    """Tell whether this Python thread compiles."""
+    """Return True if this Python thread compiles."""
     return bool(_lowerings.get())
 
 
 def is_begun(key: tuple) -> bool:
-    """Tell whether this function's result type is being determined."""
+    """Return True if this function's result type is being determined."""
     return any(lowering.key == key for lowering in _lowerings.get())
 
 
@@ -83,7 +83,7 @@ def _real_kind(thing: Any) -> Any:
 
 
 def alike(arguments: tuple) -> tuple:
-    """Convert literals and integers to the widest real type among arguments."""
+    """Convert literals and integers to the widest real type of the arguments."""
     kinds = [kind for kind in map(_real_kind, arguments) if kind is not None]
     if not kinds:
         return arguments
@@ -103,15 +103,15 @@ def _in_type_of(model: Any, kind: Any, thing: Any) -> Any:
     return thing
 
 
-# Replacements of functions called by address, in modules that contain all they call.
+# Replacements of functions called by address, in modules containing all they call.
 _replacements: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
 
 
 @contextmanager
 def in_one(called: dict[Any, Callable]) -> Iterator[None]:
-    """Write GPU modules within this context, which contain all that they call.
+    """Write GPU modules in this context, which contain all they call.
 
-    `called` has the inlined function for each signature called by address.
+    `called`: the inlined function of each signature called by address.
     """
     before = _replacements.set(tuple(called.items()))
     try:
@@ -289,7 +289,7 @@ class HeldValue:
 
 
 def implementations(kind: type) -> dict[Callable, Callable] | None:
-    """Return the functions that a number type implements, or None."""
+    """Return a number type's functions, or None."""
     return kind.implements if hasattr(kind, "implements") else None
 
 
@@ -309,7 +309,7 @@ def is_literal(thing: Any) -> bool:
 
 
 class Emitted:
-    """Calls a function that has another version in kernels."""
+    """Calls a function with another version in kernels."""
 
     def __init__(self, function: Callable):
         self.seen = function
@@ -337,4 +337,4 @@ OF_WHOLE = {min, max, abs, int, bool}
 # Functions whose literals adapt to the other operands; more are added by name.
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
-LONG = 8  # iterations up to which a loop over a known range is unrolled without need
+LONG = 8  # iterations up to which a known range is unrolled without need

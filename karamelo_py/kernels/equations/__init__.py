@@ -142,27 +142,29 @@ def affine_part(quantity, w, stencil, load):
     """Return (array, first component, value at the first node, increments per node), or ()."""
 
 
-def _register(own: Any) -> None:
-    groups = [(array, (*sums,)) for array, sums in groupby(own.gives, lambda one: one.into.array)]
-    made, takes = namedtuple("Load", own.takes), tuple(own.takes.values())  # type: ignore[misc]
+def _register(kind: Any) -> None:
+    groups = [(array, (*sums,)) for array, sums in groupby(kind.gives, lambda one: one.into.array)]
+    made, takes = namedtuple("Load", kind.takes), tuple(kind.takes.values())  # type: ignore[misc]
     names = [name for take in takes for name in take.reads]
-    own.reads = tuple(dict.fromkeys((*own.also_reads, *names)))
+    kind.reads = tuple(dict.fromkeys((*kind.also_reads, *names)))
 
-    @load_of.on(own)
+    @load_of.on(kind)
     def load_of_point(quantity, pt):
         return made(*[take(pt) for take in takes])
 
-    @scattered.on(own)
+    @scattered.on(kind)
     def scatter(quantity, load, node):
         for array, sums in groups:
-            there = found(node.w.nodes, array)
-            values = () if there is None else flat([one.of(load, node) for one in sums])
+            target = node_array(node.w.nodes, array)
+            values = () if target is None else flat([one.of(load, node) for one in sums])
             if len(values):
-                accumulate(there, node.i, sums[0].into.first(node.w.kin), values)
+                accumulate(target, node.i, sums[0].into.first(node.w.kin), values)
 
-    @affine_part.on(own)
+    @affine_part.on(kind)
     def affine(quantity, w, stencil, load):
-        present = [(array, sums) for array, sums in groups if found(w.nodes, array) is not None]
+        present = [
+            (array, sums) for array, sums in groups if node_array(w.nodes, array) is not None
+        ]
         if len(present) != 1:
             return ()
         array, sums = present[0]
@@ -170,10 +172,10 @@ def _register(own: Any) -> None:
         if not all(len(part) for part in parts):
             return ()
         at_first = [_at_first(w, stencil, *part) for part in parts]
-        return found(w.nodes, array), sums[0].into.first(w.kin), *_joined(at_first)
+        return node_array(w.nodes, array), sums[0].into.first(w.kin), *_joined(at_first)
 
 
-def found(nodes: Nodes, array: Any) -> Any:
+def node_array(nodes: Nodes, array: Any) -> Any:
     """Return an array of nodes by name or field class; None if it is absent."""
     return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
 
@@ -197,7 +199,7 @@ def _joined(parts):
         return values, ()
     none = [tuple([a - a for a in value]) for value, _ in parts]
     growths = [
-        own or (zeros,) * len(growing[0]) for zeros, (_, own) in zip(none, parts, strict=True)
+        growth or (zeros,) * len(growing[0]) for zeros, (_, growth) in zip(none, parts, strict=True)
     ]
     return values, tuple([flat(ways) for ways in zip(*growths, strict=True)])
 
@@ -223,8 +225,8 @@ def is_apart(w):
 @reads("mass")
 def mass(pt):
     """Mass given to the sums of all solids: 0 for rigid points with separate sums."""
-    own = of_present(pt.p, pt.w.points.mass[pt.p])
-    return own - own if is_apart(pt.w) else own
+    m = of_present(pt.p, pt.w.points.mass[pt.p])
+    return m - m if is_apart(pt.w) else m
 
 
 @reads("v")

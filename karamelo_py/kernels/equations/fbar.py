@@ -100,8 +100,8 @@ def mean_stress(pt):
 def minus_V_stress_beside(pt):
     """-V times averaged minus own mean stress, a tensor."""
     _, _, f = pt.law_state_F
-    own, present = mean_stress(pt)
-    change = present * pt.of(AveragedStress)[0, pt.p] - own
+    V_tau, present = mean_stress(pt)
+    change = present * pt.of(AveragedStress)[0, pt.p] - V_tau
     return force_stress(pt.w.frame, pt.kin, nothing(pt.kin) - change * I, f)
 
 
@@ -133,8 +133,8 @@ class SetMeanStress(eq.Task):
         beside = pt.of(PressureBeside)
         if beside is not None:
             law, state = pt.law_and_state
-            own = laws.cauchy_stress(law, pt.kin, state).mean_of_stretching()
-            beside[0, pt.p] = own - total
+            mean = laws.cauchy_stress(law, pt.kin, state).mean_of_stretching()
+            beside[0, pt.p] = mean - total
         return eq.Report(real(0, pt.dt), fastest)
 
 
@@ -159,8 +159,8 @@ def averaged(pt, dl, ratio):
     if not len(ratio):
         return dl
     _, _, f = pt.law_state_F
-    own = pt.of(VolumeRatio)[0, pt.p]
-    return scaled_increment(pt.w.frame, pt.kin, dl, f, ratio[0] / own)
+    trial = pt.of(VolumeRatio)[0, pt.p]
+    return scaled_increment(pt.w.frame, pt.kin, dl, f, ratio[0] / trial)
 
 
 # --- means at nodes -----------------------------------------------------------------------------

@@ -96,14 +96,14 @@ def temperature_at(pt, node):
 
 def heat_at(pt, node):
     """Capacity and heat."""
-    part = at_least_round_off(node.N) * pt.content[0]
-    return part, part * temperature_at(pt, node)
+    capacity = at_least_round_off(node.N) * pt.content[0]
+    return capacity, capacity * temperature_at(pt, node)
 
 
 def mean_at(pt, node):
     """Conductance times temperature, and conductance."""
-    part = at_least_round_off(node.N) * pt.content[1]
-    return part * temperature_at(pt, node), part
+    conductance = at_least_round_off(node.N) * pt.content[1]
+    return conductance * temperature_at(pt, node), conductance
 
 
 class HeatContent(eq.NodalQuantity):

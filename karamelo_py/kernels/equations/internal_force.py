@@ -61,8 +61,8 @@ def affine_force(pt, w):
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()
-    own = pt.force if len(pt.force) else zero_vector(w.kin, pt.minus_V_stress[0])
-    return own, tuple([inverse_d[0] * column for column in pt.minus_V_stress.columns()])
+    at_point = pt.force if len(pt.force) else zero_vector(w.kin, pt.minus_V_stress[0])
+    return at_point, tuple([inverse_d[0] * column for column in pt.minus_V_stress.columns()])
 
 
 class InternalForce(eq.NodalQuantity):

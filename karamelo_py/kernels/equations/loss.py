@@ -181,10 +181,10 @@ def _before(node, like):
 def _gone(pt, v, moment):
     """Return the kinetic energy per mass that a point lost on the way to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
-    there, here = transfers.lost_fractions(pt.w.transfer, gone)
+    outward, back = transfers.lost_fractions(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)
     for node in pt.nodes:
         mine = transfers.nodal_momentum(pt.w.transfer, unit, node)
         apart = 0.5 * node.N * (_before(node, v) - v).squared()
-        gone += there * node.N * lost[node.i, 1] + here * (apart - energy_of(node.N, mine))
+        gone += outward * node.N * lost[node.i, 1] + back * (apart - energy_of(node.N, mine))
     return gone

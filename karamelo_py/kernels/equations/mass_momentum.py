@@ -71,9 +71,11 @@ class MassMomentum(eq.NodalQuantity):
 @eq.reads("moment")
 def moment_again(pt):
     """The part of the moment that is mapped again after the move."""
-    own = eq.moment(pt)
+    moment = eq.moment(pt)
     # With constant weights, all is mapped again.
-    return mapped_again(pt.w.basis, pt.w.grid, own) if len(own) and pt.w.frame.moves else own
+    return (
+        mapped_again(pt.w.basis, pt.w.grid, moment) if len(moment) and pt.w.frame.moves else moment
+    )
 
 
 class MomentumAgain(eq.NodalQuantity):

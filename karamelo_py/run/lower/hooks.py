@@ -50,9 +50,9 @@ def lower_hooks(
         x0=np.concatenate([np.empty((0, dimension)), *(s.x0 for s in solids)]),
         chosen=np.zeros(BLOCK, np.int64),
         scratch=np.zeros((STACK + ROWS + 1, BLOCK)),
-        held=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
+        holders=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
-        told=builder.told,
+        rigid_fields=builder.rigid_fields,
         mode=mode or Serial(),
         # Values per thread, with padding in between.
         apart=arrays.Apart(
@@ -88,7 +88,7 @@ class _Builder:
         self.holding: list[Fix] = []
         self.loaded_nodes = 0  # the number of nodes, if hooks bring forces
         method = hub.update.method
-        self.told = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
+        self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         laws = (solid.material.law for solid in hub.solids.values())
         self.rigid = any(can(law, constrained_velocity) for law in laws)
         self.whole: list[Tag] = []  # of hooks on whole points
