@@ -317,7 +317,7 @@ class Emulator(_Coded):
         """Do nothing: launches are done."""
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
-        """Run launches in turn, and time each."""
+        """Run launches one by one, and time each."""
         seconds = []
         for launch in launches:
             begun = perf_counter()

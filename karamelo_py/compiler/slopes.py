@@ -120,7 +120,7 @@ def slopes_of(x: Any, n: int) -> tuple:
 
 
 def seeded(numbers: tuple) -> Any:
-    """Make numbers the independent variables; of a tensor, keep the class."""
+    """Make numbers the independent variables; tensors retain their class."""
     n = range(len(numbers))
     made = [
         Dual(x, tuple([1 if i == k else 0 for i in n])) for k, x in zip(n, numbers, strict=True)

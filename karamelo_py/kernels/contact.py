@@ -22,7 +22,7 @@ leave a gap, points would sink a little into a wall, permanently. So where conta
 prescribed velocity acted in the last step, bodies may separate but not approach. For bodies that
 hold no shape this lasts 100 steps, as their points leave a wall for some steps at a time, and
 includes nodes that a moving wall reaches. Such a wall may be one cell thick and have corners that
-other bodies fill: only its faces towards the other body count, and none of those of a hollow corner
+other bodies fill: only its faces towards the other body count, and none in a hollow corner
 may be entered.
 """
 
@@ -245,15 +245,15 @@ def _is_hollow(bodies, n, normal, other):
 def _entering(bodies, n, other, velocity, least):
     """Return the largest part of a velocity, above `least`, into a face towards `other`."""
     contact, kin, _ = bodies
-    most, inward = least, zero_vector(kin, 0.0)
+    most, penetrating = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
         beside, inside = _beside(contact, kin, n, which)
         face = _face(bodies, beside if inside else n)
         speed, square = -dot(face, velocity), dot(face, face)
         if inside and speed > most * sqrt(square) and _cosine_above(face, -1.0 * other, FACING):
             most = speed / sqrt(square)
-            inward = (-speed / square) * face
-    return inward
+            penetrating = (-speed / square) * face
+    return penetrating
 
 
 def _across(direction, other):

@@ -132,7 +132,7 @@ def act(members, task, call, count):
 
 @noinline
 def _act_on_part(members, task, call, k, parts):
-    total = 0
+    counted = 0
     call.hooks.scratch[:6] = 0.0
     first, last, step = _turns(members, k, parts)
     for turn in range(first, last, step):
@@ -144,8 +144,8 @@ def _act_on_part(members, task, call, k, parts):
             else:
                 count, position = choose_points(members, call, position, end)
             if count > 0:
-                total += act(members, task, call, count)
-    return total
+                counted += act(members, task, call, count)
+    return counted
 
 
 @shared_out
@@ -429,7 +429,7 @@ def _change_update(members, call, c, q):
         before = _take_over(call, n, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may still change the velocity of a free node, a rigid body that of any node.
+    # Contact may still change the velocity of a free node, a rigid body of any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
     if late and (hook.holds == 0 or _is_taken(rigid, n)):

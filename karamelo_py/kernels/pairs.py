@@ -53,7 +53,7 @@ class Push(NamedTuple):
     kin: Tag
     reach: float  # points touch if they are closer than this in every direction
     step: float  # time that points have moved for
-    dt: float  # set the stiffness, with `kick`
+    dt: float  # sets the stiffness, with `kick`
     kick: float
 
 

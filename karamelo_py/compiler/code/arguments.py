@@ -77,7 +77,7 @@ class Plan(NamedTuple):
 
 
 class ArgumentBuffer:
-    """Words of arguments: held tuples in turn, inner ones first."""
+    """Words of arguments: held tuples, inner ones first."""
 
     __slots__ = ("kinds", "words")
 

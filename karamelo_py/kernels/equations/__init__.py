@@ -1,7 +1,7 @@
 """Quantities that points scatter, and tasks that gather: one file each.
 
 A quantity is a tag with equations as data, `takes` and `gives`; a task has functions `empty`,
-`gathered` and `updated`. docs/house/kernels.md has an example of each.
+`gathered` and `updated`. Examples: docs/house/kernels.md.
 """
 
 from collections import namedtuple
@@ -40,8 +40,8 @@ def _zero(kin):
 class Sum(NamedTuple):
     """Sum over points at a node: ``of(pt, node)`` is a point's contribution, a tuple.
 
-    Where it is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none for b
-    = 0), else (): in lanes, affine sums are arranged for the records once per point, not per node.
+    Where that is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none for
+    b = 0), else (): lanes arrange affine sums like records once per point, not per node.
     """
 
     into: NodeColumns
@@ -56,7 +56,7 @@ def whole(kind: Any, count: Callable | None = None) -> NodeColumns:
 
 
 class RigidSums(SummedField):
-    """Sums of rigid points at a node, as in `Nodes.sums`; force on them."""
+    """Sums of rigid points at a node, as in `Nodes.sums`, and the force on them."""
 
     @staticmethod
     def shape(kin):
@@ -71,7 +71,7 @@ VELOCITY = NodeColumns("velocity", _zero, vector, lambda kin: arrays.VELOCITY_WI
 
 
 def of_point(**functions: Callable) -> MappingProxyType:
-    """Name functions of a point, for `Quantity.takes`."""
+    """Name the functions of a point in `NodalQuantity.takes`."""
     return MappingProxyType(functions)
 
 
@@ -81,8 +81,8 @@ class NodalQuantity(NamedTuple):
     in_lanes = True
     not_at_corners = ()
     records = ""  # array of nodes to prefetch
-    adds = False  # to present values at nodes, instead of replacing them
-    also_reads = ()  # fields of points, in addition to `takes`
+    adds = False  # to values at nodes, instead of replacing them
+    also_reads = ()  # fields of points besides `takes`
     takes = of_point()
     gives = ()
 
@@ -108,18 +108,18 @@ class Task(NamedTuple):
 class Report(NamedTuple):
     """Result of a point in a task; NaN or infinity if it failed."""
 
-    moved: Number  # move, in cells
-    rate: Number  # largest rate so far, as `Sweep.reported` takes it
+    moved: Number  # in cells
+    rate: Number  # largest so far, as `Sweep.reported` takes it
 
 
 @point_function()
 def empty(task: Tag, w: Work, x: tuple) -> tuple:
-    """Return the initial totals of a gather: zeros."""
+    """Return the totals at the start of a gather: zeros."""
 
 
 @point_function()
 def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
-    """Return `total` plus the contribution of a node."""
+    """Return `total` plus a node's contribution."""
 
 
 @point_function()
@@ -129,12 +129,12 @@ def updated(task: Tag, pt: PointView, total: tuple, totals: tuple, fastest: Numb
 
 @point_function()
 def load_of(quantity: Tag, pt: PointView) -> tuple:
-    """Return what a point scatters, before weighting."""
+    """Return what a point scatters, unweighted."""
 
 
 @point_function()
 def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
-    """Add the contribution of a load to a node."""
+    """Add a load's contribution to a node."""
 
 
 @point_function()
@@ -181,7 +181,7 @@ def node_array(nodes: Nodes, array: Any) -> Any:
 
 
 def _at_first(w, stencil, value, slopes):
-    """Return value at the first node and increments per node, from value and slopes at a point."""
+    """Return value at the first node, and increments per node, of an affine field at a point."""
     value = value if isinstance(value, tuple) else (value,)
     if not len(slopes):
         return value, ()
@@ -224,7 +224,7 @@ def is_apart(w):
 
 @reads("mass")
 def mass(pt):
-    """Mass given to the sums of all solids: 0 for rigid points with separate sums."""
+    """Mass given to the common sums: 0 for rigid points with separate sums."""
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 
@@ -249,13 +249,13 @@ def empty_all(tasks, w, x):
 
 
 def gathered_all(tasks, w, stencil, k, totals):
-    """Add the contribution of the k-th node of a stencil to the totals of all tasks."""
+    """Add the contribution of a stencil's k-th node to the totals of all tasks."""
     node = node_of(w, stencil, k)
     return tuple([gathered(task, node, totals[n]) for n, task in enumerate(tasks)])
 
 
 def updated_all(tasks, pt, totals, fastest):
-    """Update by all tasks in order; return the sum of moves and the rate."""
+    """Update by all tasks in order; return the sum of moves, and the rate."""
     moved = real(0, fastest)
     for task, total in zip(tasks, totals, strict=True):
         further, fastest = updated(task, pt, total, totals, fastest)

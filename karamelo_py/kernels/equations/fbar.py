@@ -1,4 +1,4 @@
-"""F-bar: volume changes are averaged over the surroundings.
+"""F-bar: volume changes averaged over the surroundings.
 
 The volume ratio J_p of an increment becomes the average of Jbar_i = sum_q N_iq V_q J_q / sum_q N_iq
 V_q over the nodes (after Coombs et al. 2018, "Overcoming volumetric locking in material point
@@ -24,7 +24,7 @@ class VolumeRatio(StepField):
 
 
 class NodalMean(SummedField):
-    """Weighted sum and weights at a node, then the mean: of volume ratios, of temperatures."""
+    """Weighted sum and weights at a node, then the mean: volume ratios, temperatures."""
 
     shape = pair
 
@@ -52,8 +52,8 @@ class PointByPoint(NamedTuple):
 class FBar(NamedTuple):
     """Averaged volume changes, against volumetric locking.
 
-    With volume rates d_p, the average is sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted
-    with volumes it is self-adjoint: the mean stress averaged alike gives forces whose power is that
+    Volume rates d_p average to sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with
+    volumes this is self-adjoint: the mean stress, averaged alike, gives forces whose power is that
     of the averaged strain.
     """
 
@@ -63,7 +63,7 @@ class FBar(NamedTuple):
 
 
 class FBarOfSoil(FBar):
-    """F-bar with laws whose yield surface uses a part of the averaged pressure.
+    """F-bar for laws whose yield surface uses part of the averaged pressure.
 
     With the point's pressure, soil that dilates less than friction requires would lose strength in
     stripes (:func:`~karamelo_py.points.laws.strengths.frictional.share_of_average`).
@@ -142,12 +142,12 @@ class SetMeanStress(eq.Task):
 
 
 def no_ratio(w, like):
-    """Return the start of the gather of the averaged volume ratio; () where none is averaged."""
+    """Return the initial total of the averaged volume ratio; () without averaging."""
     return (real(0, like),) if isinstance(w.averaging, FBar) else ()
 
 
 def gathered_ratio(node, total):
-    """Add the ratio of volumes at a node to `total`, where it is averaged."""
+    """Add a node's volume ratio to `total`, where it is averaged."""
     if not len(total):
         return total
     (mean,) = row(node.of(NodalMean), node.i, 0, total)
@@ -155,7 +155,7 @@ def gathered_ratio(node, total):
 
 
 def averaged(pt, dl, ratio):
-    """Give `dl` the averaged volume change; in the total frame dl = dt Fdot, F + dl is scaled."""
+    """Give `dl` the averaged volume change; total frame: dl = dt Fdot, F + dl is scaled."""
     if not len(ratio):
         return dl
     _, _, f = pt.law_state_F

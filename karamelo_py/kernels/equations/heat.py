@@ -58,13 +58,13 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as of `Heate
 
 
 def at_least_round_off(weight):
-    """Return `weight`, tiny instead of 0: nodes with only a gradient need a temperature."""
+    """Return `weight`, tiny for 0: nodes with only a gradient need a temperature."""
     return max(weight, round_off(weight))
 
 
 @eq.reads("mass", "state", "material")
 def content(pt):
-    """Heat capacity, conductivity times volume, and temperature; also stored."""
+    """Heat capacity, conductivity times volume, and temperature; all stored too."""
     (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
@@ -74,7 +74,7 @@ def content(pt):
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance
     pt.of(Volume)[0, p] = volume
-    # Fixes may change both.
+    # Changed by fixes.
     pt.of(Supply)[0, p] = real(0, pt.dt)
     pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
     return of_present(p, capacity), of_present(p, conductance), T
@@ -107,7 +107,7 @@ def mean_at(pt, node):
 
 
 class HeatContent(eq.NodalQuantity):
-    """Scatter heat capacity and heat, extrapolated by gradients."""
+    """Scatter heat capacity, and heat extrapolated by gradients."""
 
     not_at_corners = ("anything",)
     says = "heat to grid"
@@ -148,7 +148,7 @@ class HeatFlow(eq.NodalQuantity):
 
 
 class TemperatureGradient(eq.Task):
-    """Gather the gradient of the nodal temperature."""
+    """Gather the gradient of nodal temperature."""
 
     not_at_corners = ("anything",)
     says = "gradient of temperature"
@@ -159,7 +159,7 @@ class TemperatureGradient(eq.Task):
         return x - x
 
     def gathered(task, node, total):
-        # An axisymmetric gradient also has the hoop part after it; a scalar has none.
+        # Without the hoop part of an axisymmetric gradient: a scalar has none.
         return total + node.w.nodes.velocity[node.i, 0] * node.grad_N.planar()
 
     def updated(task, pt, total, totals, fastest):
@@ -168,7 +168,7 @@ class TemperatureGradient(eq.Task):
 
 
 class Warming(eq.Task):
-    """Gather the nodal temperature change; update the point's temperature."""
+    """Gather the change of nodal temperature; update the point's."""
 
     not_at_corners = ("anything",)
     says = "temperature"
@@ -194,7 +194,7 @@ class Warming(eq.Task):
         return fma(weight, node.w.nodes.update[node.i, 1], change), mean
 
     def updated(task, pt, total, totals, fastest):
-        """The reported rate is the factor by which conduction has become faster."""
+        """Report the factor by which conduction has become faster."""
         law, state, f = pt.law_state_F
         T, p = pt.of(Temperature)[0, pt.p], pt.p
         capacity = pt.of(Capacity)[0, p]

@@ -51,13 +51,12 @@ def V_mean_stress(pt):
 
 
 def force_at(pt, node):
-    """Force of a point on a node."""
     force = pt.minus_V_stress.dot(node.strain_N)
     return node.N * pt.force + force if len(pt.force) else force
 
 
 def affine_force(pt, w):
-    """Force at the point and its slope, where gradients are moments of weights (MLS)."""
+    """Force at the point, and slope, where gradients are moments of weights (MLS)."""
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()

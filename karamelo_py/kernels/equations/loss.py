@@ -1,22 +1,21 @@
 """Kinetic energy lost in a transfer, returned as heat to laws with internal energy.
 
 A point p of mass m gives node i the velocity a_ip = v_p + the part of its moment, with weight N_ip
-m. The nodes store the mean v_i, and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0. The node stores that
-per mass, and points take it back by their weights, conserving it. On the way back points retain the
-mean and the moment of v_i, and lose m sum_i N_ip |v_i - v_p|^2 / 2 less what the moment holds.
-FLIP, v -> alpha v + (1 - alpha) P v with P to the nodes and back, loses 1 - alpha^2 of the first
-sum and (1 - alpha)^2 of the second.
+m. Nodes store the mean v_i, and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, stored per mass; points
+take it back by their weights, conserving it. On the way back points retain the mean and the moment
+of v_i, and lose m sum_i N_ip |v_i - v_p|^2 / 2 less what the moment holds. FLIP, v -> alpha v + (1
+- alpha) P v with P to the nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of
+the second.
 
-AFLIP and its kin lose these sums with their moments; the energy of the moments themselves comes and
-goes, as moments follow the velocity. XPIC leaves Q^m v of v, Q = 1 - P, and loses <v, Q^m v> - |Q^m
-v|^2 / 2. With r_k = Q^k v and the terms of its series w_k = S+ r_k, this is half of |r_q|^2 +
-sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each part is
-local and >= 0.
+AFLIP and its kin lose these sums with their moments; the moments' energy comes and goes, as moments
+follow the velocity. XPIC leaves Q^m v of v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With
+r_k = Q^k v and the terms of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S
+w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each part is local and >= 0.
 
-The change dv by forces is not included: what forces give to velocities that points do not take does
-not strain the points either in musl, where strain is from the re-mapped velocity. A hot point alone
-in its cells would heat itself by that. Apart from time integration, the remainder is that moments
-are mapped differently after a move (not with splines), and that usl strains by dv.
+The change dv by forces is excluded: in musl, where strain is from the re-mapped velocity,
+velocities that points do not take do not strain them either. A hot point alone in its cells would
+heat itself by that. Apart from time integration, the remainder is that moments are mapped
+differently after a move (not with splines), and that usl strains by dv.
 """
 
 from collections import namedtuple
@@ -38,7 +37,7 @@ ALONE = 0.6
 
 
 class EnergyLoss(SummedField):
-    """Kinetic energy brought to a node (fused: for the next step); its loss per mass; its mass."""
+    """Kinetic energy brought to a node (fused: for the next step), loss per mass, mass."""
 
     shape = triple
 
@@ -47,12 +46,12 @@ BROUGHT = whole(EnergyLoss, scalar)
 
 
 class FrictionalHeat(StepField):
-    """Frictional heat at a node per mass, of contact and walls."""
+    """Frictional heat per mass at a node, of contact and walls."""
 
 
 @node_task
 class KeepLoss(NamedTuple):
-    """Energy loss of a node: kinetic energy brought by points minus its own."""
+    """Energy loss of a node: kinetic energy brought minus kinetic energy."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 
@@ -73,8 +72,6 @@ class KeepLoss(NamedTuple):
 
 @node_task
 class ClearFrictionalHeat(NamedTuple):
-    """Frictional heat starts from zero."""
-
     goes_through = ("frictional heat",)
 
     def at_node(task, kin, nodes, n, dt):
@@ -87,7 +84,7 @@ def warm_node(rubbed, n, heat):
 
 
 def warm_by_friction(pt):
-    """Give a point frictional heat of its nodes, by its weights."""
+    """Give a point frictional heat of its nodes, weighted."""
     rubbed = field(pt.w.nodes.fields, FrictionalHeat)
     if rubbed is not None:
         (law, state), like = pt.law_and_state, pt.v[0]
@@ -108,7 +105,7 @@ def energy_of(mass, momentum):
 
 
 def warm(pt, v):
-    """Heat a point by the energy it lost to the nodes and back; `v` is their velocity before."""
+    """Heat a point by the energy lost to the nodes and back; `v`: their velocity before."""
     if field(pt.w.nodes.fields, EnergyLoss) is not None:
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
         for node in pt.nodes:
@@ -123,7 +120,7 @@ def warm(pt, v):
 
 
 def in_company(pt, moment):
-    """Return the part of `moment` that a point of a gas retains: none if it is alone.
+    """Return the part of `moment` that a point of a gas retains: none if alone.
 
     Nodes of no other point return its own moment: driven by its pressure, its volume would grow
     without bound. The energy of the rest heats it.
@@ -133,7 +130,7 @@ def in_company(pt, moment):
         return moment
     mass = pt.w.points.mass[pt.p]
     one, share = real(1, mass), mass - mass
-    for node in pt.nodes:  # the point's fraction of the mass of its nodes
+    for node in pt.nodes:  # the point's mass fraction at its nodes
         share += node.N * node.N * mass / max(lost[node.i, 2], real(1e-36, mass))
     kept = (one - share) / real(1 - ALONE**pt.kin.dimension, mass)
     return max(min(kept, one), mass - mass) * moment
@@ -179,7 +176,7 @@ def _before(node, like):
 
 
 def _gone(pt, v, moment):
-    """Return the kinetic energy per mass that a point lost on the way to the nodes and back."""
+    """Return the kinetic energy per mass that a point lost to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
     outward, back = transfers.lost_fractions(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)

@@ -11,7 +11,7 @@ from karamelo_py.points.transfers import affine_velocity, nodal_momentum
 
 
 class Normal(SummedField):
-    """Sum of m grad N at a node, which points out of a body (contact)."""
+    """Sum of m grad N at a node, pointing out of a body (contact)."""
 
     shape = vector
 
@@ -30,7 +30,7 @@ def rigid_mass(pt):
 
 @eq.reads()
 def place(pt):
-    """Position (d,) after the move, if centres are needed; else ()."""
+    """Position (d,) after the move if centres are needed, else ()."""
     return () if field(pt.w.nodes.fields, Centre) is None else pt.y
 
 
@@ -40,7 +40,7 @@ def momentum(pt, node):
 
 
 def affine_momentum(pt, w):
-    """Momentum at the point and its gradient, where it is affine."""
+    """Momentum at the point, and gradient, where affine."""
     at_point = pt.mass * pt.v
     if not len(pt.moment):
         return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())
@@ -49,7 +49,7 @@ def affine_momentum(pt, w):
 
 
 class MassMomentum(eq.NodalQuantity):
-    """Scatter mass and momentum; of rigid points to their separate sums."""
+    """Scatter mass and momentum; rigid points to their separate sums."""
 
     not_at_corners = ("moments", "loss")
     records = "sums"
@@ -70,9 +70,8 @@ class MassMomentum(eq.NodalQuantity):
 
 @eq.reads("moment")
 def moment_again(pt):
-    """The part of the moment that is mapped again after the move."""
+    """The part of the moment mapped again after the move."""
     moment = eq.moment(pt)
-    # With constant weights, all is mapped again.
     return (
         mapped_again(pt.w.basis, pt.w.grid, moment) if len(moment) and pt.w.frame.moves else moment
     )

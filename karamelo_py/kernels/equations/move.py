@@ -18,7 +18,7 @@ from karamelo_py.points.kinematics import dot
 
 
 class VelocityBefore(Field):
-    """Velocity before the last step; NaN if there was none, or it was reflected."""
+    """Velocity before the last step; NaN if none, or reflected."""
 
     shape = vector
     start = nan
@@ -54,7 +54,7 @@ class Move(Task):
         y = x + step
         force = pt.load(Force, old)
         if len(force) and not laws.is_rigid(w.laws):
-            # With the mean nodal velocity of the step, which includes stress and constraints.
+            # Mean nodal velocity of the step: includes stress and constraints.
             work = w.kick * dot(force, v_pic - 0.5 * dv)
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
@@ -83,7 +83,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the place `new` with moved corners, by their gathered velocities if known."""
+    """Return the place `new` with moved corners, by gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

@@ -10,7 +10,7 @@ from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag
 
 @point_function()
 def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
-    """Do `task` at node `n`. Nodes without mass stay at rest."""
+    """Do `task` at node `n`; nodes without mass stay at rest."""
 
 
 def node_task(tag: type) -> type:
@@ -26,7 +26,7 @@ def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
 
 
 def unlimited(seen, n, mass, light):
-    """Return the fraction of its velocity change that a node shows: below 1 if it is light."""
+    """Return the fraction of its velocity change that a node shows: < 1 if it is light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -35,7 +35,7 @@ def unlimited(seen, n, mass, light):
 
 
 class SquaredMass(SummedField):
-    """Sum of N m^2 at a node; over the sum of N m, the mean mass of its points (USL)."""
+    """Sum of N m^2 at a node; over the sum of N m, its points' mean mass (USL)."""
 
     @staticmethod
     def needed(basis):
@@ -45,7 +45,7 @@ class SquaredMass(SummedField):
 
 @node_task
 class NodalUpdate(NamedTuple):
-    """v* = v + dt f / m from the sums."""
+    """v* = v + dt f / m."""
 
     says = "update v*"
     goes_through = ("sums", "update")
@@ -60,7 +60,7 @@ class NodalUpdate(NamedTuple):
 
 @node_task
 class MomentumToVelocity(NamedTuple):
-    """Momentum in the velocity array over mass: the re-mapped velocity of MUSL."""
+    """Momentum in the velocity array over mass: MUSL's re-mapped velocity."""
 
     says = "re-mapped velocity"
     goes_through = ("sums", "velocity", "velocity")
@@ -88,9 +88,9 @@ class SumsToVelocity(NamedTuple):
 class UpdateToVelocity(NamedTuple):
     """The deforming velocity is v*, limited at light nodes (USL).
 
-    A point of mass m that gives a node the fraction N of it gets back the strain of f dt / (N m):
-    an oscillation that grows if (c dt / h)^2 > N, in d directions at once. Nodes below `light` = d
-    (c dt / h)^2 times the mean mass of their points are limited; the limit vanishes with the step.
+    A point of mass m giving a node the fraction N gets back the strain of f dt / (N m): an
+    oscillation that grows if (c dt / h)^2 > N, in d directions at once. Nodes below `light` = d (c
+    dt / h)^2 times their points' mean mass are limited; the limit vanishes with the step.
     """
 
     light: float
@@ -98,7 +98,7 @@ class UpdateToVelocity(NamedTuple):
     goes_through = ("sums", "update", "velocity")
 
     def at_node(task, kin, nodes, n, dt):
-        # Only the gradient is limited: points take the whole change, which conserves momentum.
+        # Only the gradient is limited: points take the whole change, conserving momentum.
         one = real(1, dt)
         share = unlimited(
             field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light

@@ -1,4 +1,4 @@
-"""Strain: the state of the law follows from the velocity gradient sum_i v_i grad N_i."""
+"""Strain: the law's state follows from the velocity gradient sum_i v_i grad N_i."""
 
 from math import inf, sqrt
 
@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics import I, det, large, outer, zero
 
 
 class Strain(Task):
-    """Gather the velocity gradient; update the state of the law."""
+    """Gather the velocity gradient; update the law's state."""
 
     not_at_corners = ("moments",)
     records = "velocity"
@@ -30,7 +30,7 @@ class Strain(Task):
         return add_gradient(node, total[0]), fbar.gathered_ratio(node, total[1])
 
     def updated(task, pt, total, totals, fastest):
-        """Update state and domain; report growth of the domain in cells, and rate."""
+        """Update state and domain; report the domain's growth in cells, and the rate."""
         w, (gradient, ratio) = pt.w, total
         if not len(gradient):  # gathered by `Move`
             gradient = totals[0][2]
@@ -74,7 +74,7 @@ class StrainOfLoadStep(Strain):
 
 
 class StrainInMove(Strain):
-    """`Strain` after `Move` in the same visit; it may reuse its gradient."""
+    """`Strain` after `Move` in the same visit, perhaps with its gradient."""
 
     records = ""
 
@@ -116,7 +116,7 @@ def add_gradient(node, grad_v):
 
 
 def increment(dt, grad_v):
-    """Return dl = dt grad v as numbers: F + dl is a sum of two of them."""
+    """Return dl = dt grad v as numbers: F + dl sums two of them."""
     return grad_v._make(dt * grad_v)
 
 
@@ -130,13 +130,13 @@ def _deform_domain(task, pt, growth):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """Return by how many cells the domain of a point reaches further than before."""
+    """Return by how many cells a point's domain reaches further."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 
 
 def _fastest_wave(pt, material, fastest):
-    """Return the larger of `fastest` and c + max |v_i - common_i|; c only if a bound is larger."""
+    """Return max(fastest, c + max |v_i - common_i|); finds c only if a bound is larger."""
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter

@@ -52,7 +52,7 @@ class SeriesBack(eq.NodalQuantity):
 
 @node_task
 class StartSeries(NamedTuple):
-    """First term of the series: v; also the first part of the new velocity."""
+    """First term of the series, v; also the new velocity so far."""
 
     goes_through = ("sums", "series", "update", "update")
 
@@ -66,7 +66,7 @@ class StartSeries(NamedTuple):
 
 @node_task
 class ExtendSeries(NamedTuple):
-    """Next term of the series, added to the new velocity."""
+    """Next term, added to the new velocity."""
 
     goes_through = ("sums", "series", "series", "update", "update")
 
