@@ -269,10 +269,10 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
             raise ValueError("items of a row do not lie one after another")
         if array.itemsize not in (4, 8):
             raise ValueError(f"items of {array.itemsize} bytes, not of 4 or 8")
-        places = [array.ctypes.data]
+        addresses = [array.ctypes.data]
         for count, stride in zip(array.shape[:-1], array.strides[:-1], strict=True):
-            places = [place + k * stride for place in places for k in range(count)]
-        rows += [(place, array.itemsize) for place in places]
+            addresses = [address + k * stride for address in addresses for k in range(count)]
+        rows += [(address, array.itemsize) for address in addresses]
     return np.array(rows, np.int64).reshape(-1, 2)
 
 

@@ -376,8 +376,8 @@ class Card(_Coded):
         self._stream = self._do("cuStreamCreate", 0)  # copies wait for it
         about = driver.CUdevice_attribute
         major, minor = (
-            self._do("cuDeviceGetAttribute", getattr(about, f"CU_DEVICE_ATTRIBUTE_{what}"), device)
-            for what in ("COMPUTE_CAPABILITY_MAJOR", "COMPUTE_CAPABILITY_MINOR")
+            self._do("cuDeviceGetAttribute", getattr(about, f"CU_DEVICE_ATTRIBUTE_{key}"), device)
+            for key in ("COMPUTE_CAPABILITY_MAJOR", "COMPUTE_CAPABILITY_MINOR")
         )
         self.processor = f"sm_{major}{minor}"
         self.name = self._do("cuDeviceGetName", 100, device).split(b"\0")[0].decode()

@@ -298,24 +298,24 @@ def _take_part(team, k):
     epoch = read(team + _TICKETS + 64 * k) >> 32
     mine = looks = seen = 0
     while True:
-        part = k
+        owner = k
         word = read(team + _TICKETS + 64 * k)
         for other in range(0 if word & _LEFT > 0 else size):
-            found = read(team + _TICKETS + 64 * other)
-            if found & _LEFT > word & _LEFT:
-                part, word = other, found
+            ticket = read(team + _TICKETS + 64 * other)
+            if ticket & _LEFT > word & _LEFT:
+                owner, word = other, ticket
         left = word & _LEFT
         if word >> 32 != epoch or left == 0:
             return mine
         if word != seen:
             seen, looks = word, 0
-        if part != k and looks < _LOOKS:
+        if owner != k and looks < _LOOKS:
             looks += 1
             for _ in range(_APART):
                 pause(False)
-        elif replaced(team + _TICKETS + 64 * part, word, word - 1):
+        elif replaced(team + _TICKETS + 64 * owner, word, word - 1):
             # While an index is unfinished, the loop stays the present one.
-            end = read(team + _COUNT) * (part + 1) // size
+            end = read(team + _COUNT) * (owner + 1) // size
             task, arguments = read(team + _TASK_AT), read(team + _ARGUMENTS)
             _call(task, arguments, end - left)
             mine += 1
@@ -330,9 +330,9 @@ def _share(team, count, task, arguments):
     write(team + _COUNT, count)
     write(team + _DONE, 0)
     epoch = read(team + _EPOCH) + 1
-    for part in range(size):
-        numbers = count * (part + 1) // size - count * part // size
-        write(team + _TICKETS + 64 * part, ((epoch & _LEFT) << 32) | numbers)
+    for owner in range(size):
+        numbers = count * (owner + 1) // size - count * owner // size
+        write(team + _TICKETS + 64 * owner, ((epoch & _LEFT) << 32) | numbers)
     write(team + _EPOCH, epoch)
     mine = _take_part(team, 0)
     pauses = 0
@@ -406,13 +406,13 @@ def by_team(function: Callable) -> Callable:
 
     @shared
     def member(mode, *arguments):
-        *given, k = arguments
+        *items, k = arguments
         team = mode.team
         if k > 0:
             _serve(team, k)
         else:
             write(team + _STATE, _LEADS)
-            write(team + _RESULT, _regardless(inner, mode, *given))
+            write(team + _RESULT, _regardless(inner, mode, *items))
             write(team + _STATE, _ENDED)
 
     def run(mode, *arguments):

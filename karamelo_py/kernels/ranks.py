@@ -22,7 +22,7 @@ _call = caller_of(CALL)
 class Linked(NamedTuple):
     """This process has some of the tiles."""
 
-    address: int  # of ``(what, a, b) -> number``
+    address: int  # of ``(request, a, b) -> number``
     foreign: np.ndarray  # (N,) uint8: 1 if another process counts the terms of a node
 
 
