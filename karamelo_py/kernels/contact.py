@@ -447,7 +447,7 @@ def _node(contact, node, i):
 @noinline
 def _count_partners(which, bodies, node, count):
     """Count approaching, or `Touched`, pairs of each field; return whether any."""
-    contact, any_pair = bodies.contact, False
+    contact, some_pair = bodies.contact, False
     contact.partners[:count] = 0
     for i in range(count):
         n = _node(contact, node, i)
@@ -461,8 +461,8 @@ def _count_partners(which, bodies, node, count):
             if belongs:
                 contact.partners[i] += 1
                 contact.partners[j] += 1
-                any_pair = True
-    return any_pair
+                some_pair = True
+    return some_pair
 
 
 @noinline

@@ -132,7 +132,7 @@ def act(members, task, call, count):
 
 @noinline
 def _act_on_part(members, task, call, k, parts):
-    counted = 0
+    handled = 0
     call.hooks.scratch[:6] = 0.0
     first, last, step = _turns(members, k, parts)
     for turn in range(first, last, step):
@@ -144,8 +144,8 @@ def _act_on_part(members, task, call, k, parts):
             else:
                 count, position = choose_points(members, call, position, end)
             if count > 0:
-                counted += act(members, task, call, count)
-    return counted
+                handled += act(members, task, call, count)
+    return handled
 
 
 @shared_out
@@ -299,10 +299,10 @@ def _node(hooks, h, m):
 def _act_at_nodes(members, task, call, count):
     hooks = call.hooks
     if task == COUNT:
-        counted = 0
+        number = 0
         for q in range(count):
-            counted += totals.counts(call.control.ranks, hooks.chosen[q])
-        return counted
+            number += totals.counts(call.control.ranks, hooks.chosen[q])
+        return number
     if members.target == LOADS:
         _work_at_nodes(members, call, count)
         return 0

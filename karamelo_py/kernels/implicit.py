@@ -152,14 +152,14 @@ def strain(kin, seen, u, response, part):
     most = 0.0
     for p in range(points_of(count, part), points_of(count, part + 1)):
         H = zero(kin, u[0, 0])
-        displacement = zero_vector(kin, u[0, 0])
+        shift = zero_vector(kin, u[0, 0])
         for k in range(seen.count[p]):
             node = seen.nodes[p, k]
             moved = vector(kin, [u[node, i] for i in range(kin.dimension)])
             H = H + outer(moved, gradient_at(kin, seen, p, k))
-            displacement = displacement + seen.weights[p, k] * moved
+            shift = shift + seen.weights[p, k] * moved
         store(response.increment, p, H)
-        most = max(most, displacement.largest())
+        most = max(most, shift.largest())
     response.furthest[part] = most
 
 

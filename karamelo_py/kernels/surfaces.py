@@ -273,7 +273,7 @@ def encloses(kin, surface, x):
     """Return True if the faces enclose `x`."""
     leaves, count = surface.low.shape[0] // 2, surface.faces.shape[0]
     last = kin.dimension - 1
-    crossings = 0
+    hits = 0
     k = 1
     while k > 0:
         near = x[last] <= surface.high[k, last]
@@ -285,9 +285,9 @@ def encloses(kin, surface, x):
             if near:
                 first = LEAF * (k - leaves)
                 for i in range(first, min(first + LEAF, count)):
-                    crossings += _crossing(kin, surface, i, x)
+                    hits += _crossing(kin, surface, i, x)
             k = _behind(k)
-    return crossings & 1 != 0 if surface.odd else crossings != 0
+    return hits & 1 != 0 if surface.odd else hits != 0
 
 
 def _place(kin, x, p):
