@@ -122,7 +122,6 @@ def of_present(p: int, value: float) -> float:
 
 @shared
 def is_one(number: int) -> bool:
-    """Return True if all lanes have the same number."""
     return True
 
 

@@ -127,7 +127,6 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
 
 
 def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
-    """Return the instruction that converts a number, or None."""
     whole, real = types.Integer | types.Boolean, types.Float
     signed = isinstance(kind, types.Integer) and kind.signed
     width = kind.bitwidth if isinstance(kind, types.Integer | real) else 1

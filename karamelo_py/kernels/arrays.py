@@ -158,8 +158,6 @@ class Block(NamedTuple):
 
 
 class OnGrids(NamedTuple):
-    """Points on grids."""
-
     basis: Tag  # or () for what serves all bases
     kin: Tag
     grids: Grid
@@ -168,8 +166,6 @@ class OnGrids(NamedTuple):
 
 
 class Matter(NamedTuple):
-    """Points with their law."""
-
     kin: Tag
     points: Points
     laws: NamedTuple  # as in `Block`
@@ -367,7 +363,7 @@ class Control(NamedTuple):
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """Make a control with a zero clock; `firsts` are the first points of the solids."""
+    """Make a control with a zero clock; `firsts`: ids of the first points of solids."""
     clock = np.zeros(1, CLOCK).view(np.recarray)
     clock[0].weight = clock[0].stride = 1.0
     more = (1 + d) * (len(firsts) + 1)

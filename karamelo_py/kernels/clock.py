@@ -156,8 +156,6 @@ def all_well(s: Setup, take: Any = take_reports) -> bool:
 
 
 class MoveCheck(NamedTuple):
-    """Settings of the check of moves."""
-
     frame: Tag
     kin: Tag
     grids: Grid

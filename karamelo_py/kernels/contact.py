@@ -91,8 +91,6 @@ class SeparateFields(NamedTuple):
 
 
 class Bodies(NamedTuple):
-    """Bodies in contact, and their nodes."""
-
     contact: SeparateFields
     kin: Tag
     nodes: Nodes
@@ -118,8 +116,6 @@ class Touched(NamedTuple):
 
 
 class Side(NamedTuple):
-    """A field that meets another."""
-
     field: int
     i: int  # index among those that meet
     n: int  # its node
@@ -495,7 +491,6 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _touch_pair(bodies, control, i, j, where):
-    """Apply the impulse between the `i`-th and `j`-th of the meeting fields."""
     contact, kin, nodes = bodies
     share = _share(contact, i, j)
     a, b = contact.meeting[i], contact.meeting[j]

@@ -57,7 +57,6 @@ def impose_stress(matter, chosen, components, stress):
 
 @kernel
 def impose_temperature(kin, points, laws, rows, temperature):
-    """Set the temperature (n,) of the points in these rows."""
     points, laws = at_hand(points), at_hand(laws)
     for k in range(rows.size):
         p = index(rows[k])

@@ -95,12 +95,11 @@ def while_steps_go_on(function: Callable) -> Callable:
 
 
 def goes_wrong(fate, number):
-    """Note the number of a failed point; the lowest remains."""
     raise_to(fate, WRONG, BEHIND - float(number))
 
 
 def _report(fate, number, moved, rate, stride):
-    """Note the report of a point; in this form, NaN counts as failed."""
+    """NaN counts as failed."""
     if (moved <= stride) & (rate < 1e300):
         raise_to(fate, MOVED, float(moved))
         raise_to(fate, RATE, float(rate))
@@ -243,7 +242,6 @@ class Stage:
         return len(self.columns) * -(-self.support // self.parts)
 
     def nodes_of(self, part: int) -> tuple[int, int]:
-        """Return the range of stencil nodes summed in a part."""
         count = self.support
         return count * part // self.parts, count * (part + 1) // self.parts
 

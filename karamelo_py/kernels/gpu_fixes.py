@@ -182,7 +182,6 @@ def _setup(s: arrays.Setup) -> Callable:
 
 
 def each_node(function: Callable, s: arrays.Setup) -> Callable:
-    """Return the function of a node for an `EachNode`."""
     setup_of = _setup(s)
 
     def visit_each_node(i, fate, s, use, copies):
@@ -193,7 +192,6 @@ def each_node(function: Callable, s: arrays.Setup) -> Callable:
 
 
 def each_point(function: Callable, s: arrays.Setup) -> Callable:
-    """Return the function of a point for an `EachPoint`."""
     setup_of = _setup(s)
 
     def visit_each_point(i, fate, s, block, copies):
@@ -213,7 +211,6 @@ def once(function: Callable) -> Callable:
 
 
 def clear_totals(i, fate, copies, first, count):
-    """Clear a number of `count` rows of totals, from row `first` on, in all copies."""
     limbs = copies.shape[2]
     k, rest = i // (count * limbs), i % (count * limbs)
     copies[k, first + rest // limbs, rest % limbs] = 0
@@ -279,7 +276,6 @@ def _add_all(copy, first_row, solid, total):
 
 
 def add_work(i, fate, s, block, copies):
-    """Add the work of forces on a point to the total."""
     work = field(block.points.fields, WorkOfForces)
     if work is not None:
         totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))

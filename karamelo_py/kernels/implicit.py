@@ -103,7 +103,6 @@ def points_of(count, k):
 
 @by_threads
 def see(frame, at, matter, seen, part):
-    """Find the nodes that points see, with weights and gradients at present positions."""
     (basis, _, grids, of, where), seen = at_hand(at), at_hand(seen)
     kin, points, laws = at_hand(matter)
     for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
@@ -189,7 +188,6 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @by_threads
 def respond(matter, dt, response, part):
-    """Compute each point's stress after its increment."""
     matter, response = at_hand(matter), at_hand(response)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)

@@ -89,7 +89,6 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 @by_threads
 def respond_averaged(matter, dt, response, averages, part):
-    """Compute P and q of each point, and their derivatives."""
     matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
@@ -113,7 +112,6 @@ def respond_averaged(matter, dt, response, averages, part):
 
 @kernel
 def keep_averaged_stress(matter, response, averages):
-    """Store P and q of the present state."""
     kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)

@@ -265,7 +265,6 @@ def _touch(push, bodies, cells, i, j):
 
 @noinline
 def _rub(push, bodies, i, contact):
-    """Replace the velocity in `contact` by the friction on point `i`."""
     kin = push.kin
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])

@@ -124,7 +124,6 @@ def _chunks(count: int) -> list[tuple[int, int]]:
 
 
 def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> list:
-    """Return lanes of `count` components from the points' records."""
     if count == 1:
         return [pack(builder, [lane(builder, row, 0) for row in rows], lanes)]
     parts = [_transposed(builder, rows[k : k + 4]) for k in range(0, lanes.width, 4)]
@@ -134,7 +133,7 @@ def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> 
 
 
 def _gathered(builder: ir.IRBuilder, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
-    """Gather records; ``read(lane, column, count)`` loads components of one point."""
+    """``read(lane, column, count)`` loads components of one point."""
     components: list = []
     for begin, count in _chunks(len(like)):
         column = builder.add(first, I64(begin))
@@ -160,7 +159,7 @@ def _gather_row(array, nodes, first, like):
 
 @intrinsic
 def _gather_weighted(array, nodes, first, weights, like):
-    """Load weighted sums of node records, summed before they become lanes."""
+    """Weighted sums are made before records become lanes."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
@@ -335,7 +334,6 @@ def _scatter_affine(*kinds):
 
 
 def _records_of(builder: ir.IRBuilder, parts: list, lanes: Lanes, count: int) -> list:
-    """Return a record of `count` components for each lane."""
     parts = [*parts, *[ir.Constant(llvm.register_type(lanes), None)] * 8][:count]
     rows = []
     for k in range(0, lanes.width, 4):

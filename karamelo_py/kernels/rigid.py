@@ -72,7 +72,6 @@ def _impose_on_strain(at, n):
 
 
 def _add_forces(s, block, p):
-    """Add the force on a rigid point, and the torque about the origin."""
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
     grid = record(s.grids, points.grid[p])

@@ -15,8 +15,6 @@ from karamelo_py.points.grid import Grid, cells_along, in_cells
 
 
 class TileGrid(NamedTuple):
-    """Tiles of g grids."""
-
     size: np.ndarray  # (d,) cells of a tile
     count: np.ndarray  # (g, d) number of tiles
     first: np.ndarray  # (g + 1,) number of the first
@@ -34,8 +32,6 @@ class Neighbourhood(NamedTuple):
 
 
 class SortKeys(NamedTuple):
-    """Keys of the order of points."""
-
     tiles: TileGrid
     around: Neighbourhood
     ids: np.ndarray  # (n,)

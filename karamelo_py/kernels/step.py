@@ -44,7 +44,6 @@ def first_rows(scheme: Any, visits: Any) -> list[Any]:
 
 
 def untaken(rows: Iterable[Any], backend: type) -> list[str]:
-    """Name the kinds of rows without an implementation on a back end."""
     # Rows become others before they are taken.
     combined = table.Gather, table.Scatter, table.SceneTask, table.Repeated
     kinds = dict.fromkeys(type(row) for row in rows if not isinstance(row, combined))
@@ -52,16 +51,12 @@ def untaken(rows: Iterable[Any], backend: type) -> list[str]:
 
 
 class InStep(NamedTuple):
-    """Arguments of rows besides the setup."""
-
     mode: Tag  # one thread, or several
     hooks: Tag  # of the fixes
     more: bool  # another step follows: leave its sums on the nodes (fused)
 
 
 class StepKind(NamedTuple):
-    """Tags that select the code of a step."""
-
     scheme: Tag
     visits: Tag  # `Fused` or `Staged`
     mode: Tag  # one thread, or several

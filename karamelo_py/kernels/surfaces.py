@@ -270,7 +270,6 @@ def _crossing_triangle(kin, surface, i, x):
 
 @noinline
 def encloses(kin, surface, x):
-    """Return True if the faces enclose `x`."""
     leaves, count = surface.low.shape[0] // 2, surface.faces.shape[0]
     last = kin.dimension - 1
     hits = 0
@@ -333,8 +332,6 @@ def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
 
 
 class HalfSpace(NamedTuple):
-    """One side of a plane."""
-
     normal: np.ndarray  # (d,) inward
     offset: float  # its product with a place on the plane
 

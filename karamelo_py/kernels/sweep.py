@@ -55,8 +55,6 @@ class Visit(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """The part of a visit that a sweep does."""
-
     dt: Number
     gathers: bool
     scatters: bool
@@ -112,7 +110,7 @@ def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
 
 
 def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
-    """Return the places of a sweep; `now` and `then` are indices of `Points.x`."""
+    """`now` and `then` are indices of `Points.x`."""
     weighed: Any = points.x[now] if frame.moves else points.home
     return Places(weighed, points.x[now], points.x[then])
 
@@ -314,7 +312,6 @@ def sweep(s: Setup, mode: Tag, visit: Visit, extent: Extent) -> None:
 
 
 def sum_given(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
-    """Sum the quantities at the nodes, from all processes, if due."""
     if len(quantities):
         take_over(s.control.ranks, due & (s.buffers.count[1] == 0))
         sum_buffers(mode, quantities, s, due)

@@ -317,7 +317,6 @@ def average_volumes(row: Sweep) -> tuple:
 
 
 def average_stress(s: Setup) -> tuple:
-    """Replace the points' mean stress by the averaged one (F-bar)."""
     if not isinstance(s.averaging, fbar.FBar):
         return ()
     visit = Visit((fbar.SetMeanStress(),), (fbar.AveragedForce(),), OldWeights())

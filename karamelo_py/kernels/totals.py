@@ -161,7 +161,6 @@ def add_all(totals, row, terms):
 
 @kernel
 def add_rows(totals, rows, terms):
-    """Add each term to the total in its row."""
     for q in range(terms.size):
         add_to(totals, rows[q], terms[q])
 
@@ -200,7 +199,6 @@ def take_over(ranks, due):
 
 
 def publish(control, slot, count):
-    """Set published values from `slot` on to their totals."""
     collect(control.ranks, control, slot, count)
     for k in range(count):
         control.values[slot + k] = control.answer[k]

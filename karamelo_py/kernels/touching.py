@@ -103,7 +103,6 @@ def force_of(tag, members, volume, one):
 
 
 def touch_kind(grip: type | None) -> type[Touch]:
-    """Return the class of a touch with this grip."""
     if grip is None:
         return Touch
     name = f"Touch{grip.__name__}"

@@ -170,7 +170,6 @@ def _sum_drift(s):
 
 
 def take_drift(s):
-    """Read the totals of the solids' mass and momentum."""
     control, d = s.control, s.kin.dimension
     first_row = control.values.size
     totals.collect(control.ranks, control, first_row, control.totals.shape[0] - first_row)
@@ -217,7 +216,6 @@ def _sum_before(s, mode, step):
 
 
 def note_before(clock, step):
-    """Store the energies for the look at the next step."""
     clock.stored_before = clock.stored
     clock.moving_before = clock.kinetic - clock.work
     clock.stored_at = step
@@ -310,7 +308,6 @@ def _range_of_heat(kin, points, laws, control):
 
 
 def measure_heat(s):
-    """Store the extreme temperatures of all points in the clock."""
     clock = s.control.clock[0]
     clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
     for block in s.blocks:

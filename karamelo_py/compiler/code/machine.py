@@ -21,7 +21,6 @@ LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 @functools.cache
 def features() -> str:
-    """List the processor's instruction sets."""
     with contextlib.suppress(RuntimeError):
         return llvm.get_host_cpu_features().flatten()
     return ""

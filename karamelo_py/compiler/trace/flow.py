@@ -86,7 +86,6 @@ class Grows(Untraceable):
 
 
 def is_number_type(thing: Any) -> bool:
-    """Return True if a thing is a number of an `algebra`."""
     return hasattr(type(thing), "constant")
 
 
@@ -225,7 +224,6 @@ class Flow:
         return LoopHeader(block, phis, carried, paths), names | carried
 
     def close(self, head: LoopHeader, names: dict[str, Any]) -> None:
-        """Jump back to a loop's start."""
         values: list = []
         grown: dict[tuple, Any] = {}
         for name, before in head.names.items():

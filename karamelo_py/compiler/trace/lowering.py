@@ -109,7 +109,6 @@ class Lowering:
         return traced.Value(kind, self.builder and llvm.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
-        """Return the common type, or None."""
         first = kinds[0]
         if all(kind == first for kind in kinds):
             return first

@@ -205,7 +205,6 @@ def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> ir.Va
 
 @shared
 def all_lanes(condition: bool) -> bool:
-    """Return True if a condition holds in all lanes."""
     return condition
 
 
@@ -217,7 +216,6 @@ def _all(mask):
 
 @shared
 def any_lane(condition: bool) -> bool:
-    """Return True if a condition holds in any lane."""
     return condition
 
 

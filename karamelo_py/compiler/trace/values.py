@@ -67,7 +67,6 @@ def writing(lowering: Any) -> Iterator[None]:
 
 
 def at_work() -> bool:
-    """Return True if this Python thread compiles."""
     return bool(_lowerings.get())
 
 
@@ -289,7 +288,6 @@ class HeldValue:
 
 
 def implementations(kind: type) -> dict[Callable, Callable] | None:
-    """Return a number type's functions, or None."""
     return kind.implements if hasattr(kind, "implements") else None
 
 

@@ -25,8 +25,6 @@ from karamelo_py.points.transfers import Moment, zero_moment
 
 
 class NodeColumns(NamedTuple):
-    """Columns of a node array: a name in `Nodes`, or the class of a field."""
-
     array: Any
     first: Callable  # functions of the kinematics
     count: Callable
@@ -249,7 +247,6 @@ def empty_all(tasks, w, x):
 
 
 def gathered_all(tasks, w, stencil, k, totals):
-    """Add the contribution of a stencil's k-th node to the totals of all tasks."""
     node = node_of(w, stencil, k)
     return tuple([gathered(task, node, totals[n]) for n, task in enumerate(tasks)])
 

@@ -116,8 +116,6 @@ class AveragedForce(eq.NodalQuantity):
 
 
 class SetMeanStress(eq.Task):
-    """Gather the averaged mean stress."""
-
     says = "averaged mean stress"
     reads = ("x", "state", "material")
     writes = ("averaged stress", "pressure beside")
@@ -179,6 +177,4 @@ class TakeMean(NamedTuple):
 
 
 class TakeMeanStress(TakeMean):
-    """The mean of the mean stress."""
-
     goes_through = ("nodal stress", "nodal stress")

@@ -139,8 +139,6 @@ def flow_at(pt, node):
 
 
 class HeatFlow(eq.NodalQuantity):
-    """Scatter the heat flow and the supply of fixes."""
-
     not_at_corners = ("anything",)
     says = "heat flow"
     takes = eq.of_point(flow=flow, supply=supply)
@@ -148,8 +146,6 @@ class HeatFlow(eq.NodalQuantity):
 
 
 class TemperatureGradient(eq.Task):
-    """Gather the gradient of nodal temperature."""
-
     not_at_corners = ("anything",)
     says = "gradient of temperature"
     reads = ("x",)

@@ -65,8 +65,6 @@ def affine_force(pt, w):
 
 
 class InternalForce(eq.NodalQuantity):
-    """Scatter internal force and forces of fixes."""
-
     not_at_corners = ("moments",)
     says = "internal force"
     takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_of_fixes, mean=V_mean_stress)

@@ -51,7 +51,7 @@ class FrictionalHeat(StepField):
 
 @node_task
 class KeepLoss(NamedTuple):
-    """Energy loss of a node: kinetic energy brought minus kinetic energy."""
+    """Kinetic energy brought to a node minus that of the node."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 

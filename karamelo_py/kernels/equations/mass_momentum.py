@@ -78,8 +78,6 @@ def moment_again(pt):
 
 
 class MomentumAgain(eq.NodalQuantity):
-    """Scatter momentum to the velocity array."""
-
     not_at_corners = ("moments",)
     records = "velocity"
     says = "momentum to grid"

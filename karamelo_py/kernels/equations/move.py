@@ -25,7 +25,7 @@ class VelocityBefore(Field):
 
 
 class Move(Task):
-    """Gather v* and its change; update velocity and position."""
+    """Gather v* and its change; update velocity, position and corners; report the move in cells."""
 
     not_at_corners = ("moments",)
     records = "update"
@@ -44,7 +44,6 @@ class Move(Task):
         return v_pic + node.N * v, dv_pic + node.N * dv, moment, *corners
 
     def updated(task, pt, total, totals, fastest):
-        """Update velocity, position and carried corners; report the move in cells."""
         w, old, (law, state), (v_pic, dv, moment, *corners) = pt.w, pt.v, pt.law_and_state, total
         x, new = pt.x, transfers.updated_velocity(w.transfer, old, v_pic, dv)
         v = laws.constrained_velocity(law, old, new)

@@ -20,7 +20,7 @@ def node_task(tag: type) -> type:
 
 
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
-    """Return 1 / mass of a node, 0 without mass."""
+    """1 / mass of a node; 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
 
@@ -60,7 +60,7 @@ class NodalUpdate(NamedTuple):
 
 @node_task
 class MomentumToVelocity(NamedTuple):
-    """Momentum in the velocity array over mass: MUSL's re-mapped velocity."""
+    """MUSL's re-mapped velocity, from momentum in the velocity array."""
 
     says = "re-mapped velocity"
     goes_through = ("sums", "velocity", "velocity")

@@ -30,7 +30,7 @@ class Strain(Task):
         return add_gradient(node, total[0]), fbar.gathered_ratio(node, total[1])
 
     def updated(task, pt, total, totals, fastest):
-        """Update state and domain; report the domain's growth in cells, and the rate."""
+        """Report the domain's growth in cells, and the rate."""
         w, (gradient, ratio) = pt.w, total
         if not len(gradient):  # gathered by `Move`
             gradient = totals[0][2]
@@ -107,7 +107,6 @@ class TrialStrainOfLastStep(TrialStrain):
 
 
 def _is_known(task, w):
-    """Return True if the transfer may have gathered the gradient with v*."""
     return isinstance(task, StrainInMove) and not isinstance(w.averaging, fbar.FBar)
 
 

@@ -33,7 +33,7 @@ class SeriesTerm(namedtuple("SeriesTerm", "k"), eq.Task):
 
 @eq.reads("term of series")
 def term(pt):
-    """Term of the series at a point, (d,)."""
+    """Term of the series (d,)."""
     return pt.load(TermOfSeries, pt.v)
 
 
