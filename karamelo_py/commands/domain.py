@@ -202,7 +202,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
         raise
     domain.place = hub.place
     longest = max(b - a for a, b in zip(lo, hi, strict=True))
-    # One cell along a side is a line, or a column; a domain of one cell is an element that deforms.
+    # One cell along a side is a line or column; a domain of one cell is an element that deforms.
     if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
             f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
@@ -247,7 +247,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
     require_domain(hub)
     hub.solids.refuse(ID)
     if not registry.knows("solid", kind):
-        # The forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
+        # Forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
         if kind in hub.regions:
             arguments = (Argument(parse_text(kind)[0], hub.interpreter), *arguments)
             kind = "region"

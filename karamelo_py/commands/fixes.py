@@ -135,7 +135,6 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
 
 
 def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
-    """Refuse a published value that would hide an existing name."""
     for suffix in style.published:
         name = f"{ID}_{suffix}" if suffix else ID
         if name in MEANINGS or name in SEEDS:

@@ -67,7 +67,7 @@ def value(hub: Hub, expression: Expression) -> float:
         return expression.constant
     if not expression.names.intersection(POINT_SEEDS):
         if hub.rehearsing:
-            return math.nan  # known only after the runs before it
+            return math.nan  # known only after earlier runs
         if hub.interpreter.replay is not None:
             number = hub.interpreter.replay.value()
         else:

@@ -39,7 +39,7 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
     solid
     """
     if style in hub.parts["eos"] and arguments and not registry.knows("material", style):
-        # The form of 2020, material(ID, eosID, strengthID), has no style.
+        # Form of 2020 without a style: material(ID, eosID, strengthID).
         arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
         style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
@@ -108,7 +108,7 @@ temperature = _part(
 
 
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
-    """Store under `ID` the object that the style makes; refuse an ID in use first."""
+    """Store the object made by the style under `ID`; refuse an ID in use first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
     values: dict = {}
@@ -321,7 +321,6 @@ def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> No
 
 
 def _check_components(path: LoadPath, point: Point, kinematics: str, number: int) -> None:
-    """Refuse strains that the kinematics lacks, and stresses that need them."""
     subject, argument = f"load path '{path.id}'", 2 + number
     for kind, names in (("e", path.strain), ("s", path.stress)):
         for name in names:

@@ -249,7 +249,6 @@ class _Call:
         return styles
 
     def parts(self) -> dict[str, Any]:
-        """Make the transfer, basis and method, each with its options."""
         if self.shapes:
             self._check_shapes()
         rest = self._choose("basis", self._choose("transfer", self.options))
@@ -286,7 +285,6 @@ class _Call:
         }
 
     def _check_shapes(self) -> None:
-        """Refuse basis functions without domains, and shapes for another dimension."""
         kind, fit = self.names["method"], self.fit
         if self.names["basis"] != "linear":
             message = f"method {kind} maps the corners of domains with a linear basis only"
@@ -315,7 +313,7 @@ class _Call:
             )
 
     def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
-        """Replace the style by the variant that a word selects, and return the other options."""
+        """Replace the style by the variant that a word selects; return the other options."""
         variants = self.variants[family]
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
@@ -391,7 +389,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """The word of `words` that an argument names; a variable of that name is ignored."""
+    """Return the one of `words` that an argument names; variables of that name are ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

@@ -73,7 +73,7 @@ def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
         raise ScriptError(message, place=first.place, expected=expected, hint=hint)
 
 
-dump.syntax = "ID, all, style, every, file[, ...]"  # the style defines the rest
+dump.syntax = "ID, all, style, every, file[, ...]"
 
 
 def delete_dump(hub: Hub, ID: str) -> None:
@@ -291,5 +291,5 @@ def units(
 
 
 for _command in (dump, delete_dump, set_output, log, log_modify, plot, save_plot, units):
-    # A change is harmless when a run resumes from a file.
+    # Harmless when a run resumes from a file.
     _command.may_differ = True

@@ -96,7 +96,7 @@ def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
     if hub.rehearsing or hub.interpreter.replay is not None:
         return
     numbers, fields = {solid.index for solid in solids}, hub.fields
-    # Zero for deleted points: the condition does not apply to them.
+    # Deleted points do not meet the condition.
     meet = np.zeros(fields.count, np.bool_)
     meet[fields.present] = condition.holds(fields)
     _take_away(hub, np.flatnonzero(meet & np.isin(fields.solid, list(numbers))))
@@ -175,7 +175,6 @@ def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
 
 
 def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
-    """The initial state of the points of a solid that are `kept`."""
     volume = solid.volume0 / solid.domain.depth(solid.x0[:])
     return Placement(
         x0=solid.x0[kept],
@@ -205,7 +204,6 @@ def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
 def replace_points(
     hub: Hub, solid: Solid, placement: Placement, *, may_be_empty: bool = False
 ) -> None:
-    """Give a solid new points, and renumber the solids after it."""
     before = solid.count
     solid.put(hub, placement, may_be_empty=may_be_empty)
     for other in hub.solids.values():
@@ -336,7 +334,6 @@ def _count(value: float, name: str, place) -> int:
 
 
 def _kept(hub: Hub, region: Region, placed: Placement) -> Placement:
-    """The points inside the region and the domain, and the number outside the domain."""
     domain = require_domain(hub)
     wanted = region.inside(placed.x0)
     in_domain = domain.contains(placed.x0)

@@ -378,5 +378,5 @@ def read_restart(hub: Hub, file: str) -> None:
 
 
 for _command in (set_dt, dt_factor, restart):
-    # A change is harmless when a run resumes from a file.
+    # Harmless when a run resumes from a file.
     _command.may_differ = True

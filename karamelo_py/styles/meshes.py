@@ -29,7 +29,7 @@ UNITS = {
     1 / 0.0254: "a file in metres, a script in inches",
     1 / 25.4: "a file in millimetres, a script in inches",
 }
-CURVED = 0.01  # of the length of an edge: of a circle with 80 elements
+CURVED = 0.01  # of an edge's length: a circle of 80 elements
 
 
 def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
@@ -149,7 +149,7 @@ class MeshRegion(Enclosed):
         return self.skin.open
 
 
-# Binary STL files, and most programs that write the other formats, have single precision.
+# Binary STL files, and most writers of other formats, have single precision.
 _SINGLE = float(np.finfo(np.float32).eps)
 
 

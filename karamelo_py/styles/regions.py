@@ -20,7 +20,7 @@ class Primitive(region.Region):
     """Base of shapes with an exact depth: slabs across some axes, round across others."""
 
     slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
-    across: Sequence[int] = ()  # the axes along which it is round, with a centre and a radius
+    across: Sequence[int] = ()  # axes along which it is round, with a centre and a radius
     centre: Sequence[float] = ()
     radius: float
 
@@ -64,7 +64,7 @@ class Primitive(region.Region):
 
 
 def _between(d: int, axis: int, lo: float, hi: float) -> list[np.ndarray]:
-    """Return the planes (d + 1,) of a slab, see `Convex`; none where it is open."""
+    """Planes (d + 1,) of a slab, see `Convex`; none where it is open."""
     normal = np.eye(d)[axis]
     return [np.append(n, at) for n, at in ((normal, lo), (-normal, -hi)) if math.isfinite(at)]
 
@@ -272,7 +272,7 @@ class Union(region.Region):
     intersection, difference
     """
 
-    # How to combine the inside tests and the box corners of the parts.
+    # Combine the inside tests and the box corners of the parts.
     joined, low, high = np.logical_or, np.minimum, np.maximum
     kind: type = Joined
 

@@ -91,7 +91,7 @@ class RegionSolid(Solid):
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*hub.update.method.basis.traits.shape}
         method = hub.update.method
-        # Whole boxes make steps that affect contact; shapes from files have a known mass.
+        # Whole boxes make stair-steps that affect contact; shapes from files have a known mass.
         stepped = method.fields_per_solid and not region.aligned
         drawn = region.from_file and not method.regular_points
         if points is None and (stepped or drawn) and not (corners or region.unknown):
@@ -128,13 +128,13 @@ class RegionSolid(Solid):
         self._warn_of_size(hub)
 
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
-        """Return the volume of the points, and of the shape in a file, if there is one."""
+        """Return the volume of the points, and of the shape in a file, if any."""
         whole = self.region.volume
         total = float(np.sum(np.broadcast_to(placement.volume, self.count)))
         return None if whole is None else (total, whole)
 
     def _warn_of_size(self, hub: Hub) -> None:
-        """Warn if all of the body fits into a cell: the grid sees next to no deformation then."""
+        """Warn if all of the body fits into a cell: the grid then sees hardly any deformation."""
         size = float((self.hi - self.lo).max()) if self.count > 1 else np.inf
         if size < (1 - 1e-6) * self.h:
             hub.warn(

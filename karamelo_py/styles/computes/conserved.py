@@ -114,7 +114,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """Return the present drift; `scale` is a possible magnitude of the value, above 0."""
+        """Return the present drift; `scale` > 0 is a possible magnitude of the value."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value
@@ -169,7 +169,7 @@ class EnergyBalance(Compute):
 
 
 class Momentum(Compute):
-    """Base of computes of a momentum: the `terms` of points are its components and magnitude."""
+    """Base of computes of a momentum: `terms` of points are components and magnitude."""
 
     published = ("x", "y", "z", "drift")
     remembers = ("_drift",)

@@ -20,7 +20,7 @@ from karamelo_py.script.expressions import Expression
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
-VANISHED = 1e-9  # of the largest norm of the exact values so far: less is round-off
+VANISHED = 1e-9  # of the largest norm of the exact values so far: below is round-off
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
@@ -30,9 +30,9 @@ def column(points: PointTable, name: str) -> np.ndarray:
 
 
 class PointField:
-    """A field of points: its name in the script, and its columns, one for a scalar.
+    """A field of points: its name in the script, and its columns (one for a scalar).
 
-    `weights` count the components in the square of the magnitude: shear components twice.
+    `weights` count components in the square of the magnitude: shear components twice.
     """
 
     script_kind = "a column of points, or displacement, velocity, stress or strain"
@@ -56,8 +56,8 @@ class PointField:
 class Norm:
     """Norm of a difference: L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    In a history, each difference is weighted by the time since the last output, so the result does
-    not depend on the number of outputs.
+    In a history, each difference is weighted by the time since the last output: the result does not
+    depend on the number of outputs.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -92,7 +92,7 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """As `scaled`, and add the moment to `history` and `largest`, once."""
+        """Like `scaled`, and add the moment to `history` and `largest`, once."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -101,7 +101,7 @@ class Norm:
         if self.kind == "max":
             self._sums = mean = np.maximum(self._sums, moment)
         else:
-            # The first state counts alone until there is a second one.
+            # The first state counts alone until the second.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
             self._sums += span * moment**self.power
@@ -112,7 +112,7 @@ class Norm:
         return now
 
     def scaled(self, difference: float, exact: float) -> float:
-        """Return the absolute or relative norm, from the norms of differences and exact values."""
+        """Return the absolute or relative norm, from those of differences and exact values."""
         if not self.relative or difference == 0:
             return float(difference)
         return float(difference / exact) if exact else inf
@@ -137,7 +137,7 @@ class Compared:
 
 
 def refuse_absent(hub: Any, columns: tuple[str, ...]) -> None:
-    """Refuse a column that no material has: comparing it is a mistake."""
+    """Refuse a column that no material has."""
     absent = [name for name in columns if name in hub.fields.absent_at_points()]
     if absent and hub.materials:
         message = f"'{absent[0]}' is 0 because no material of the scene has it"
@@ -210,7 +210,7 @@ class Error(Compared, Compute):
         self.publish_all(now, self.norm.largest, self.norm.history)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Magnitudes (2, n) of the differences and exact values at points, and their weights."""
+        """Magnitudes (2, n) of differences and exact values at points, and weights."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))
         for name, weight, formula in self.parts:

@@ -15,7 +15,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Mean(Compute):
-    """Base of computes of means: the `terms` of points are weights, and weights times quantities.
+    """Base of computes of means: `terms` of points are weights, and weights times quantities.
 
     With zero total weight the mean is 0, like the sums of other computes.
     """
@@ -176,7 +176,6 @@ class MaxPosition(Compute):
 
     def refresh(self) -> None:
         extremes = self.hub.fields.each(self, "furthest")
-        # 0 without points, like the sums of other computes.
         self.publish_components(self.extreme(extremes, axis=0) if extremes else np.zeros(3))
 
     def furthest(self, points: PointTable) -> np.ndarray | None:
@@ -233,7 +232,7 @@ class PositionQuantile(Compute):
 
     def refresh(self) -> None:
         d = self.hub.domain.dimension
-        # Radix selection: the bits of the coordinates, eight at a time, from the highest.
+        # Radix selection: bits of coordinates, eight at a time, from the highest.
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
@@ -241,7 +240,7 @@ class PositionQuantile(Compute):
                 self.publish_components(np.zeros(d))
                 return
             if shift == 64 - BITS:
-                # Fractions such as 0.1 of ten equal points must not fail by rounding.
+                # Fractions such as 0.1 of ten equal points must not fail by round-off.
                 wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 occupied = np.flatnonzero(of_bits)
@@ -264,7 +263,6 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Integers in the same order as the floating-point numbers."""
     bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 

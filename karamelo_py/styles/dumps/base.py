@@ -53,7 +53,6 @@ class Dump(Rhythmic):
             self.write()
 
     def warn_of_absence(self) -> None:
-        """Warn if the file to continue is not as the resumed run left it."""
         self.hub.warn(begins_anew(self.path()), place=self.place)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
@@ -64,8 +63,7 @@ class Dump(Rhythmic):
 
 
 POSITIONS = ("x", "y", "z")
-# Written with every row anyway, so requests for them are ignored. `tag` is Karamelo's other name of
-# the id.
+# Written with every row anyway, so requests are ignored. `tag` is Karamelo's other name of the id.
 LEADING = ("id", "type", "tag")
 
 
@@ -80,9 +78,9 @@ class TableRows(NamedTuple):
 class TableDump(Dump):
     """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
 
-    `OfPoints` or `OfNodes`, which comes before this class among the bases of a style, defines the
-    rows: `names` of columns that can be written, `absent` ones (always 0), the `extent` (number of
-    rows, largest id), and all rows in the order of their ids, in `tables` that fit into memory.
+    `OfPoints` or `OfNodes`, which precedes this class among the bases of a style, defines the rows:
+    `names` of columns that can be written, `absent` ones (always 0), the `extent` (number of rows,
+    largest id), and all rows in the order of their ids, in `tables` that fit into memory.
 
     Attributes
     ----------

@@ -15,7 +15,7 @@ from karamelo_py.output.vtkhdf import VERSION, describe
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
-# The lowest compression: with shuffled bytes, higher levels take twice the time for a few per cent.
+# Lowest compression: with shuffled bytes, higher levels take twice the time for a few per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
@@ -53,7 +53,7 @@ class Hdf5Dump(TableDump):
         import h5py
 
         if k == 0 or self.one_file_per_step:
-            # In memory at first: HDF5 cannot close a file that has no room on the disk.
+            # In memory first: HDF5 cannot close a file without room on the disk.
             with h5py.File("new", "w", driver="core", backing_store=False, libver=VERSION) as root:
                 self._prepare(root, snapshot.last)
                 root.flush()
@@ -101,8 +101,8 @@ class Hdf5Dump(TableDump):
     def resumed(self) -> None:
         """Continue the file of an earlier run, with the snapshots that it had then.
 
-        They are rewritten, as at first, so that the bytes are the same. A file that a killed
-        program was writing can be read but not written.
+        They are rewritten, as at first, for equal bytes. A file that a killed program was writing
+        can be read but not written.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -136,7 +136,7 @@ class Hdf5Dump(TableDump):
 
     @property
     def _first(self) -> int:
-        """The smallest id: points are numbered from 1 and nodes from 0."""
+        """Smallest id: points are numbered from 1, nodes from 0."""
         return int(self.rows_are == "points")
 
     def _prepare(self, root: Any, last: int) -> None:
@@ -167,7 +167,6 @@ class Hdf5Dump(TableDump):
                 root[name].dims[axis].attach_scale(root[scale])
 
     def _append(self, root: Any, k: int, snapshot: SnapshotRows) -> None:
-        """Write snapshot `k`. Rows are placed by id."""
         first = self._first
         count = max(snapshot.last + 1 - first, len(root["id"]))
         if count > len(root["id"]):
@@ -179,13 +178,13 @@ class Hdf5Dump(TableDump):
         for name, number in (("time", snapshot.time), ("step", snapshot.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
-        # An array without a reference flushes its chunks when it is deleted, and hides errors.
+        # An array without a reference flushes its chunks when deleted, and hides errors.
         arrays = {name: root[name] for name in ("id", "type", *self.columns)}
         for name in self.columns:
             arrays[name].resize((k + 1, count))
         for table in snapshot.tables:
             at = table.ids - first
-            # Pieces of a fixed size: a file has the same bytes however its rows arrive.
+            # Pieces of a fixed size: equal bytes however the rows arrive.
             for begin in range(0, count, PIECE):
                 block, here = (
                     slice(begin, min(begin + PIECE, count)),
@@ -208,7 +207,7 @@ class Hdf5Dump(TableDump):
 
 
 def _opened_to_append(path: Path) -> Any:
-    """Open the file such that its content stays readable if the program dies.
+    """Open the file so that its content stays readable if the program dies.
 
     h5py's swmr=True also opens a file that a killed program has left, if it was opened that way
     from the start (`h5py.File.swmr_mode` does it a moment later).

@@ -44,8 +44,8 @@ class Plain:
 class LammpsDump(TableDump):
     """A dump in LAMMPS text format."""
 
-    # For a file with all snapshots: position of the next one, length of the text up to there, and
-    # the encoder's state.
+    # For a file with all snapshots: position of the next one, length of the text so far, and the
+    # encoder's state.
     remembers = ("_end", "_length")
     to_first = True
     _end = 0
@@ -64,9 +64,8 @@ class LammpsDump(TableDump):
                     file.write(encoder.compress(text))
                 file.write(encoder.flush())
             return
-        # The file is complete after every snapshot: its last bytes are written each time and
-        # overwritten by the next snapshot. (Separately compressed snapshots would do for gunzip,
-        # but OVITO reads only the first.)
+        # The file is complete after every snapshot: the next one overwrites its last bytes. (gunzip
+        # would read separately compressed snapshots, but OVITO reads only the first.)
         start, before = self._end, self._encoder or self.encoder()
         encoder = before.copy()
         tail = before.copy().flush() if start else b""
@@ -87,7 +86,7 @@ class LammpsDump(TableDump):
             self.warn_of_absence()
             self._end = self._length = 0
             return
-        # The pending bytes of an encoder are not in the file, but follow from it.
+        # Pending bytes of an encoder are not in the file, but follow from it.
         self._encoder = self.encoder()
         with self.opened(path) as file:
             for begin in range(0, self._length, PIECE):
@@ -122,8 +121,8 @@ class LammpsDump(TableDump):
 def box(hub: Hub) -> list[tuple[float, float]]:
     """Return the ends of the domain along the three axes.
 
-    OVITO takes a box of zero thickness for degenerate; one cell about zero is right for a slice of
-    unit width.
+    OVITO takes a box of zero thickness for degenerate; one cell about zero suits a slice of unit
+    width.
     """
     domain = hub.domain
     used = slice(domain.dimension)

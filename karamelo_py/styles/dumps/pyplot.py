@@ -23,12 +23,12 @@ from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
-# A width or height above this is in pixels.
+# Above, a width or height is in pixels.
 MOST_INCHES = 50
 LEAST_PIXELS, MOST_PIXELS = 20, 20000
 # Fast, and nearly as small as the best for pictures with few colours.
 PNG_COMPRESSION = 1
-# Components have either sign: a diverging colour map, with grey at 0.
+# Components of either sign: a diverging colour map, grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
@@ -164,7 +164,6 @@ class PyPlot(Dump):
 
     @property
     def seen(self) -> tuple[Any, ...]:
-        """Limits of the field so far, and the field they belong to."""
         limits = self._picture.limits if self._picture is not None else self._limits
         return limits, self._label(), *self._marks()
 
@@ -211,7 +210,7 @@ class PyPlot(Dump):
         self._picture.show(snapshot, self.side(snapshot), title, tools_of(fixes))
 
     def _make(self) -> Any:
-        # Matplotlib takes 0.3 s to import: only scenes with pictures pay for it.
+        # Importing Matplotlib takes 0.3 s: only for scenes with pictures.
         from karamelo_py.output import pictures
 
         units = self.hub.output.units
@@ -268,7 +267,6 @@ def title_of(step: int, time: float, unit: str) -> str:
 
 
 def tools_of(fixes: Iterable[Any]) -> list[Any]:
-    """List the walls and tools to outline (`output.outlines.Tool`)."""
     from karamelo_py.output.outlines import Tool
 
     return [
@@ -318,7 +316,7 @@ def look_of(
                 expected="viridis, coolwarm, magma, gray, jet ...",
                 hint=meant(cmap, colormaps),
             )
-    # If the user sets a colour limit, the colours are not centred about 0.
+    # With a colour limit of the user, colours are not centred about 0.
     symmetric = signed and (vmin, vmax) == (None, None)
     look |= {"limits": (vmin, vmax), "symmetric": symmetric, "log": log}
     look["outlines"] = outlines

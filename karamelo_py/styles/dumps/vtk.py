@@ -74,7 +74,7 @@ class VtkDump(TableDump):
             file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Add what is drawn of the last points, or store what is needed for it."""
+        """Add what is drawn of the last points, or store what it needs."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add what is drawn between all points."""
@@ -127,7 +127,7 @@ class GridVtk(OfNodes, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Store the numbers of the written nodes, where some are omitted."""
+        """Store the numbers of the written nodes if some are omitted."""
         if self.occupied:
             kept.append(ids)
 

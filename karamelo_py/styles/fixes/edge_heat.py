@@ -16,8 +16,6 @@ from karamelo_py.styles.fixes.heat import HeatFix, check_coefficient
 
 
 class EdgeHeat(OnEdge, HeatFix):
-    """Base of fixes for heat flow through the edge of a region."""
-
     published = ("s", "area")
 
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region, *formulas: Expression):
@@ -122,7 +120,7 @@ class EdgeConvection(EdgeHeat):
         rate = on_points(points, faces, faces.area * h)
         warms = on_points(points, faces, faces.area * h * T_inf)
         capacity = points.mass * from_solids(self.hub, points.ids - 1, _heat_capacities)
-        conducts = capacity > 0  # points of other materials lack a temperature
+        conducts = capacity > 0  # points of other materials have no temperature
         slower = 1 + rate * self.hub.values.get("dt") / np.where(conducts, capacity, 1.0)
         return np.where(conducts, (warms - rate * points.temperature) / slower, 0.0)
 

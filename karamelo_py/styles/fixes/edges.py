@@ -80,7 +80,8 @@ def joined(tables: Sequence[Columns]) -> Columns:
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     """Measure the surface of a region at the points `ids` of a solid that fills it.
 
-    The surface in a part of a box belongs to the nearest inside point in this box or next to it.
+    The surface in a part of a box belongs to the nearest inside point in this box or an adjacent
+    one.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
@@ -106,7 +107,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
         for step in itertools.product((-1, 0, 1), repeat=d):
             number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
-            for k in (0, 1):  # a box may have two points: one of them took in a small neighbour
+            for k in (0, 1):  # a box may have two points: one absorbed a small neighbour
                 row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
@@ -143,7 +144,7 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     """Find the faces at the points `ids` of a solid whose boxes were cut: see `surface_at`.
 
-    The faces are the projections of the surface across the axes. At an edge within a part of a box,
+    The faces are projections of the surface across the axes. At an edge within a part of a box,
     opposite projections cancel, and only the difference remains.
     """
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
@@ -160,7 +161,6 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Find the surface of a region at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     none = np.zeros(len(pieces.point), np.int64)
     area = pieces.length * solid.domain.depth(pieces.middle)
@@ -179,7 +179,6 @@ class OnEdge(Fix):
     group: ParticleGroup
     region: Region
     side: int | None = None  # of `SIDES`; None: all of them
-    # The last points, and their faces by row.
     _seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
@@ -192,7 +191,7 @@ class OnEdge(Fix):
                 )
 
     def faces_at(self, ids: np.ndarray) -> Faces:
-        """Return the faces of the points in a view, by their rows there; results are cached."""
+        """Return the faces of the points in a view, by their rows there; cached."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
@@ -212,7 +211,7 @@ class OnEdge(Fix):
 
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
-        """Return solids whose faces come from the surface, with the faces of all their points."""
+        """Solids whose faces come from the surface, with the faces of all their points."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
         by_solid = {}
         for solid in self.hub.solids.values():
@@ -235,8 +234,6 @@ class OnEdge(Fix):
 
 
 class EdgeFix(OnEdge, PointForces):
-    """Base of fixes that load the edge of a region with forces."""
-
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region):
         super().__init__(hub, group)
         self.region = region

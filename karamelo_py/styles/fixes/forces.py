@@ -71,7 +71,6 @@ class BodyForce(Fix):
         self.formulas = per_direction(hub, "b", acceleration)
 
     def defined(self) -> None:
-        """Warn of a gravity in m/s^2 if other numbers use other units."""
         if not any(formula is not None and _is_gravity(formula) for formula in self.formulas):
             return
         hub = self.hub
@@ -133,12 +132,10 @@ class ForceNodes(Fix):
 
 
 class PointForces(Fix):
-    """Base of fixes that put a force on each point of their group."""
-
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = True
-    conserves = True  # apart from the work of the forces, which is summed
+    conserves = True  # except the work of the forces, which is summed
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -203,7 +200,7 @@ class ForceParticles(PointForces):
 
 
 def brake(mass, v, v_star, force, value, before, dt, share):
-    """Remove a fraction of the change of v* by forces, against v; the total is the force of that.
+    """Remove a fraction of the change of v* by forces, against v; the total is its force.
 
     No effect if the step reverses the node's motion, or a wall has stopped it.
     """

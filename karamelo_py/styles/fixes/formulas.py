@@ -11,7 +11,7 @@ from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import FIRST
 
 AXES = "xyz"
-# Rubber on dry concrete has a coefficient of 1, clean metals that weld 1.5.
+# Rubber on dry concrete has 1, clean metals that weld 1.5.
 USUAL_FRICTION = 2.0
 
 
@@ -43,7 +43,7 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
-    """Return the values (n, d) of a formula per direction, 0 if it is missing.
+    """Return the values (n, d) of a formula per direction, 0 if missing.
 
     `first()` gives the reference positions for formulas that need them.
     """
@@ -57,7 +57,6 @@ def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.n
 
 
 def unlike(one: Any, other: Any) -> list[int]:
-    """Return the directions in which two fixes have different formulas."""
     pairs = enumerate(zip(one.formulas, other.formulas, strict=False))
     return [k for k, (a, b) in pairs if None not in (a, b) and not a.is_like(b)]
 

@@ -1,4 +1,4 @@
-"""Memory of fixes for the points held by friction: see `points.bodies.rub`."""
+"""State of friction at points, for fixes: see `points.bodies.rub`."""
 
 from karamelo_py.compiler import importable
 from karamelo_py.compiler.fields import Field, field
@@ -14,7 +14,7 @@ class Grip(Field):
 
 
 class GripOfTool(Grip):
-    """As `Grip`, with the last position (d) of the point at the tool."""
+    """`Grip` with the last position (d) of the point at the tool."""
 
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
 

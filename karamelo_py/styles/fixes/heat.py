@@ -58,7 +58,7 @@ def check_coefficient(h: Expression) -> None:
         raise ScriptError(message, argument="h", expected=expected)
 
 
-MANY = 1_000_000  # points of a solid, above which the check is skipped
+MANY = 1_000_000  # points of a solid above which the check is skipped
 
 
 def hold_node(capacity, T, T_star, flow, value, before, dt, share):

@@ -26,7 +26,7 @@ HOOKS = {
     "momentum_before": ("initial_integrate", point_hook(momentum_rate)),
     "momentum_after": ("final_integrate", point_hook(momentum_rate)),
 }
-# Before all other fixes, whatever the order in the script.
+# Before all other fixes, whatever their order in the script.
 COME_FIRST = ("internal_force", "momentum_before")
 
 
@@ -92,7 +92,6 @@ class CheckSolution(Fix):
         self.publish_all(error, total, np.sqrt(error / total) if total > 0 else 0.0)
 
     def terms(self, points: PointTable) -> np.ndarray:
-        """Squared error and displacement of points times their volume, and the volume."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))
         for k, formula in enumerate(self.formulas):

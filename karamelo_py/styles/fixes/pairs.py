@@ -24,7 +24,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.grip import Gripping
 
-SENT = 350  # bytes per point that are sent to the process that searches for pairs
+SENT = 350  # bytes per point, sent to the process that searches for pairs
 
 
 def check_pair(solid1: Solid, solid2: Solid) -> None:
@@ -44,7 +44,7 @@ class PairContact(Gripping):
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = True
-    conserves = True  # apart from the work of the forces, which is summed
+    conserves = True  # except the work of the forces, which is summed
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))
@@ -68,7 +68,7 @@ class PairContact(Gripping):
     def law(self) -> NamedTuple:
         """Return the tag of :mod:`karamelo_py.points.bodies` for the force between two points.
 
-        It is asked for in each step: constants of materials may change between runs.
+        Requested in each step: constants of materials may change between runs.
         """
         raise NotImplementedError
 

@@ -237,7 +237,7 @@ class Keeper:
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 
     def _look(self) -> dict[str, int]:
-        """Return a checksum of all data that the function may change, by name."""
+        """Checksums of all data that the function may change, by name."""
         data = dict(self.data)
         if inspect.isfunction(self.function):
             seen = inspect.getclosurevars(self.function)
@@ -255,7 +255,7 @@ class Keeper:
 def _sum_of(value: Any) -> int:
     try:
         return zlib.crc32(pickle.dumps(value))
-    except Exception:  # list items may raise anything
+    except Exception:  # items may raise anything
         return 0
 
 

@@ -153,8 +153,8 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all of its directions drags material along; one at rest, or one that
-        # leaves a direction free, is a clamp, a roller or a plane of symmetry.
+        # A wall that moves in all its directions drags material along; one at rest, or with a free
+        # direction, is a clamp, a roller or a plane of symmetry.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
@@ -189,7 +189,7 @@ class VelocityNodes(Fix):
         return next(iter(bounds), "")
 
     def defined(self) -> None:
-        """Refuse walls outside the domain, and warn of nodes with two different velocities."""
+        """Refuse walls outside the domain; warn of nodes with two different velocities."""
         if self.hub.domain.h is None:
             return
         self.group.refuse_past_domain()

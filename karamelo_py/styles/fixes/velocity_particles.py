@@ -118,10 +118,10 @@ def gradient(
 ) -> np.ndarray:
     """Return derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
 
-    If a point is still at its reference position, x and x0 are the same coordinate.
+    At the reference position, x and x0 are the same coordinate.
     """
     out = np.zeros_like(x, float)
-    # Positions in single precision are rounded.
+    # Single precision rounds positions.
     unmoved = (np.abs(x - x0) <= 0.01 * step).all(axis=1)
     for k in range(x.shape[1]):
         shift = np.zeros_like(out)
@@ -155,7 +155,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     for other in fixes if fix.leads_points else ():
         axes = unlike(other, fix) if other.prescribes_velocity else []
         caught = _within(simulation, other, fix) if axes else ()
-        # A tool that passes by a wall is no conflict.
+        # A tool that passes a wall is no conflict.
         if 2 * len(caught) > len(simulation.points.members(fix.group)):
             yield _said(other, axes, caught)
 

@@ -106,7 +106,7 @@ class Method:
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        """Return (F,) bool, whether each velocity field is of a rigid solid; (0,) if none is."""
+        """Return a mask (F,) of the velocity fields of rigid solids; (0,) if none is."""
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
@@ -133,11 +133,11 @@ class Method:
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
-        """Positions and domain shapes of the points of a solid before the first step, (n, w)."""
+        """Initial positions and domain shapes of a solid's points, (n, w)."""
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """Return the domain shapes of the points of a solid, (n, s), as the basis stores them."""
+        """Domain shapes of a solid's points, (n, s), as the basis stores them."""
         basis, half = type(self.basis), solid.half_size
         n, d = half.shape
         unit = np.eye(d)
@@ -179,7 +179,7 @@ class Method:
 
 
 def _corners(element: Element, solid: Solid) -> np.ndarray:
-    """Corners (n, c, d) of the elements of a mesh, else of the boxes; no volume is negative."""
+    """Corners (n, c, d) of the elements of a mesh, else of the boxes, with volumes >= 0."""
     corners = solid.corners
     if corners is None:
         corners = solid.x0[:, None, :] + np.array(element.box) * solid.half_size[:, None, :]

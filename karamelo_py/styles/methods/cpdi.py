@@ -49,7 +49,6 @@ class Convected(Method):
             )
 
     def _check_elements(self, d: int, *solids: Solid) -> None:
-        """Refuse mesh elements, or boxes around points, that the basis does not support."""
         basis = type(self.basis)
         name, element = basis.__name__, basis.element
         if d != basis.dimension:

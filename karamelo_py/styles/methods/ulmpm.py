@@ -78,7 +78,6 @@ class TLMPM(Method):
     warned = False
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Warn once of solids without contact to others."""
         touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
         alone = [ID for ID in hub.solids if ID not in touching]
         if len(hub.solids) > 1 and alone and not self.warned:

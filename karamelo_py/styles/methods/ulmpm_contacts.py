@@ -26,7 +26,7 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 def fields(hub: Hub) -> list[int]:
-    """Return the velocity field of each solid; solids that are glued together have the same."""
+    """Return the velocity field of each solid; glued solids have the same."""
     numbers: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
@@ -157,7 +157,6 @@ class ULMPMContacts(Method):
         return united
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Return the tag of contact where the fields of two solids meet."""
         count, d = len(lattices), hub.domain.dimension
         shape = lattices[0].shape[:d]
         nodes = sum(lattice.node_count for lattice in lattices)
@@ -179,7 +178,7 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),
-            # Pages of memory cost nothing until they are written.
+            # Memory pages cost nothing until written.
             touched=np.zeros((nodes, count), np.int32),
             prescribed=np.zeros((nodes, d), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
@@ -206,7 +205,7 @@ class ULMPMContacts(Method):
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
-        # Pages of memory cost nothing until they are written.
+        # Memory pages cost nothing until written.
         prescribed: np.ndarray = contact.prescribed
         if self._prescribed is prescribed:
             prescribed[:] = 0
@@ -229,7 +228,7 @@ class ULMPMContacts(Method):
             contact.touched[touched, :fields] = before.touched[touched]
 
     def check(self, hub: Hub) -> None:
-        """Refuse two coefficients of friction for a pair of velocity fields."""
+        """Refuse two friction coefficients for a pair of velocity fields."""
         super().check(hub)
         by_pair: dict[frozenset, Fix] = {}
         for pair, fix in self._rubbing(hub):

@@ -20,10 +20,10 @@ from karamelo_py.styles.fixes.formulas import per_direction
 
 
 class ToolFix(PointForces):
-    """Base of fixes that push points, treated as small cubes (in 2D squares)."""
+    """Base of fixes that push points, taken as small cubes (in 2D squares)."""
 
     follows_points = True
-    needs_stiffness = False  # whether the force is proportional to the point's shear modulus
+    needs_stiffness = False  # whether the force scales with the point's shear modulus
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -55,7 +55,7 @@ class ToolFix(PointForces):
         return points.position.astype(float) - self.now(*place)
 
     def side(self, points: PointsView) -> np.ndarray:
-        """Edges (n,) of the cubes of the points."""
+        """Edges (n,) of the points' cubes."""
         domain = self.hub.domain
         return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
 
@@ -71,7 +71,6 @@ class ToolFix(PointForces):
 
 
 def _shear_modulus(solid: Solid) -> float:
-    """The shear modulus of a solid, 0 if it has none."""
     law: Any = elastic_law(solid.material.whole)
     return float(parameter(law, "G") or parameter(parameter(law, "strength"), "G"))
 
@@ -98,7 +97,6 @@ class PlaneTool(ToolFix):
     """Base of walls: a plane that may move, with points on the side of its normal."""
 
     def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
-        """Check the formulas of a position on the plane, and of its normal."""
         self.origin = self.of_time("", place)
         self.towards = self.of_time("n", normal)
         if not self.hub.rehearsing:  # a rehearsal lacks some values
