@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from conftest import MAKING_ROOM
 from listening import listening
 from numba import config
 
@@ -31,6 +32,12 @@ from karamelo_py.run.timings import Timings
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
+
+
+@pytest.fixture(autouse=True)
+def _old_ones_make_room(monkeypatch):
+    monkeypatch.setattr(cache, "_keep", MAKING_ROOM)
+
 
 # A package in small: two shapes in files of their own, what they share, and a loop over points.
 FILES = {
