@@ -11,8 +11,7 @@ from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
 from karamelo_py.points.laws import can, constrained_velocity, initial_state
-from karamelo_py.points.laws.strengths.frictional import little_dilatancy
-from karamelo_py.points.laws.strengths.mu_i import MuI
+from karamelo_py.points.laws.strengths.mu_i import yields_early_with_fbar
 from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -180,6 +179,4 @@ def check(hub: Hub) -> None:
 
 def _loses_strength(law: NamedTuple) -> bool:
     """Return True if F-bar lets a law yield too early in load steps."""
-    if not takes_average(law):
-        return False
-    return isinstance(law.strength, MuI) or little_dilatancy(law.strength) > 0
+    return takes_average(law) and yields_early_with_fbar(law.strength)

@@ -10,6 +10,7 @@ from karamelo_py.points.laws import LawTraits, parameter, specific_volume
 from karamelo_py.points.laws.eos import pressure
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.points.laws.strengths import elastic_ratio, fbar_fraction, remembers, respond
+from karamelo_py.points.laws.strengths.frictional import little_dilatancy
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -158,3 +159,8 @@ def _respond_mu_i(strength, law, kin, step, memories):
     scale = where(together, where(flows, tau / where(flows, shear, 1), 1), 0)
     ep = memory.ep + slip * sqrt(1 / 3)
     return scale * trial, memory._replace(ep=ep, inertial=slip / dt * grain), tau * slip
+
+
+def yields_early_with_fbar(strength):
+    """True for friction with little dilatancy: averaged stress yields at the point's pressure."""
+    return isinstance(strength, MuI) or little_dilatancy(strength) > 0
