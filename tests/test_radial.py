@@ -129,6 +129,108 @@ run(20)
     assert state["volume"][0] == pytest.approx(np.mean(bounds) ** n * np.ptp(bounds), rel=1e-12)
 
 
+GAS = """eos(air, ideal-gas, 1.2, 1.4, p=10)
+strength(thin, fluid, 0)
+material(m, eos-strength, air, thin)"""
+
+
+@pytest.mark.parametrize("kind", LAME)
+@pytest.mark.parametrize("basis", ["linear", "cpgimp"])
+def test_gas_stays_at_rest(run_interpreted, kind, basis):
+    """Its pressure and that of the wall at the radius 1 are in equilibrium, also at r = 0."""
+    script = head(kind, 0, 1, 10, method=f"ulmpm, FLIP, {basis}, 0.99", law=GAS) + INSIDE + """
+region(outside, block, 1, INF)
+group(outside, nodes, region, outside, all)
+fix(hold, velocity_nodes, outside, 0)
+compute(Ek, kinetic_energy, all)
+log_modify(custom, step, Ek, hold_x)
+run(20)
+"""  # fmt: skip
+    log = run_interpreted(script).log
+    assert log["Ek"][-1] < 1e-20
+    # With the volumes r^2 dr of the middles of points, of dr = 1/20, the wall is at R^2 - dr^2/4.
+    area = 1 - 0.05**2 / 4 if kind == "spherical" else 1
+    assert log["hold_x"][-1] == pytest.approx(-10 * area, rel=1e-9)
+
+
+def test_shells_in_contact_are_one_shell(run_interpreted):
+    """Two shells under inner pressure, as in `test_a_thick_shell_under_pressure`, in load steps;
+    the contact carries p a^3/(b^3 - a^3) (b^3/c^3 - 1) c^2 per steradian of the radius c."""
+    contacts = "ulmpm/contacts, FLIP, linear, 1"
+    both = head("spherical", n=32, method=contacts, scheme="scheme(quasi-static)")
+    one = "region(wall, block, 1, 2)\nsolid(wall, region, wall, 2, m, 0.03125)\n"
+    assert one in both
+    script = both.replace(one, """region(wall, block, 1, 1.5)
+region(outer, block, 1.5, 2)
+solid(wall, region, wall, 2, m, 1/32)
+solid(outer, region, outer, 2, m, 1/32)
+""") + f"""
+p = 1e-2
+fix(p, edge_traction, all, wall, xlo, p)
+compute(err, error, all, displacement, {LAME["spherical"]}, relative)
+log_modify(custom, step, err, ContactForce_outer_x)
+run(1)
+"""  # fmt: skip
+    log = run_interpreted(script).log
+    assert log["err"][-1] < 0.008
+    exact = 1e-2 / 7 * (8 / 1.5**3 - 1) * 1.5**2
+    assert abs(log["ContactForce_outer_x"][-1]) == pytest.approx(exact, rel=0.01)
+
+
+def test_a_rubber_shell_needs_averaged_volumes(run_interpreted):
+    """Lame's shell with nu = 0.4999: linear cells are too stiff, which is warned of."""
+    law = "material(m, linear, 1, 1e3, 0.4999)"
+    script = head("spherical", method="ulmpm, FLIP, linear, 1", law=law) + f"""
+scheme(quasi-static)
+p = 1e-2
+nu = 0.4999
+fix(p, edge_traction, all, wall, xlo, p)
+compute(err, error, all, displacement, {LAME["spherical"]}, relative)
+log_modify(custom, step, err)
+run(1)
+"""  # fmt: skip
+    stiff = run_interpreted(script, folder="stiff")
+    assert "locking" in stiff.err and stiff.log["err"][-1] > 0.5
+    averaged = run_interpreted(script.replace("scheme(", "anti_volumetric_locking(true)\nscheme("))
+    assert averaged.log["err"][-1] < 0.035
+
+
+def test_heat_flows_out_of_a_shell(run_interpreted):
+    """T = 2/r - 1 in the end, and k a b/(b - a) per steradian (Carslaw & Jaeger 1959, section 9.2)."""
+    warm = "tlmpm, FLIP, linear, 1, thermo-mechanical"
+    law = "material(m, linear, 1, 1e3, 0.3, 1, 10)"
+    script = head("spherical", n=4, method=warm, law=law) + INSIDE + """
+region(outside, block, 2, INF)
+group(outside, nodes, region, outside, all)
+fix(still, velocity_particles, all, 0)
+fix(in, temperature_nodes, inside, 1)
+fix(out, temperature_nodes, outside, 0)
+compute(err, error, all, T, 2/x0 - 1)
+log_modify(custom, step, err, in_s)
+run_time(0.07)
+"""  # fmt: skip
+    log = run_interpreted(script).log
+    assert log["err"][-1] < 0.01
+    assert log["in_s"][-1] == pytest.approx(20, rel=0.02)
+
+
+def test_check_proposes_a_line(run_interpreted):
+    script = """
+method(ulmpm, FLIP, linear, 1)
+dimension(2, 0, 1, 0, 0.2, 0.1)
+axisymmetric(true)
+region(all, block, INF, INF, INF, INF)
+material(m, linear, 1, 1e3, 0.3)
+solid(s, region, all, 2, m, 0.1)
+group(n, nodes, region, all, all)
+fix(plane, velocity_nodes, n, NULL, 0)
+fix(v, initial_velocity_particles, all, x0, 0)
+run(1)
+"""
+    found = run_interpreted(script, command="check").out
+    assert "dimension(1, 0, 1, 0.1), and cylindrical(true)" in found
+
+
 SOLID = """
 material(m, linear, 1, 1e3, 0.3)
 region(r, block, 0, 0.5)

@@ -97,7 +97,7 @@ class SceneFacts(BasicFacts):
     def locks(self) -> bool:
         """True if linear cells hold several points, so that isochoric flow locks."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
-        return self.hats and self.d > 1 and not free
+        return self.hats and (self.d > 1 or self.hub.domain.kin.hoops > 0) and not free
 
     @property
     def grid_viscosity(self) -> float:

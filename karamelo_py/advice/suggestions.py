@@ -124,9 +124,11 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
     """Suggest fewer dimensions for scenes that are uniform along a direction."""
     domain = hub.domain
     d = domain.dimension
-    if d == 1 or domain.kin.hoops or len(hub.lattices) > 1:
+    if d == 1 or len(hub.lattices) > 1:
         return
-    for k in range(d):
+    round_ = domain.kin.hoops > 0
+    whole = "thickness" if d == 3 else "length" if round_ else "cross-section"
+    for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else 0
         if layers and _acts_alike(hub, rest):
@@ -136,8 +138,9 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
             yield (
                 f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}, which has the forces and "
-                f"energies of a {'thickness' if d == 3 else 'cross-section'} of 1",
-                f"dimension({d - 1}, {', '.join(ends)}, {domain.h:g}){renamed}",
+                f"energies of a {whole} of 1",
+                f"dimension({d - 1}, {', '.join(ends)}, {domain.h:g}){renamed}"
+                + (", and cylindrical(true)" if round_ else ""),
             )
             return
 

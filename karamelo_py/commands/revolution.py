@@ -77,7 +77,9 @@ def spherical(hub: Hub, active: bool) -> None:
     Before the first solid, in a 1D domain with x >= 0. Everything depends on the radius alone. The
     hoop strains, components 22 and 33, are the radial displacement over r. Points carry the volume
     and mass of one steradian, r^2 dr: multiply masses, forces and energies by 4 pi for the whole
-    sphere. A node at x = 0 does not move. The material must be the same in y and z.
+    sphere. A node at x = 0 does not move. The material must be the same in y and z. Linear cells
+    lock where the volume cannot change: with a Poisson's ratio near 0.5, or metals that flow, use
+    anti_volumetric_locking(true).
 
     See Also
     --------
