@@ -196,7 +196,7 @@ run(1)
 
 
 def test_heat_flows_out_of_a_shell(run_interpreted):
-    """T = 2/r - 1 in the end, and k a b/(b - a) per steradian (Carslaw & Jaeger 1959, section 9.2)."""
+    """T = 2/r - 1 in the end, flux k a b/(b - a) (Carslaw & Jaeger 1959, section 9.2)."""
     warm = "tlmpm, FLIP, linear, 1, thermo-mechanical"
     law = "material(m, linear, 1, 1e3, 0.3, 1, 10)"
     script = head("spherical", n=4, method=warm, law=law) + INSIDE + """
