@@ -75,6 +75,8 @@ def volume(path, dimension, group=None):
             "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n",
             None, 1.5,
         ),
+        # as CalculiX writes refined meshes
+        (SQUARES + BOTH.replace("*ELEMENT,", " *ELEMENT,PARENT=3,"), None, 2),
         # a line with more numbers than nodes, as C3D8I of CalculiX has
         (SQUARES + "*ELEMENT, TYPE=CPE4I\n1, 1, 2, 5, 4, 7, 8,\n2, 2, 3, 6, 5, 9, 10\n", None, 2),
         ("*SYSTEM\n5, 0, 0, 5, 1, 0\n" + SQUARES + BOTH, None, 2),

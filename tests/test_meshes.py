@@ -204,6 +204,8 @@ dimension(2, 0, 1, 0, 1, 0.1)
         ("none.msh", None, "the file none.msh does not exist"),
         ("empty.msh", "", "the file empty.msh is empty"),
         ("text.msh", "hello", "cannot be read as a mesh: its content does not fit its ending"),
+        ("words.inp", "hello", "cannot be read as a mesh: its content does not fit its ending"),
+        ("lfs.vtu", "version https://git-lfs.github.com/spec/v1\n", "it is a pointer of Git LFS"),
         ("body.foo", "hello", "cannot be read as a mesh: its ending tells no format"),
         ("part.step", "hello", "part.step cannot be read as a mesh: its content does not fit"),
         ("wrong.geo", "Rectangle(1 = ;", "Gmsh cannot mesh wrong.geo: 'wrong.geo', line"),

@@ -101,7 +101,7 @@ def _wrong(keyword: _Keyword, error: str, expected: str | None = None) -> Script
 
 def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
     """Yield keywords with data lines, also of included files."""
-    lines = path.read_text("utf-8", errors="replace").splitlines()
+    lines = [line.lstrip() for line in path.read_text("utf-8", errors="replace").splitlines()]
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
     ]

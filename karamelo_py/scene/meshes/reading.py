@@ -33,6 +33,7 @@ _BY_ENDING = (".unv", ".bdf", ".nas", ".cgns")  # recognised by ending
 _MED = b"\x89HDF"
 # Other programs' files with endings of meshes: first bytes, and advice.
 _FOREIGN = (
+    (re.compile(rb"version https://git-lfs"), "a pointer of Git LFS", "git lfs pull fetches it"),
     (re.compile(rb"\s*MFEM"), "a mesh of MFEM", "in MFEM, write it as .vtu or .msh"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
     (re.compile(rb"\s*Begin\s+(ModelPart|Properties|Nodes)"), "a model of Kratos",
@@ -111,7 +112,7 @@ def _by_content(path: Path) -> Mesh:
     for pattern, program, remedy in _FOREIGN:
         if pattern.match(begin):
             raise _unreadable(path, f"it is {program}", hint=remedy)
-    if ending in (".inp", ".msh") and re.search(rb"^\*[A-Za-z]", begin, re.M):
+    if ending in (".inp", ".msh") and re.search(rb"^ *\*[A-Za-z]", begin, re.M):
         return read_deck(path)
     if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
         return _by_meshio(path, "avsucd")
@@ -180,6 +181,8 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
         unknown = "Could not deduce" in str(error)
         reason = "its ending tells no format" if unknown else _reason(error)
         raise _unreadable(path, (why or "") + reason) from None
+    if np.ndim(mesh.points) != 2:  # meshio found no nodes
+        raise _unreadable(path, "its content does not fit its ending")
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     cells = [CellBlock(block.type, np.asarray(block.data)) for block in mesh.cells]
