@@ -75,7 +75,7 @@ def _force_between_minimize_penetration(law, kin, pair):
 
 
 class FrictionMemory(NamedTuple):
-    hold: Any  # of the spring along the surface, a vector
+    hold: Any  # force of the spring along the surface, a vector
     mean: Any  # running mean of the load
     unused: Any  # friction left from earlier steps
 

@@ -1,7 +1,7 @@
 """Frames: weights and gradients at present (``Updated``) or reference positions (``Total``).
 
-``Updated``: spatial gradients and Kirchhoff stress. ``Total``: reference gradients, first Piola-
-Kirchhoff stress and deformation gradient F.
+``Updated``: spatial gradients and Kirchhoff stress. ``Total``: reference gradients, first
+Piola-Kirchhoff stress and deformation gradient F.
 """
 
 from typing import Any, NamedTuple

@@ -87,7 +87,6 @@ def motions(simulation: Backend) -> list[BodyMotion]:
 
 
 def _pieces(simulation: Backend, d: int) -> Iterator[tuple]:
-    """Yield solid number, masses (n,), positions and velocities (d, n) per block."""
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
     for block, rows in simulation.points.rows_of(None):
         points = block.points

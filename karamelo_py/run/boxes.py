@@ -88,7 +88,6 @@ def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def numbers(spans: np.ndarray) -> np.ndarray:
-    """Return the node numbers in spans (first row: count)."""
     return between(*used(spans)[1:].T)
 
 

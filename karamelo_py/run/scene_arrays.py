@@ -146,7 +146,6 @@ class SceneArrays:
         )
 
     def leaving(self) -> np.ndarray:
-        """Return the ids (ascending) of points outside the domain."""
         s, then = self.setup, 1 - self.now
         edges = ((s.grids.x0, s.grids.lx), (s.grids.y0, s.grids.ly), (s.grids.z0, s.grids.lz))
         outside = []

@@ -100,7 +100,6 @@ class Simulation(SceneArrays):
         return float(self.comm.allreduce_max(np.array([largest], float))[0])
 
     def in_tiles(self) -> bool:
-        """Return True if all points have been sorted by tile."""
         unsorted = 0
         for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
             unsorted += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
@@ -122,7 +121,6 @@ class Simulation(SceneArrays):
 
     @property
     def step_kind(self) -> StepKind:
-        """Tags that select the code of a step."""
         return StepKind(self.hub.update.scheme, self.visits, self.mode)
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:

@@ -145,7 +145,6 @@ class StepSize:
 
     @contextmanager
     def altered(self, **fields: float) -> Iterator[None]:
-        """Set fields of the clock within the block."""
         before = {name: float(self.clock[name]) for name in fields}
         for name, value in fields.items():
             self.clock[name] = value

@@ -22,7 +22,7 @@ def initial_damage(damage, like):
 
 
 class FlowStep(NamedTuple):
-    strain: Any  # of the equivalent plastic strain
+    strain: Any  # increment of the equivalent plastic strain
     triaxiality: Any  # mean stress over von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any

@@ -1,9 +1,9 @@
 """Affine transfers: the point stores the moment of velocity B with its velocity.
 
-B_p = sum_I N_I v*_I (X_I - x_p)^T, and the point gives the node m_p (N_I v_p + B_p N_I D^-1 (X_I -
-x_p)). B instead of C = B D^-1 conserves angular momentum to round-off, also if D depends on the
-position in the cell (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-
-particle-in-cell method", eqs. 15 to 18).
+B_p = sum_I N_I v*_I (X_I - x_p)^T, and the point gives the node
+m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). B instead of C = B D^-1 conserves angular momentum to
+round-off, also if D depends on the position in the cell (Jiang, Schroeder & Teran 2017, "An angular
+momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
 """
 
 from typing import Annotated, NamedTuple

@@ -1,9 +1,9 @@
 """Taylor transfers: the point stores the velocity gradient L with its velocity.
 
 The point gives the node m_p N_I (v_p + L_p (X_I - x_p)), with L_p = sum_I v*_I (x) grad N_I. No D
-is inverted, so any basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear, Bernstein-
-quadratic) this is APIC in another form. Angular momentum is then conserved as far as D is constant;
-with splines, as far as velocity is linear over their support.
+is inverted, so any basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,
+Bernstein-quadratic) this is APIC in another form. Angular momentum is then conserved as far as D is
+constant; with splines, as far as velocity is linear over their support.
 """
 
 from typing import Annotated, NamedTuple

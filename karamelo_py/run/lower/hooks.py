@@ -31,7 +31,6 @@ NO_PROGRAM = (-1, -1, -1, -1)
 def lower_hooks(
     hub: Hub, fixes: list, mode: Tag = None, threads: int = 1
 ) -> arrays.Hooks | arrays.NoHooks:
-    """Make the tables of compiled fix hooks, in their order."""
     dimension = hub.domain.dimension
     builder = _Builder(hub, sum(s.count for s in hub.solids.values()))
     for fix, name, hook in compiled_hooks(fixes):

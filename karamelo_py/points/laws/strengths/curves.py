@@ -240,7 +240,7 @@ shear_response.on(FlowStress)(radial_return)
 def _flow_stress_flow_stress(strength, before, increment, dt):
     T = temperature_or(before.heat, strength.initial_temperature)
     near = 1e-6 * (increment + 1e-4)
-    # In double precision: a small difference.
+    # In double precision: the difference is small.
     here = real(before.memory.ep, 1.0) + increment
     stress = max(value(strength, here, increment / dt, T), 0.0)
     beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)

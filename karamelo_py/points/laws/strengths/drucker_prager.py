@@ -119,8 +119,8 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # In plastic flow in plane strain s_zz = -2/3 dilation sqrt(J2): half the difference of the in-
-    # plane principal stresses is sqrt(J2) times:
+    # In plastic flow in plane strain s_zz = -2/3 dilation sqrt(J2): half the difference of the
+    # in-plane principal stresses is sqrt(J2) times:
     in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
