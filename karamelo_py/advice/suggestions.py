@@ -121,7 +121,6 @@ def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
 
 
 def _flat(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest fewer dimensions for scenes that are uniform along a direction."""
     domain = hub.domain
     d = domain.dimension
     if d == 1 or len(hub.lattices) > 1:
@@ -285,7 +284,6 @@ def _both_sides(solid: Solid, sides: Callable[[np.ndarray], np.ndarray]) -> bool
 
 
 def _precision(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest single precision for large scenes with long steps."""
     if (
         sum(solid.count for solid in hub.solids.values()) < LARGE
         or hub.settings.precision != "double"

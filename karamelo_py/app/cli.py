@@ -200,7 +200,6 @@ def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
 
 
 def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> ScriptError:
-    """Make the error for surplus words."""
     command = arguments[0]
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":

@@ -572,7 +572,6 @@ class Simulation:
 
 @contextmanager
 def _as_simulation_error() -> Iterator[None]:
-    """Convert script errors to SimulationError."""
     try:
         yield
     except ScriptError as error:
@@ -607,7 +606,6 @@ def _threads_of(threads: Any) -> int | None:
 
 
 def _as_script_text(value: Any) -> str:
-    """Format a Python value in script syntax."""
     if value is None:
         return "NULL"
     if isinstance(value, (bool, np.bool_)):

@@ -216,7 +216,6 @@ def _live(folders: list[Path]) -> int:
 
 
 def _matching(names: Iterable[Path]) -> set[Path]:
-    """Expand names and patterns to files."""
     files: set[Path] = set()
     for name in names:
         is_pattern = glob.has_magic(str(name)) and not name.exists()

@@ -208,8 +208,6 @@ FAMILIES = ("transfer", "basis", "method")
 
 
 class _Call:
-    """The three styles of a call, and the parameter of each option."""
-
     def __init__(self, hub: Hub, names: dict[str, str], options: Sequence[Argument]):
         self.hub = hub
         self.names = names

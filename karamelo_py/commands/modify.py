@@ -35,11 +35,11 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
     Notes
     -----
-    The next run uses the new constants in the same compiled loops. A stress outside the new yield
-    surface returns to it in the first step. If an elastic modulus changes, an incremental law
-    retains its stress; the stress of a law of the total deformation changes at once. Not
-    changeable: the density, because points have their masses, and constants that set the initial
-    state of points, such as pc of cam-clay.
+    The next run uses the new constants, without compilation. A stress outside the new yield surface
+    returns to it in the first step. If an elastic modulus changes, an incremental law retains its
+    stress; the stress of a law of the total deformation changes at once. Not changeable: the
+    density, because points have their masses, and constants that set the initial state of points,
+    such as pc of cam-clay.
 
     ``kind`` material also finds constants of the parts of eos-strength, if only one part has the
     name.

@@ -33,10 +33,9 @@ def dump(
 
     Notes
     -----
-    A file name is relative to the folder where the program was started; ``~`` is the home folder. A
-    folder in the name must exist. Files of that name are overwritten. Snapshots of a longer,
-    earlier run remain if this run does not reach their steps: a viewer shows them after the new
-    ones.
+    File names are relative to the folder where the program was started; ``~`` is the home folder.
+    Folders in the name must exist. Existing files are overwritten. Snapshots of a longer, earlier
+    run remain if this run does not reach their steps: a viewer shows them after the new ones.
 
     Example
     -------
@@ -159,8 +158,8 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
 
     Notes
     -----
-    Between two runs it changes the columns of the following rows. Their names are in a line of
-    log.mpm that begins with ``#``.
+    Between two runs it changes the columns of the following rows; a line ``#`` of log.mpm names
+    them.
 
     Example
     -------

@@ -55,9 +55,9 @@ def delete_particles(
     Notes
     -----
     ``where`` is for between runs. The mass and energy of the deleted points are printed. Before the
-    first run, the remaining points are renumbered, so the command must come before the groups of
-    particles and contact fixes of these solids; between runs numbers do not change. A solid cannot
-    lose all of its points before the first run.
+    first run, the remaining points are renumbered, so the command must precede particle groups and
+    contact fixes of these solids, and a solid cannot lose all of its points; between runs numbers
+    do not change.
 
     See Also
     --------
@@ -250,8 +250,8 @@ def populate_cylindrical_coordinates(
     Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``, and points at the
     angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx`` with
     ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``; the
-    sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo puts rings at ``j dr`` with a point in
-    the centre, and slices at ``lo + i dx``, whose volumes do not give this sum.
+    sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo has rings at ``j dr`` with a point in
+    the centre, and slices at ``lo + i dx``; their volumes do not give this sum.
 
     Before the first run, and before groups that select from these points. T0 replaces the
     temperature of the solid.

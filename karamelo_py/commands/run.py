@@ -266,13 +266,13 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     The script must be unchanged up to this run, except for commands that only control how a run
     proceeds or its output (set_dt, dt_factor, set_output, dump, plot), an added
     ``boundary(delete)``, and the length of the last run, as a number in its own line. Variables
-    that were set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run
-    that had this length from the start. A longer ``run_time(T)`` is too, if the file was written
-    before the last two steps of the shorter run, which are shortened.
+    that were set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run of
+    this length; so is a longer ``run_time(T)``, if the file was written before the last two steps
+    of the shorter run, which are shortened.
 
     A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
-    plots, and the values that the script has read. A run that is killed while writing leaves the
-    previous file intact. The last state of each run is written too. A run that fails writes
+    plots, and the values that the script has read. A run killed while writing leaves the previous
+    file intact. The last state of each run is written too. A run that fails writes
     last_good.<step>.h5 instead: if its energy has grown, the last state before the growth, to
     within ten steps; if its step was above the stable limit from the start, the state before the
     first step. No such file is written with boundary(delete), or if the run was resumed from a file

@@ -20,8 +20,6 @@ from karamelo_py.script.parser import parse, parse_expression, read_script
 
 @dataclass
 class _Frame:
-    """A script in progress: its statements, and the next one."""
-
     statements: list[syntax.Statement]
     path: Path | None
     next: int = 0

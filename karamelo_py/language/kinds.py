@@ -189,7 +189,6 @@ def _to_number(hub: Scene, argument: Argument) -> float:
 
 
 def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
-    """Suggest only numbers for an unknown name."""
     name, alike, numbers = error.name or "", error.alike, argument.numbers()
     if error.code != "unknown-name" or alike is None or "value" in argument.text:
         return

@@ -260,7 +260,6 @@ def ranges(count: int) -> Iterator[tuple[int, int]]:
 
 
 def _joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
-    """Concatenate points from the arrays of `arrays_of`."""
     count = sum(arrays[0].shape[-1] for arrays in parts)
     made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):

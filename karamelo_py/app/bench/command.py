@@ -240,8 +240,6 @@ def comparison(now: Record, then: Record) -> list[str]:
 
 
 def _differences(now: Record, then: Record) -> list[str]:
-    """List differences of machine, threads and versions."""
-
     def about(record: Record) -> dict:
         keys = ("processor", "cores", "system", "commit", "threads")
         versions = record.get("versions") or {}

@@ -316,8 +316,6 @@ def _take_step(simulation: Simulation, mode: Any) -> None:
 
 
 class _Recorder(NamedTuple):
-    """Mode that records what a sweep would read and write."""
-
     points: list
     nodes: list
     sums: list

@@ -144,7 +144,6 @@ def _is_closed(text: str) -> bool:
 
 
 def _apart(text: str) -> list[str]:
-    """Split at commas outside parentheses."""
     words, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")

@@ -181,8 +181,6 @@ class Study:
 
 
 class _Display:
-    """Progress: a line for each finished run, on a terminal also a bar."""
-
     def __init__(self, study: Study, count: int):
         from rich.progress import BarColumn, Progress, TextColumn
 

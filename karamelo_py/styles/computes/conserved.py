@@ -30,7 +30,7 @@ class KineticEnergy(Energy):
 
     Notes
     -----
-    In the log it belongs to half a step earlier, like velocities (see `scheme`).
+    Like velocities, it belongs to half a step before the logged time (see `scheme`).
 
     See Also
     --------

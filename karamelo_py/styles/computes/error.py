@@ -173,7 +173,7 @@ class Error(Compared, Compute):
 
     Publishes ID, the present error; ID_max, the largest output so far; and ID_history, the norm
     over points and all time so far, in which each output is weighted by the time since the previous
-    one. With ``relative`` both norms cover the whole history, so exact values may vanish at times.
+    one. With ``relative`` both norms cover the whole history: exact values may vanish at times.
 
     See Also
     --------

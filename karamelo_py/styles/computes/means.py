@@ -205,9 +205,8 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z: the first coordinate at which the mass of the points up to there
-    reaches the fraction. Unlike the largest position, such a front does not jump when a few points
-    fly ahead.
+    Published as ID_x, ID_y, ID_z: the coordinate up to which the mass of the points reaches the
+    fraction. Unlike the largest position, it does not jump when a few points fly ahead.
 
     Parameters
     ----------

@@ -38,8 +38,8 @@ SAMPLE = 1 << 16  # points, about, from which the typical size is measured
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
-    In 2D and 3D the points are drawn at their positions; in 1D the field is drawn over x. Unless
-    given, the colour limits grow with the values seen, so the pictures of a run can be compared.
+    In 2D and 3D the points are drawn at their positions; in 1D the field is drawn over x. By
+    default the colour limits grow with the values, so the pictures of a run can be compared.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ class PyPlot(Dump):
     scale
         log: colours follow the logarithm of the column.
     quantile
-        Fraction of the values that may lie beyond either colour limit, such as 0.01, so that a few
-        large values do not use up all colours.
+        Fraction of the values beyond either colour limit, such as 0.01, so that a few large values
+        do not use up all colours.
     dpi
         Pixels per inch. A picture of 600 pixels is 6 inches wide, and has 1800 with 300.
     fontsize

@@ -275,9 +275,9 @@ class EdgeTraction(EdgeFix):
     The points of the group are boxes that fill the region. Boxes with an outer face in the
     direction of `side` take the traction on the initial area of this face. The load has constant
     magnitude and direction (a dead load) and acts half a box inside the edge. The sum over a plane
-    side is exactly traction times area. Faces of a hole that look in this direction are loaded too:
-    for a plate with a hole, name the region without the hole. In axisymmetry, area and force are
-    per radian.
+    side is exactly traction times area. Faces of a hole in this direction are loaded too: for a
+    plate with a hole, name the region without the hole. In axisymmetry, area and force are per
+    radian.
 
     See Also
     --------
@@ -325,8 +325,8 @@ class EdgePressure(EdgeFix):
     is that on the projected area, as on the smooth edge. With points=cut the forces are those on
     the smooth edge itself. In axisymmetry, forces are per radian.
 
-    For a part of an edge, define a separate region. A region such as ``region(top, block, 0, 1,
-    0.9, 1)`` also has other sides, which the group may have to exclude.
+    For a part of an edge, define a separate region; the group may have to exclude other sides of a
+    region such as ``region(top, block, 0, 1, 0.9, 1)``.
 
     See Also
     --------

@@ -23,7 +23,7 @@ class Erosion(Fix):
         solids, time and published values; points for which it is not 0 are deleted. A column name
         means the column even if the script has a variable of that name.
     every
-        Steps between two checks, after each step whose number is a multiple.
+        Checks follow steps whose number is a multiple of this.
 
     Example
     -------

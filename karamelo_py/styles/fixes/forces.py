@@ -233,12 +233,12 @@ class LocalDamping(Fix):
     stiffness, and steady motion is not damped. With 0.8 a scene comes to rest within about ten
     periods of its slowest vibration.
 
-    It acts after all other fixes, wherever it is in the script. Nodes that are held or have a
-    prescribed constant velocity are not damped, and their reactions are correct. Publishes the sum
-    of the damping forces as ID_x, ID_y, ID_z.
+    It acts after all other fixes, wherever it is in the script. Nodes that are held or move at a
+    prescribed constant velocity are not damped; their reactions are correct. Publishes the sum of
+    the damping forces as ID_x, ID_y, ID_z.
 
-    In method ulmpm/contacts it acts after contact, on the net force: bodies that touch come to rest
-    with the correct forces between them.
+    In method ulmpm/contacts it acts after contact, on the net force: touching bodies come to rest
+    with correct contact forces.
 
     See Also
     --------
@@ -275,8 +275,7 @@ class InitialStress(Fix):
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
-    set. A warning is given for tension that a material cannot sustain, such as in soil without
-    cohesion.
+    set. Tension that a material cannot sustain gives a warning, such as in soil without cohesion.
     """
 
     published = ()

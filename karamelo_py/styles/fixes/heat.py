@@ -142,7 +142,7 @@ def heat(capacity, T, face, supply, value, other, dt):
 
 
 class FacesOfPoints(HeatFix):
-    """A fix that acts through one face of each point."""
+    """Base of fixes that act through one face of each point."""
 
     by_sizes = True
 

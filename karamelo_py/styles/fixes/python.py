@@ -92,8 +92,8 @@ class Python(Fix):
 
     With several processes all points are gathered in each step. If the function treats each point
     or node separately and moves no points, write ``pull.point_by_point = True`` after it: each
-    process then calls it for its own points, in any order. ``points.total(terms)`` sums terms (n,)
-    or (n, k) over all points.
+    process then calls it for its local points, in any order. ``points.total(terms)`` sums terms
+    (n,) or (n, k) over all points.
 
     Restart files hold values that the function stores between steps, if ``remembers = ("taken",
     "left")`` names them: variables in the module, or attributes in the class of a callable object.

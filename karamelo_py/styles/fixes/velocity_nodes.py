@@ -122,10 +122,10 @@ class VelocityNodes(Fix):
 
     A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
     in cells next to faces whose nodes are all held or bounded, so a group should extend to the last
-    cell in which a body has points.
+    cell with points of a body.
 
-    In ulmpm/contacts, if the fix gives all components and all corners of a solid's cells are in the
-    group, all nodes of the solid are held.
+    In ulmpm/contacts, a fix that gives all components, on all corners of a solid's cells, holds all
+    nodes of the solid.
 
     See Also
     --------

@@ -58,7 +58,7 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
 
 
 class ULMPMContacts(Method):
-    """Updated Lagrangian MPM with contact: each solid has a separate velocity field on the grid.
+    """Updated Lagrangian MPM with contact: a velocity field on the grid for each solid.
 
     Solids move freely until they approach each other and the gap between them is closed. Then they
     push each other along their common normal. They separate freely. Contact is frictionless unless
