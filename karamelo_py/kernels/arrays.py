@@ -92,11 +92,11 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
         yield name_of(type(one)), one.array
 
 
-def made_of(points: Points, found: Iterable[np.ndarray]) -> Points:
+def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
     """Rebuild `points` from `arrays`, in the order of `arrays_of`."""
-    arrays = iter(found)
-    own: list[Any] = [None if array is None else next(arrays) for array in points[:-1]]
-    return Points(*own, tuple(type(one)(next(arrays)) for one in points.fields))
+    remaining = iter(arrays)
+    items: list[Any] = [None if array is None else next(remaining) for array in points[:-1]]
+    return Points(*items, tuple(type(one)(next(remaining)) for one in points.fields))
 
 
 class Tiling(NamedTuple):
@@ -337,7 +337,7 @@ CLOCK = np.dtype(
         ("hottest", np.float64),
         ("T_low", np.float64),  # of the points at the last look
         ("T_high", np.float64),
-        ("own_heat", np.float64),  # largest heating of a point by its dissipation
+        ("own_heat", np.float64),  # largest temperature rise of a point by its dissipation
         ("set_low", np.float64),  # set at nodes by fixes
         ("set_high", np.float64),
         ("rise", np.float64),  # largest heating rate of points by fixes

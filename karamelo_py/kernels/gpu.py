@@ -145,7 +145,7 @@ class Stage:
             places = sweep.places_of(c.frame, points, c.now, c.then)
             return c, PointView(sweep.work_of(c, grid, c.nodes, block, places), (), p, c.dt)
 
-        def place(pt):
+        def place_of(pt):
             w = pt.w
             places = w.places.y if lists and w.frame.moves else w.places.where
             return place_at(w.basis, w.kin, places, pt.p)
@@ -174,7 +174,7 @@ class Stage:
         def count_point(i, fate, s, block, cells):
             points = block.points
             c, pt = point(s, block, index(i))
-            where = place(pt)
+            where = place_of(pt)
             is_inside = inside(pt.w.grid, c.kin, where)
             for k in range(corners):
                 number = 0  # the run ends
@@ -186,7 +186,7 @@ class Stage:
             if not is_inside:
                 goes_wrong(fate, points.id[pt.p])
 
-        self._point, self._place = point, place
+        self._point, self._place = point, place_of
         self.load, self.load_point = load_of_point, load_point
         self.gather, self.count = gather_point, count_point
 

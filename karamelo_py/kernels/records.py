@@ -240,14 +240,14 @@ def _move(*kinds):
     array, _, other, _, _, like, _ = kinds
 
     def codegen(builder, *values):
-        here, i, there, j, first, _, keep = values
+        here, i, source_table, j, first, _, keep = values
         size = _size(array)
 
         def address(kind, table, node):
             pointer = llvm.item_pointer(builder, kind, table, [node, first])
             return _record(builder, kind, pointer, len(like))
 
-        to, of = address(array, here, i), address(other, there, j)
+        to, of = address(array, here, i), address(other, source_table, j)
         before = builder.load(to, align=size)
         zero = ir.Constant(before.type, None)
         kept = builder.select(keep, before, zero)

@@ -70,12 +70,12 @@ def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, shar
     """Sum the quantities at a part of the nodes, tile by tile, box by box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts
-    for part in range(first[share], first[share + 1]):
-        action, count = parts[part, 9], parts[part, 4]
-        for i in range(parts[part, 2]):
-            for j in range(parts[part, 3]):
-                n = parts[part, 0] + i * parts[part, 5] + j * parts[part, 6]
-                m = parts[part, 1] + i * parts[part, 7] + j * parts[part, 8]
+    for row in range(first[share], first[share + 1]):
+        action, count = parts[row, 9], parts[row, 4]
+        for i in range(parts[row, 2]):
+            for j in range(parts[row, 3]):
+                n = parts[row, 0] + i * parts[row, 5] + j * parts[row, 6]
+                m = parts[row, 1] + i * parts[row, 7] + j * parts[row, 8]
                 if action == arrays.CLEAR:
                     for k in range(count):
                         _clear_record(quantities, kin, nodes, index(n + k))

@@ -222,9 +222,9 @@ def nearest(kin, surface, x, reach):
 
 
 @noinline
-def _crossed(a, b, place):
+def _crossed(a, b, point):
     """Return 1 if a ray from (x, y) along x crosses a rising edge a b, -1 a falling one, else 0."""
-    (ax, ay), (bx, by), (x, y) = a, b, place
+    (ax, ay), (bx, by), (x, y) = a, b, point
     if (ay > y) == (by > y):
         return 0
     if ay < by:  # same operations for both faces of an edge
@@ -252,10 +252,10 @@ def _crossing_segment(kin, surface, i, x):
 def _crossing_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
     flat = [(corner[0], corner[1]) for corner in (a, b, c)]
-    place = x[0], x[1]
-    winding = _crossed(flat[0], flat[1], place)
-    winding += _crossed(flat[1], flat[2], place)
-    winding += _crossed(flat[2], flat[0], place)
+    point = x[0], x[1]
+    winding = _crossed(flat[0], flat[1], point)
+    winding += _crossed(flat[1], flat[2], point)
+    winding += _crossed(flat[2], flat[0], point)
     if winding == 0:
         return 0
     normal = _cross(b - a, c - a)
@@ -361,7 +361,7 @@ def depth(shape, kin, x, reach):
 
 @point_function(otherwise=True)
 def slopes(shape, kin, x, reach, within_and_step):
-    """Return depth a step after minus a step before `x`, per axis; `within` is the depth at `x`."""
+    """Return depth a step before minus a step after `x`, per axis; `within` is the depth at `x`."""
     return _slopes_across(shape, kin, x, reach, within_and_step[1])
 
 

@@ -118,7 +118,7 @@ def hand_over(private, totals, row):
 
 @kernel
 def carry(total):
-    """Carry: digits in [0, 2^32 - 1], the last one signed."""
+    """Carry digits into [0, 2^32 - 1]; the last one is signed."""
     for k in range(LOST - 1):
         carry = total[k] >> 32
         total[k] -= carry << 32

@@ -51,7 +51,7 @@ class FrictionalHeat(StepField):
 
 @node_task
 class KeepLoss(NamedTuple):
-    """Kinetic energy brought to a node minus that of the node."""
+    """Energy loss of a node: kinetic energy brought minus nodal kinetic energy."""
 
     goes_through = ("sums", "energy loss", "energy loss")
 
