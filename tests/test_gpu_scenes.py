@@ -67,6 +67,11 @@ def pair(method, materials, *lines, d=2, begin=0.2, more="", T=""):
 
 SCENES = {
     "axis": bar("method(ulmpm, FLIP, linear, 0.99)"),
+    "centre": bar("method(ulmpm, FLIP, linear, 0.99)")
+    .replace("dimension(2, 0, 0.4, 0, 0.4", "dimension(1, 0, 0.4")
+    .replace("axisymmetric", "spherical")
+    .replace("0, 0.1, 0.1, 0.3", "0, 0.2")
+    .replace("2*x, -4*y", "2*x"),
     "averaged volumes": bar("method(ulmpm, FLIP, linear, 0.99)\nanti_volumetric_locking(true)"),
     "averaged pressure of soil": bar(
         "method(ulmpm, FLIP, linear, 0.99)\nscheme(usavg)\nanti_volumetric_locking(true)"

@@ -102,6 +102,27 @@ run_time(2*PI/w)
     assert energy[-1] == pytest.approx(energy[0], rel=2e-3)
 
 
+def test_a_wave_leaves_a_cavity(run_interpreted):
+    """A sudden pressure p in a cavity of radius a: u = d(f/r)/dr at the time t - (r - a)/c, where
+    f'' + 4 cs^2/(c a) f' + 4 cs^2/a^2 f = -p a/rho (Selberg 1952, Ark. Fys. 5)."""
+    script = head("spherical", 1, 4, 36) + """
+c = sqrt(E*(1 - nu)/((1 + nu)*(1 - 2*nu)))
+G = E/(2*(1 + nu))
+damping = 2*G/c
+w = sqrt(4*G - damping^2)
+t = max(time - (x0 - 1)/c, 0)
+p = 0.1
+fade = exp(-damping*t)
+f = -p/(4*G)*(1 - fade*(cos(w*t) + damping/w*sin(w*t)))
+rate = -p/(4*G)*fade*(w + damping^2/w)*sin(w*t)
+fix(p, edge_pressure, all, wall, p*(x < 2))
+compute(err, error, all, displacement, -f/x0^2 - rate/(c*x0), relative)
+log_modify(custom, step, err)
+run_time(2.5/c)
+"""  # fmt: skip
+    assert run_interpreted(script).log["err"][-1] < 0.05
+
+
 @pytest.mark.parametrize("kind", LAME)
 @pytest.mark.parametrize("method", ["tlmpm, FLIP, linear, 1", "ulmpm, APIC, cpgimp"])
 def test_even_expansion_is_exact(state_interpreted, kind, method):
