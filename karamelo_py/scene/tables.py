@@ -71,35 +71,30 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
     Rows are an element, x, y, z, unless the second line has the Properties of extended XYZ.
     """
     lines = read_text(path).rstrip().splitlines()
-    first, count = 0, 0
-    while True:
-        word = lines[first].strip() if first < len(lines) else ""
-        if not word.isdigit() or len(lines) < first + 2 + int(word):
+    begin, first = 0, 0
+    while first < len(lines) or not lines:
+        word, begin = "".join(lines[first : first + 1]).strip(), first + 2
+        first = begin + int(word) if word.isdigit() else len(lines) + 1
+        if first > len(lines):
             raise ScriptError(
-                f"line {first + 1} of {path}: {word}",
+                f"line {begin - 1} of {path}: {word}",
                 expected="the number of points, a line of text, and a line for each point",
                 argument="file",
             )
-        count = int(word)
-        if len(lines) <= first + 2 + count:
-            break
-        first += 2 + count
-    stated = re.search(r'Properties="?([\w:]+)', lines[first + 1])
+    stated = re.search(r'Properties="?([\w:]+)', lines[begin - 1])
     parts = (stated[1] if stated else "species:S:1:pos:R:3").split(":")
+    known = {"pos": "xyz", "velo": ["vx", "vy", "vz"], "mass": ["mass"], "masses": ["mass"]}
     columns: dict[str, int] = {}
     at = 0
     for name, width in zip(parts[::3], map(int, parts[2::3]), strict=True):
-        names = {"pos": "xyz", "velo": ["vx", "vy", "vz"], "mass": ["mass"], "masses": ["mass"]}
-        columns |= {of: at + k for k, of in enumerate(names.get(name, ()))}
+        columns |= {of: at + k for k, of in enumerate(known.get(name, ()))}
         at += width
-    rows = [line.split() for line in lines[first + 2 :]]
-    for number, row in enumerate(rows, first + 3):
+    rows = [line.split() for line in lines[begin:]]
+    for number, row in enumerate(rows, begin + 1):
         if any(k >= len(row) or number_of(row[k]) is None for k in columns.values()):
-            raise ScriptError(
-                f"line {number} of {path}: {' '.join(row)}",
-                expected="an element, and x, y, z" if not stated else f"columns {stated[1]}",
-                argument="file",
-            )
+            expected = f"columns {':'.join(parts)}"
+            message = f"line {number} of {path}: {' '.join(row)}"
+            raise ScriptError(message, expected=expected, argument="file")
     return {of: np.array([row[k] for row in rows], float) for of, k in columns.items()}
 
 

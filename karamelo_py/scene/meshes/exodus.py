@@ -1,5 +1,6 @@
 """Read Exodus II files of Cubit, MOOSE and Sierra (Schoof and Yarberry 1994)."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ FAMILIES = {
     "WED": "wedge", "PYR": "pyramid", "BAR": "line", "BEA": "line", "TRU": "line", "EDG": "line",
     "SPH": "vertex", "CIR": "vertex",
 }  # fmt: skip
+MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # variables; not results
 # Corners of the sides in their order.
 SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -31,81 +33,73 @@ ORDER = {
 }
 
 
-class _File:
-    """Variables by name, of netCDF-4 (which is HDF5) or netCDF-3."""
+def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
+    """Return arrays and types of elements by name, of netCDF-4 (which is HDF5) or netCDF-3."""
+    with path.open("rb") as file:
+        is_hdf5 = file.read(4) == b"\x89HDF"
+    if is_hdf5:
+        import h5py
 
-    def __init__(self, path: Path):
-        if path.read_bytes()[:4] == b"\x89HDF":
-            import h5py
+        with h5py.File(path, "r") as root:
+            items = [(name, of) for name, of in root.items() if MESH.match(name)]
+            found = {name: (of[()], of.attrs.get("elem_type", "")) for name, of in items}
+    else:
+        from scipy.io import netcdf_file
 
-            with h5py.File(path, "r") as root:
-                self.arrays = {name: of[()] for name, of in root.items() if of.shape is not None}
-                self.types = {name: of.attrs.get("elem_type", b"") for name, of in root.items()}
-        else:
-            from scipy.io import netcdf_file
-
-            with netcdf_file(path, mmap=False) as root:
-                self.arrays = {name: of.data.copy() for name, of in root.variables.items()}
-                types = root.variables.items()
-                self.types = {name: vars(of).get("elem_type", b"") for name, of in types}
-
-    def names(self, kind: str, count: int) -> list[list[str]]:
-        """Return the names and numbers of blocks, side sets or node sets."""
-        rows: Any = self.arrays.get(f"{kind}_names", np.zeros((count, 0), "S1"))
-        numbers = self.arrays.get(f"{kind}_prop1", range(1, count + 1))
-        names = [b"".join(row).split(b"\0")[0].decode().strip() for row in rows]
-        return [
-            [name] * bool(name) + [str(number)] for name, number in zip(names, numbers, strict=True)
-        ]
-
-    def each(self, begin: str) -> list[np.ndarray]:
-        found: list[np.ndarray] = []
-        while (array := self.arrays.get(f"{begin}{len(found) + 1}")) is not None:
-            found.append(np.asarray(array, np.int64))
-        return found
+        with netcdf_file(path, mmap=False) as root:
+            items = [(name, of) for name, of in root.variables.items() if MESH.match(name)]
+            found = {name: (of.data.copy(), vars(of).get("elem_type", "")) for name, of in items}
+    return {
+        name: (array, word.decode() if isinstance(word, bytes) else str(word))
+        for name, (array, word) in found.items()
+    }
 
 
 def read_exodus(path: Path) -> Mesh:
     """Read blocks, side sets and node sets; KeyError or OSError for other files."""
-    file = _File(path)
-    axes = [file.arrays[f"coord{a}"] for a in "xyz" if f"coord{a}" in file.arrays]
-    coordinates = np.array(axes if axes else file.arrays["coord"], float)
+    variables = _variables(path)
+    arrays = {name: array for name, (array, _) in variables.items()}
+
+    def each(begin: str) -> list[np.ndarray]:
+        count = sum(re.fullmatch(rf"{begin}\d+", name) is not None for name in arrays)
+        return [np.asarray(arrays[f"{begin}{k + 1}"], np.int64) for k in range(count)]
+
+    def names(kind: str, count: int) -> list[list[str]]:
+        """Return names and numbers of blocks, side sets or node sets."""
+        rows: Any = arrays.get(f"{kind}_names", np.zeros((count, 0), "S1"))
+        words = [b"".join(row).split(b"\0")[0].decode().strip() for row in rows]
+        numbers = arrays.get(f"{kind}_prop1", np.arange(1, count + 1))
+        return [[w] * bool(w) + [str(n)] for w, n in zip(words, numbers, strict=True)]
+
+    axes = [arrays[f"coord{a}"] for a in "xyz" if f"coord{a}" in arrays]
+    coordinates = np.array(axes if axes else arrays["coord"], float)
     points = np.zeros((coordinates.shape[1], 3))
     points[:, : len(coordinates)] = coordinates.T
     cells: list[CellBlock] = []
-    of_set: list[list[str]] = []  # names, by block of `cells`
-    connected = file.each("connect")
+    connected = each("connect")
+    of_set = names("eb", len(connected))  # by block of `cells`
     firsts = np.cumsum([1, *map(len, connected)])
-    for k, (nodes, names) in enumerate(
-        zip(connected, file.names("eb", len(connected)), strict=True)
-    ):
-        kind = file.types[f"connect{k + 1}"]
-        word = (kind.decode() if isinstance(kind, bytes) else str(kind)).upper().rstrip("\0")
+    for k, nodes in enumerate(connected):
+        word = variables[f"connect{k + 1}"][1].upper().rstrip("\0")
         family, count = FAMILIES.get(word[:3], word.lower()), nodes.shape[1]
         count = {("hexahedron", 27): 20, ("wedge", 18): 15}.get((family, count), count)
         order = ORDER.get((family, count), range(count))
         cells.append(CellBlock(family, nodes[:, order] - 1, label=word))
-        of_set.append(names)
-    elements, sides = file.each("elem_ss"), file.each("side_ss")
-    sets = zip(elements, sides, file.names("ss", len(sides)), strict=True)
-    for element, side, names in list(sets):
+    sides = each("side_ss")
+    for element, side, called in zip(each("elem_ss"), sides, names("ss", len(sides)), strict=True):
         block = np.searchsorted(firsts, element, side="right") - 1
-        for k in np.unique(block):
-            for number in np.unique(side[block == k]):
-                here = (block == k) & (side == number)
-                corners = list(SIDES[cells[k].family][number - 1])
-                faces = cells[k].nodes[element[here] - firsts[k]][:, corners]
-                cells.append(CellBlock(FACE_TYPES[len(corners)], faces))
-                of_set.append(names)
-    named = dict.fromkeys(name for names in of_set for name in names)
+        for k, number in np.unique(np.column_stack([block, side]), axis=0):
+            here = (block == k) & (side == number)
+            corners = list(SIDES[cells[k].family][number - 1])
+            faces = cells[k].nodes[element[here] - firsts[k]][:, corners]
+            cells.append(CellBlock(FACE_TYPES[len(corners)], faces))
+            of_set.append(called)
     masks = {
-        name: [
-            np.full(len(of.nodes), name in names) for of, names in zip(cells, of_set, strict=True)
-        ]
-        for name in named
+        name: [np.full(len(of.nodes), name in own) for of, own in zip(cells, of_set, strict=True)]
+        for name in dict.fromkeys(name for own in of_set for name in own)
     }
-    nodes_of, points_of = file.each("node_ns"), {}
-    for nodes, names in zip(nodes_of, file.names("ns", len(nodes_of)), strict=True):
+    nodes_of, points_of = each("node_ns"), {}
+    for nodes, called in zip(nodes_of, names("ns", len(nodes_of)), strict=True):
         mask = np.isin(np.arange(1, len(points) + 1), nodes)
-        points_of.update(dict.fromkeys(names, mask))
+        points_of.update(dict.fromkeys(called, mask))
     return Mesh(points, cells, masks, points_of, {})
