@@ -84,7 +84,10 @@ def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None
     for function in functions:
         register(function, function in (with_temperature, warmed))
     if shown_by in functions:
-        of_part.on(outer)(of_law_within)
+
+        @of_part.on(outer)
+        def _of_part_within(law, tag):
+            return Within(tag)
 
 
 _columns: dict[type, dict[str, NamedTuple]] = {}
@@ -126,10 +129,6 @@ class Within(NamedTuple):
 @shown.on(Within)
 def _shown_within(tag, law, kin, state):
     return shown_by(law, kin, state, tag.column)
-
-
-def of_law_within(law, tag):
-    return Within(tag)
 
 
 def number(function: Callable) -> Callable:

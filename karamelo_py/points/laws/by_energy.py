@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from hashlib import sha256
 from itertools import combinations
 from math import cos, cosh, isfinite, sin, sinh, sqrt, tan, tanh
-from operator import add, mul, neg, sub, truediv
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -76,11 +75,18 @@ class _ProgramWriter:
             made.append((operation, None))
 
 
-def operation_of(name):
+def applied(operation, a, b):
+    if operation in ("+", "-"):
+        return a + b if operation == "+" else a - b
+    if operation in ("*", "/"):
+        return a * b if operation == "*" else a / b
+    return power(a, b)
+
+
+def function_of(name):
     return {
-        "+": add, "-": sub, "*": mul, "/": truediv, "^": power, "neg": neg, "sqrt": sqrt,
-        "exp": exponential, "log": logarithm, "sin": sin, "cos": cos, "tan": tan, "tanh": tanh,
-        "sinh": sinh, "cosh": cosh,
+        "sqrt": sqrt, "exp": exponential, "log": logarithm, "sin": sin, "cos": cos, "tan": tan,
+        "tanh": tanh, "sinh": sinh, "cosh": cosh,
     }[name]  # fmt: skip
 
 
@@ -104,9 +110,11 @@ def evaluated(code, law, arguments):
         elif operation == "whole power":
             stack = (whole_power(stack[0], operand), *stack[1:])
         elif operation in ("+", "-", "*", "/", "^"):
-            stack = (operation_of(operation)(stack[1], stack[0]), *stack[2:])
+            stack = (applied(operation, stack[1], stack[0]), *stack[2:])
+        elif operation == "neg":
+            stack = (-stack[0], *stack[1:])
         else:
-            stack = (operation_of(operation)(stack[0]), *stack[1:])
+            stack = (function_of(operation)(stack[0]), *stack[1:])
     return stack[0]
 
 

@@ -27,7 +27,6 @@ from karamelo_py.points.laws import Absent, LawTraits, law_traits
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
-PROBE = 1e-6  # strain at which moduli are measured
 SMALL = 0.01  # step over relaxation time, below which series are exact
 
 
@@ -48,10 +47,10 @@ class ElasticMaterial:
 
 def strained(law: Any, component: int) -> Any:
     """Stress over strain after a small increment of one component of F from rest."""
-    space = Space()
-    dl = tensor(space, [PROBE * (component == k) for k in range(9)])
+    space, size = Space(), 1e-6
+    dl = tensor(space, [size * (component == k) for k in range(9)])
     state = laws.advance(law, space, laws.initial_state(law, space, 1.0), dl, 1.0)
-    return laws.cauchy_stress(law, space, state) / PROBE
+    return laws.cauchy_stress(law, space, state) / size
 
 
 def is_isotropic(law: Any) -> bool:
@@ -116,8 +115,7 @@ class Viscoelastic(NamedTuple):
             raise ScriptError("the terms are pairs of g and tau", expected=cls.syntax)
         if not sum(pairs[::2]) < 1:
             message = f"the fractions g sum to {sum(pairs[::2]):g}: no stiffness would remain"
-            hint = "g and tau alternate: " + cls.syntax
-            raise ScriptError(message, argument="pairs", expected="a sum below 1", hint=hint)
+            raise ScriptError(message, argument="pairs", expected="g and tau in turn")
         branches, G = Absent(), strained(elastic.whole, 1)[3]
         for g, tau in zip(pairs[::2], pairs[1::2], strict=True):
             branches = Branch(g, tau, 0.25 / (g * G), branches)
@@ -157,10 +155,6 @@ def internal_stress(memory, kin):
 def lost_stress(law, kin, s, branches):
     """Relaxed deviatoric Kirchhoff stress, from the elastic deviator s."""
     return relaxed_part(law.branches) * s - dev(internal_stress(branches, kin))
-
-
-def elastic_deviator(law, kin, elastic):
-    return dev(laws.kirchhoff_stress(law.elastic, kin, elastic))
 
 
 def mean_decay(x):
@@ -207,8 +201,8 @@ def _initial_state_viscoelastic(law, kin, like):
 def _advance_viscoelastic(law, kin, state, dl, dt):
     plain = dl.dl if isinstance(dl, LargeIncrement) else dl
     elastic = laws.advance(law.elastic, kin, state.elastic, dl, dt)
-    before = elastic_deviator(law, kin, state.elastic)
-    after = elastic_deviator(law, kin, elastic)
+    before = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
+    after = dev(laws.kirchhoff_stress(law.elastic, kin, elastic))
     branches, loss = decayed(law.branches, state.branches, plain, after - before.carried(plain), dt)
     # Work that the relaxed stress does not do.
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
@@ -246,7 +240,7 @@ def _with_lost_stress(function):
     @function.on(Viscoelastic)
     def _speed_viscoelastic(law, kin, state):
         # Elastic stiffness, and the stress that the elastic law has and the body has not.
-        s = elastic_deviator(law, kin, state.elastic)
+        s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
         lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
         return function(law.elastic, kin, state.elastic) + 2 * lost * laws.specific_volume(law)
 

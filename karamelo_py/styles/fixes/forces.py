@@ -334,8 +334,8 @@ class Detonation(Fix):
     def __init__(self, hub: Hub, group: ParticleGroup, t: Expression):
         super().__init__(hub, group)
         self.formulas = (t,)
-        touched = [solid for solid in hub.solids.values() if group.touches(solid)]
-        if not any(can(solid.material.whole, ignited) for solid in touched):
+        laws = [solid.material.whole for solid in hub.solids.values() if group.touches(solid)]
+        if not any(can(law, ignited) for law in laws):
             hub.warn("no point of the group is explosive", hint="a group with eos jwl")
 
     def initial_integrate(self, points: PointsView) -> None:

@@ -25,7 +25,6 @@ from karamelo_py.script.errors import ScriptError
 
 LONG = 6.0, 0.5  # times to fall, or rotate, by the liquid's size: dam breaks take 4
 FRONT = 1.5  # cells in which a point burns
-UNLIT = -1e30  # time since lighting
 STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock, and of a strong one
 
 
@@ -387,7 +386,7 @@ def cold(eos, j):
 
 @initial_energy.on(Jwl)
 def _initial_energy_jwl(eos, like):
-    return Burning(eos.energy, UNLIT)
+    return Burning(eos.energy, -1e30)
 
 
 @ignited.on(Jwl)
