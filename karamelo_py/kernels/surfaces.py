@@ -227,7 +227,7 @@ def _crossed(a, b, point):
     (ax, ay), (bx, by), (x, y) = a, b, point
     if (ay > y) == (by > y):
         return 0
-    if ay < by:  # same operations for both faces of an edge
+    if ay < by:  # the same operations for both faces of an edge
         return 1 if x < ax + (y - ay) / (by - ay) * (bx - ax) else 0
     return -1 if x < bx + (y - by) / (ay - by) * (ax - bx) else 0
 
