@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.language import registry
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import places_before
+from karamelo_py.points.transfers import stores_moment
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, point_hook
@@ -57,8 +59,10 @@ class VelocityParticles(VelocityOfPoints):
     in one direction, the last decides. It also overrides initial velocities and held nodes; a run
     warns of this before its first step.
 
-    Use two cells of points or more: the rest of a solid can slip past a grip of one cell. This
-    happened in ulmpm when a slab was squeezed by 20 % (linear, quadratic-spline, cubic-spline).
+    Use two cells of points or more, FLIP, and a scheme that maps velocities again (musl). The rest
+    of a solid slips past a grip of one cell when squeezed by 20 % in ulmpm (linear,
+    quadratic-spline, cubic-spline); a bar in tlmpm is pulled with 94 % of the force. With APIC and
+    its kin, or usl, it slips past any grip.
 
     See Also
     --------
@@ -160,6 +164,22 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
             yield _said(other, axes, caught)
 
 
+def _slips(fix: Any, scene: Any) -> dict[str, Any] | None:
+    """Check whether the grid sees the velocities of led points too late.
+
+    Strains follow from nodal velocities: those before the points are led (usl), or with an affine
+    part that the points keep from the grid.
+    """
+    again, affine = scene.scheme.traits.maps_velocity_again, stores_moment(scene.transfer)
+    if not fix.leads_points or scene.simulation.implicit or (again and not affine):
+        return None
+    solids = [solid for solid in scene.hub.solids.values() if fix.group.touches(solid)]
+    if len(fix.group) >= sum(len(solid.volume0) for solid in solids):  # nothing is left to pull
+        return None
+    scheme = registry.name_of("scheme", type(scene.scheme))
+    return {"what": scene.transfer_name if again else f"scheme {scheme}"}
+
+
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
     by_nodes = other.prescribes_velocity
     return {
@@ -209,4 +229,13 @@ known_failure(
     reason="fix '{other.id}' (line {other.place.line}) gives {points} of this group another "
     "{axes}: this fix decides{more}",
     cure="{apart}, or NULL for one of the components",
+)
+known_failure(
+    VelocityOfPoints,
+    "grip '{part.id}'",
+    when=_slips,
+    reason="with {what} the grid does not follow points that are led: the rest of the body slips "
+    "past them, and the force is far too small (in a pulled bar 19 times with a grip of one cell, "
+    "4 times with two)",
+    cure="tlmpm with velocity_nodes at the grip; or FLIP with scheme musl",
 )
