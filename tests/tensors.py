@@ -4,12 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
+from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, Spherical
 
 KINEMATICS = [Line(), PlaneStrain(), Space()]  # those of a dimension
 ALL_KINEMATICS = [*KINEMATICS, Axisymmetric()]
 every_kinematics = pytest.mark.parametrize(
     "kin", ALL_KINEMATICS, ids=lambda kin: type(kin).__name__
+)
+with_spheres = pytest.mark.parametrize(
+    "kin", [*ALL_KINEMATICS, Spherical()], ids=lambda kin: type(kin).__name__
 )
 # Places of the symmetric components xx yy zz xy xz yz in a matrix.
 SYMMETRIC = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
@@ -20,8 +23,8 @@ def matrix(kin, flat, rest=0.0):
     d = kin.dimension
     out = np.eye(3) * rest
     out[:d, :d] = np.reshape(flat[: d * d], (d, d))
-    if isinstance(kin, Axisymmetric):
-        out[2, 2] = flat[4]
+    for place, value in zip(kin.Tensor.places[d * d :], flat[d * d :], strict=True):
+        out[place] = value
     return out
 
 

@@ -15,7 +15,6 @@ from numba import typeof
 from tensors import (
     ALL_KINEMATICS,
     deformations,
-    every_kinematics,
     flat,
     gradients,
     matrix,
@@ -26,16 +25,19 @@ from tensors import (
     symmetric_tensors,
     tensors,
     vectors,
+    with_spheres,
 )
 
 from karamelo_py.compiler import kernel, shared
 from karamelo_py.points.frames import Total, Updated, of_places_before
 from karamelo_py.points.kinematics import (
     Axisymmetric,
+    Cylindrical,
     I,
     Line,
     PlaneStrain,
     Space,
+    Spherical,
     det,
     dev,
     from_columns,
@@ -65,7 +67,7 @@ def test_terms_are_added_one_after_another(monkeypatch):
     assert total([1.0, 1e-16, 1e-16, 0.1]) == 1.0 + 1e-16 + 1e-16 + 0.1 != 1.1 + 2e-16
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_products_are_those_of_matrices(kin, data):
     d = kin.dimension
@@ -95,20 +97,22 @@ def test_gradients_meet_tensors_as_in_space(kin, data):
     assert close(v + t.dot(g), np.array(v) + matrix(kin, t)[:d, :d] @ np.array(g))
 
 
+@pytest.mark.parametrize("kin", [Axisymmetric(), Cylindrical(), Spherical()])
 @given(data=st.data())
-def test_gradients_at_an_axisymmetric_point(data):
-    """grad v has v_r/r around the axis, and so power balances: f . v = s : grad v for any node.
+def test_gradients_around_an_axis_or_a_centre(kin, data):
+    """grad v has v_r/r around the axis or centre, and so power balances: f . v = s : grad v.
 
     The strain around the axis is u_r/r (Timoshenko & Goodier, Theory of Elasticity); the force of
     a node is what does the same power.
     """
-    kin = Axisymmetric()
+    d = kin.dimension
     v, g = data.draw(vectors(kin)), data.draw(gradients(kin))
     t, s = data.draw(tensors(kin)), data.draw(symmetric_tensors(kin))
     grad = outer(v, g)
     expected = np.zeros((3, 3))
-    expected[:2, :2] = np.outer(v, g[:2])
-    expected[2, 2] = v[0] * g[2]
+    expected[:d, :d] = np.outer(v, g[:d])
+    for k in range(d, len(g)):
+        expected[k, k] = v[0] * g[k]
     assert close(matrix(kin, grad), expected)
     power = np.dot(v, s.dot(g))
     assert close(power, np.sum(symmetric_matrix(kin, s) * expected))
@@ -116,7 +120,7 @@ def test_gradients_at_an_axisymmetric_point(data):
     assert close(power, np.sum(matrix(kin, t) * expected))
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_strains_are_those_of_matrices(kin, data):
     f, dl = data.draw(tensors(kin)), data.draw(tensors(kin))
@@ -131,7 +135,7 @@ def test_strains_are_those_of_matrices(kin, data):
     assert close(symmetric_matrix(kin, sym(dl)), (gradient + gradient.T) / 2)
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_increments_multiply_the_volume(kin, data):
     """det((I + dl) F) = det(I + dl) det F."""
@@ -139,7 +143,7 @@ def test_increments_multiply_the_volume(kin, data):
     assert close(det(f.after(dl)), det(I + dl) * det(f))
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_total_lagrangian_algebra_is_that_of_matrices(kin, data):
     """F^-1, P = tau F^-T; and an increment (dt Fdot) F^-1 takes F to F + dt Fdot."""
@@ -155,7 +159,7 @@ def test_total_lagrangian_algebra_is_that_of_matrices(kin, data):
     assert close(f.after(dl), f + b)
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_an_increment_of_the_places_after_a_motion(kin, data):
     """dl = I - F^-1 at the places that a motion F has led to makes I + dl' = F.
@@ -174,7 +178,7 @@ def test_an_increment_of_the_places_after_a_motion(kin, data):
     assert of_places_before(Total(), kin, before) == before
 
 
-@every_kinematics
+@with_spheres
 def test_small_increments_keep_their_digits(kin):
     """dl (I + dl + ...), in single precision too: I added and taken away leaves none of 1e-9."""
     dl = kin.Tensor._make([np.float32(1e-9 * (k + 1)) for k in range(kin.tensor_size)])
@@ -190,7 +194,7 @@ def exact_stretch(kin, f):
     return vt.T @ np.diag(values) @ vt
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_stretch_is_the_root_of_cauchy_green(kin, data):
     f = data.draw(deformations(kin))
@@ -221,7 +225,7 @@ def special(kin):
         yield "flat", about @ np.diag([10.0, 1.0, 1e-3])
 
 
-@every_kinematics
+@with_spheres
 @pytest.mark.parametrize("number, tolerance", [(np.float64, 1e-13), (np.float32, 1e-6)])
 def test_stretch_of_special_deformations(kin, number, tolerance):
     """In either precision; errors are relative to the largest stretch. Single stays single."""
@@ -244,7 +248,7 @@ def test_stretch_of_any_rotation_and_stretch(angles, logs):
     assert close(found, u, 1e-12 * np.exp(max(logs)) + 1e-12)
 
 
-@every_kinematics
+@with_spheres
 def test_units_and_zeros(kin):
     assert close(matrix(kin, unit(kin), 1.0), np.eye(3))
     assert zero(kin, 1.0) == (0.0,) * kin.tensor_size
@@ -254,7 +258,7 @@ def test_units_and_zeros(kin):
     assert zero_vector(kin, 1.0) == (0.0,) * kin.dimension
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_row_sums_bound_the_eigenvalues(kin, data):
     """Gershgorin 1931; the wave speed of hyperelastic laws relies on it."""
@@ -270,7 +274,7 @@ def invariants(full):
     return np.array([np.trace(full), np.sum(full * full), np.linalg.det(full)])
 
 
-@every_kinematics
+@with_spheres
 @given(data=st.data())
 def test_spin_keeps_the_invariants(kin, data):
     """Whatever the increment, the turn is a rotation to round-off, however large."""
@@ -362,7 +366,7 @@ def everything(kin, f, dl, s, a, g):
     return of_all(kin, f, dl, s, a, g)
 
 
-@every_kinematics
+@with_spheres
 @settings(max_examples=20)
 @given(data=st.data())
 def test_compiled_is_the_same(kin, data):
@@ -395,7 +399,7 @@ def all_tensors(kin, f, dl, s, a, g):
     return made(kin, f, dl, s, a, g)
 
 
-@every_kinematics
+@with_spheres
 def test_single_precision_stays_single(kin):
     """One double literal would make every number of a kernel double."""
 
