@@ -274,6 +274,8 @@ def _kinetic(s: Setup, block: Block) -> np.ndarray:
 
 
 def _of_law(density: Callable) -> Callable:
+    """Energy of each point from a density per volume."""
+
     def energies(s: Setup, block: Block) -> np.ndarray | None:
         if not can(block.laws, density):
             return None

@@ -82,6 +82,7 @@ def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _largest(values: np.ndarray, reach: int) -> np.ndarray:
+    """Maximum over neighbours up to `reach` along each axis."""
     for axis in [*range(values.ndim)] * reach:
         neighbours = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
         values = np.maximum(values, neighbours)

@@ -45,6 +45,7 @@ class Part(NamedTuple):
     places: np.ndarray | slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
+        """Select these points from an array (..., k) over the block."""
         whole = self.rows is None or len(self.rows) == array.shape[-1]
         return array if whole else fields.some_points(array, self.rows)
 

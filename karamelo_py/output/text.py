@@ -32,6 +32,7 @@ FIRST = -280  # of the powers in POWERS
 
 
 def _power(k: int) -> tuple[float, float]:
+    """Return 10^k as a sum of two doubles."""
     exact = Fraction(10) ** k
     high = float(exact)
     return high, float(exact - Fraction(high))

@@ -34,7 +34,7 @@ class Quit(Exception):
     """The statement quit: the script ends normally."""
 
 
-# Exceptions of foreign code, including its exit().
+# Exceptions of foreign code, including exit(), which would end the program silently.
 FAILURES = (Exception, SystemExit)
 
 
@@ -81,7 +81,7 @@ class ScriptError(Exception):
     # Of failed runs: likely cause, and the command that resumes.
     cause: str = ""
     resume: str = ""
-    # True once the statement is known.
+    # True once the statement is known: callers further out add nothing.
     complete: bool = False
 
     def __str__(self) -> str:

@@ -262,6 +262,7 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
+    """Integers in the order of the floating-point numbers."""
     bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 

@@ -161,6 +161,7 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
+    """Find the surface of a region at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     none = np.zeros(len(pieces.point), np.int64)
     area = pieces.length * solid.domain.depth(pieces.middle)

@@ -147,6 +147,7 @@ class ContactSurface(StiffTool):
         )
 
     def forces(self, points: PointsView) -> np.ndarray:
+        """Forces (n, d) of a region without a kernel."""
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
         within, aside = self.depth(x), ASIDE * self.hub.domain.h
