@@ -87,8 +87,6 @@ def open_parenthesis(text: str, start: int) -> Mistake:
     return Mistake(message, begin, start + 1, "as many ) as (", "add the missing )")
 
 
-# ---- expressions ---------------------------------------------------------------------------------
-
 _VALUE = "a number, a name or a parenthesis"
 _OPERATORS = ("OR", "AND", "NOT", "COMPARISON", "SIGN", "TIMES", "POWER")
 _STARTS = ("NUMBER", "NAME", "STRING", "LPAR")

@@ -58,9 +58,6 @@ class Mistake(Exception):
         return ScriptError(self.message, place=place, expected=expected, hint=hint, code="syntax")
 
 
-# ---- expressions; start and end are offsets into the text of the expression ---------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Node:
     """One node of an expression tree."""
@@ -112,9 +109,6 @@ class FunctionCall(Node):
 
     name: str
     operands: tuple[Node, ...]
-
-
-# ---- statements ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)

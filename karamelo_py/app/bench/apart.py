@@ -48,9 +48,6 @@ class Measurement(NamedTuple):
     file: str = ""  # of results
 
 
-# ---- one process --------------------------------------------------------------------------------
-
-
 def measured(job: Measurement) -> Measured | Solved:
     workload = WORKLOADS[job.workload]
     simulation = measure.build(workload, job.threads, job.presets)
@@ -81,9 +78,6 @@ def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
             ) as process:
                 status = process.wait()
         return status, read_json(file)
-
-
-# ---- several processes --------------------------------------------------------------------------
 
 
 class Scaled(NamedTuple):
@@ -153,9 +147,6 @@ def line(row: Scaled, one: Scaled) -> str:
         shares = f"{100 * row.exchange:>7.1f} % {100 * row.imbalance:>8.1f} %"
     speed = f"{row.best / 1e6:>10.2f} {row.best / one.best:>10.2f}"
     return f"  {who:<22}{row.points:>9} {speed} {shares}"
-
-
-# ---- the program of these processes -------------------------------------------------------------
 
 
 def main() -> int:

@@ -188,9 +188,6 @@ def _print_solved(one: measure.Solved) -> None:
         print(f"    {stage:<38} {100 * share:6.1f} %")
 
 
-# ---- files --------------------------------------------------------------------------------------
-
-
 def commit() -> str | None:
     """Return the commit if the program runs from its repository."""
     folder = Path(karamelo_py.__file__).parent
