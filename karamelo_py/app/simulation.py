@@ -114,8 +114,10 @@ class Columns(Mapping, dict):  # type: ignore[metaclass]
 
     def to_pandas(self) -> Any:
         """Return the columns as a DataFrame."""
-        import pandas
-
+        try:
+            import pandas
+        except ModuleNotFoundError as error:
+            raise SimulationError("DataFrames need pandas: pip install pandas") from error
         return pandas.DataFrame(self)
 
 

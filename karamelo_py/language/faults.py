@@ -37,8 +37,11 @@ def fault(name: str, message: str, place: Place | None, more: str = "") -> Scrip
     """Make the error for a faulty style (``fix drag``), naming its package."""
     family, _, style = name.rpartition(" ")
     family = family or "command"
-    package = f" (of {registry.origin(family, style)})" if registry.knows(family, style) else ""
+    origin = registry.origin(family, style) if registry.knows(family, style) else ""
+    package = f" (of {origin})" if origin else ""
     hint = f"tell the author of {style}{more}"
+    if origin.startswith("the module "):  # it is the user's
+        hint = f"mend it in {origin.removeprefix('the ')}{more}"
     error = ScriptError(f"{name}{package}: {message}", place=place, hint=hint, code="plug-in")
     error.complete = True
     return error

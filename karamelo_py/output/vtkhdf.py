@@ -24,42 +24,27 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
     with reading(path) as dump:
         times, count = dump["time"][:], len(dump["id"])
     steps = len(times)
-    with h5py.File("new", "w", driver="core", backing_store=False) as root:
+    with h5py.File("new", "w", driver="core", backing_store=False, libver=VERSION) as root:
         top = root.create_group("VTKHDF")
         top.attrs["Version"] = 2, 0
         top.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", 8))
 
-        def add(group: h5py.Group, name: str, shape: tuple, *parts: tuple) -> None:
-            """Add an array of columns (name, shape, start, count), 0 elsewhere, with no date."""
-            kind = h5py.h5t.py_create(np.dtype(np.int64 if len(parts[0][1]) == 1 else float))
-            made = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
-            made.set_layout(h5py.h5d.VIRTUAL)
-            made.set_obj_track_times(False)
-            made.set_fill_value(np.zeros(1, kind.dtype))
-            for of, whole_shape, start, size in parts:
-                space = h5py.h5s.create_simple(shape)
-                space.select_hyperslab(start, size)
-                source = h5py.h5s.create_simple(whole_shape)
-                made.set_virtual(space, path.name.encode(), of.encode(), source)
-            h5py.h5d.create(group.id, name.encode(), kind, h5py.h5s.create_simple(shape), made)
-
         def virtual(group: h5py.Group, name: str, parts: Sequence[str]) -> None:
-            """Add the columns `parts`, step after step."""
-            rows, width = steps * count, len(parts)
-            add(
-                group,
-                name,
-                (rows, width) if width > 1 else (rows,),
-                *(
-                    (part, (steps, count), (0, k)[: min(width, 2)], (rows, 1)[: min(width, 2)])
-                    for k, part in enumerate(parts)
-                    if part in columns
-                ),
-            )
+            """Add the columns `parts`, step after step; 0 for missing ones."""
+            layout = h5py.VirtualLayout((steps * count, *[len(parts)] * (len(parts) > 1)), float)
+            layout.dcpl.set_obj_track_times(False)  # equal runs write equal files
+            for k, part in enumerate(parts):
+                if part in columns:
+                    source = h5py.VirtualSource(path.name, part, (steps, count), float)
+                    layout[(slice(None), k) if len(parts) > 1 else slice(None)] = source
+            group.create_virtual_dataset(name, layout, fillvalue=0)
 
         def numbers(group: h5py.Group, name: str, of: str, shift: int = 0) -> None:
             """Add integers of the points, after `shift` zeros."""
-            add(group, name, (shift + count,), (of, (count,), (shift,), (count,)))
+            layout = h5py.VirtualLayout((shift + count,), np.int64)
+            layout.dcpl.set_obj_track_times(False)
+            layout[shift:] = h5py.VirtualSource(path.name, of, (count,), np.int64)
+            group.create_virtual_dataset(name, layout, fillvalue=0)
 
         top["NumberOfPoints"] = [count]
         virtual(top, "Points", POSITIONS)
