@@ -281,3 +281,28 @@ def test_an_element_in_plane_stress(run_interpreted):
         table = np.genfromtxt(folder / f"element_{name}.txt", names=True)
         assert table["sxx"][-1] == pytest.approx(1000.0, rel=1e-9)
         assert table["szz"][-1] == pytest.approx(0, abs=1e-7)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("law", ["neo-hookean, 1, 100, 0.3", "linear, 1, 100, 0.3"])
+def test_load_steps_in_plane_stress_compile(run_script, law):
+    """A pulled plate, compiled: its trials of the strain across are code, or a loop."""
+    done = run_script(f"""
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, 0, 1.2, 0, 1, 0.25)
+    plane_stress(true)
+    scheme(quasi-static)
+    region(plate, block, 0, 1, 0, 0.5)
+    material(m, {law})
+    solid(plate, region, plate, 2, m, 0.25)
+    region(left, block, -INF, 0, -INF, INF)
+    region(right, block, 1, 1, -INF, INF)
+    group(left, nodes, region, left, all)
+    group(right, nodes, region, right, all)
+    fix(left, velocity_nodes, left, 0, NULL)
+    fix(right, velocity_nodes, right, 0.01, NULL)
+    set_dt(1)
+    log_modify(custom, step, right_x)
+    run(1)
+    """)
+    assert done.log.right_x[-1] == pytest.approx(0.5, rel=0.02)  # E, strain 0.01, height 0.5

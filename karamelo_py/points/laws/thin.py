@@ -14,6 +14,7 @@ from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, n
 
 WHOLE = Axisymmetric()  # kinematics of the wrapped law
 ENOUGH = 10  # trials of q for increments of any size
+UNROLLED = 9  # the same for laws of F, whose trials are short enough to be code without a loop
 FURTHEST = 0.3  # change of the stretch across in a trial
 FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over rho c^2
 
@@ -67,9 +68,10 @@ def _advance_thin(law, kin, state, dl, dt):
         new = laws.advance(inner, WHOLE, old, with_strain_across(inner, kin, dl, q), dt)
         return new, laws.cauchy_stress(inner, WHOLE, new)[2]
 
+    large_trials = ENOUGH if laws.by_rates(inner) else UNROLLED
     q, slope = modulus - modulus, first
     new, stress = tried(q)
-    for _ in range((ENOUGH if isinstance(dl, LargeIncrement) else law.trials) - 1):
+    for _ in range((large_trials if isinstance(dl, LargeIncrement) else law.trials) - 1):
         furthest, left = FURTHEST * (1 + q), stress
         step = max(min(-stress / slope, furthest), -furthest)
         q = q + step
