@@ -110,7 +110,7 @@ def test_where_there_are_no_locks_nobody_waits(tmp_path, monkeypatch, call, why)
         with lock(tmp_path / "another" / "loop.lock"):
             """Without it."""
     if opened:
-        assert len(os.listdir("/proc/self/fd")) == opened
+        assert len(os.listdir("/proc/self/fd")) <= opened  # older ones may be collected
 
 
 def test_what_cannot_be_compiled_is_no_lock_for_others(tmp_path, monkeypatch):

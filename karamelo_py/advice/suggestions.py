@@ -130,7 +130,8 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else 0
-        if layers and _acts_alike(hub, rest):
+        # A radial scene costs as much per point: two layers are no waste.
+        if layers > (2 if round_ else 0) and _acts_alike(hub, rest):
             ends = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             axes = " and ".join(AXES[axis] for axis in rest)
             renamed = "" if k == d - 1 else f", with {axes} called {' and '.join(AXES[: d - 1])}"
