@@ -8,6 +8,7 @@ from karamelo_py.advice.energy import not_watched
 from karamelo_py.advice.step_size import (
     own_step_instead_of,
     stable_step,
+    step_after_motion,
     words_of_own_step,
     words_of_share,
 )
@@ -69,10 +70,12 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"limited by     {simulation.steps.ruling_limit}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
             one = seconds_of_step(hub, simulation.count)
-            say(f"steps          about {n:.0f}, {n * one:.1g} s or more")
-            most = max(hub.fixes.values(), key=lambda fix: fix.seconds(), default=None)
-            if most is not None and 2 * most.seconds() > one:
-                say(f"               most of it for fix {most.style} '{most.id}'")
+            after = step_after_motion(simulation)
+            most = f" ({n / after:.0f} if points move from the start)" if after < 1 else ""
+            say(f"steps          about {n:.0f}{most}, {n * one:.1g} s or more")
+            slowest = max(hub.fixes.values(), key=lambda fix: fix.seconds(), default=None)
+            if slowest is not None and 2 * slowest.seconds() > one:
+                say(f"               most of it for fix {slowest.style} '{slowest.id}'")
     if simulation.moves:
         why = unknown_work(hub)
         say(f"energy         is {not_watched(why) if why else 'monitored'}")

@@ -63,6 +63,14 @@ def words_of_own_step(simulation: Simulation, step: float) -> str:
     return f"{step:.6g}" + (far if after < step else "")
 
 
+def step_after_motion(simulation: Simulation) -> float:
+    """Return the fraction of the first step that is left after a quarter of a cell of motion."""
+    update, clock = simulation.hub.update, simulation.control.clock[0]
+    if update.fixed_dt is not None or update.dt_factor is not None:
+        return 1.0
+    return clock.dt_factor_moving * clock.courant_moving / (clock.dt_factor * clock.courant)
+
+
 def stable_step(simulation: Simulation, limit: float) -> float:
     """Return the larger of `limit` and the default's stable step."""
     return max(limit, own_step(simulation) / USUAL)
@@ -94,7 +102,7 @@ def words_of_share(simulation: Simulation) -> str:
         of_heat = steps.ruling_limit == "conduction"
         words = f"{USUAL if of_heat else float(clock.dt_factor):g} of the stable step, "
         words += "the program's own"
-        after = clock.dt_factor_moving * clock.courant_moving / (clock.dt_factor * clock.courant)
+        after = step_after_motion(simulation)
         far = f"; {after:.2g} of that once points have gone a quarter of a cell"
         return words if after == 1 else words + far
     else:
