@@ -114,7 +114,7 @@ def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) ->
         raise ScriptError(message, argument="active", expected=expected)
     if hub.solids and active != same:
         message, expected = "the points of solids are made already", "before the first solid"
-        expected = f"{name}(true) {expected}"
+        expected = f"{name}({str(active).lower()}) {expected}"
         raise ScriptError(message, argument="active", expected=expected, code="too-late")
     if active != same:
         domain.kin = kin if active else KINEMATICS[d]()

@@ -97,7 +97,8 @@ def forget_other(module: str) -> bool:
     """
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
-        del sys.modules[module]
+        for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
+            del sys.modules[name]
     return spec is not None
 
 

@@ -148,9 +148,11 @@ class StepSize:
         before = {name: float(self.clock[name]) for name in fields}
         for name, value in fields.items():
             self.clock[name] = value
-        yield
-        for name, value in before.items():
-            self.clock[name] = value
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                self.clock[name] = value
 
     def _ask(self, halvings: int) -> bool:
         simulation, clock = self.simulation, self.clock

@@ -82,7 +82,7 @@ def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None
             return state._replace(**{kept: made}) if changes else made
 
     for function in functions:
-        register(function, function in (with_temperature, warmed))
+        register(function, function in (with_temperature, warmed, lit))
     if shown_by in functions:
 
         @of_part.on(outer)

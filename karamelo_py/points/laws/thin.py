@@ -87,7 +87,7 @@ laws.hand_on(
         laws.jacobian, laws.energy_density, laws.dissipated_energy, laws.damage,
         laws.damage_initiation, laws.temperature, laws.plastic_strain,
         laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.shown_by,
-        laws.with_temperature, laws.warmed,
+        laws.with_temperature, laws.warmed, laws.lit,
     ), WHOLE,
 )  # fmt: skip
 

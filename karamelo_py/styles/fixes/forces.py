@@ -330,6 +330,7 @@ class Detonation(Fix):
     published = ()
     first_step_only = True
     point_by_point = True
+    ignites = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, t: Expression):
         super().__init__(hub, group)

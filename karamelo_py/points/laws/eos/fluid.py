@@ -339,7 +339,7 @@ class Jwl(NamedTuple):
 known_failure(
     Jwl,
     "an explosive without a fuse",
-    when=lambda eos, scene: "detonation" not in scene.text,
+    when=lambda eos, scene: not any(fix.ignites for fix in scene.hub.fixes.values()),
     reason="nothing lights material '{owner.id}', which has no pressure until then",
     cure="fix(light, detonation, all, x0/D): the time at which each point is lit",
 )
