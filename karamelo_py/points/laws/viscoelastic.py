@@ -128,9 +128,7 @@ class Viscoelastic(NamedTuple):
 known_failure(
     Branch,
     "short relaxation times",
-    when=lambda branch, scene: (
-        branch.tau < scene.simulation.dt and not scene.simulation.implicit
-    ),
+    when=lambda branch, scene: branch.tau < scene.simulation.dt and not scene.simulation.implicit,
     reason="material '{owner.id}' has a relaxation time below the time step, in which that part "
     "of the stress never acts",
     cure="leave the term out, with a softer elastic law",
