@@ -179,11 +179,6 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     with the basis weights removes the excess constraints (Coombs et al. 2018). The mean stress is
     averaged likewise, so the forces do the work of the averaged strain.
 
-    Parameters
-    ----------
-    active
-        ``true`` or ``false`` (the default).
-
     Example
     -------
     anti_volumetric_locking(true)

@@ -10,11 +10,6 @@ from karamelo_py.script.errors import ScriptError
 def axisymmetric(hub: Hub, active: bool) -> None:
     """Make x the radius and y the axis of symmetry.
 
-    Parameters
-    ----------
-    active
-        ``true`` or ``false`` (the default).
-
     Example
     -------
     dimension(2, 0, 10, 0, 30, 0.5)
@@ -34,11 +29,6 @@ def axisymmetric(hub: Hub, active: bool) -> None:
 
 def cylindrical(hub: Hub, active: bool) -> None:
     """Make a 1D scene a cylinder or tube: x is the distance from its axis.
-
-    Parameters
-    ----------
-    active
-        ``true`` or ``false`` (the default).
 
     Example
     -------
@@ -61,11 +51,6 @@ def cylindrical(hub: Hub, active: bool) -> None:
 
 def spherical(hub: Hub, active: bool) -> None:
     """Make a 1D scene a sphere or spherical shell: x is the distance from its centre.
-
-    Parameters
-    ----------
-    active
-        ``true`` or ``false`` (the default).
 
     Example
     -------

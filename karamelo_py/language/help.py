@@ -29,7 +29,11 @@ def describe(target: Callable, name: str) -> Help:
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     noun = name.removeprefix("delete_").replace("_", " ")
-    descriptions = {"ID": f"Name of the {noun}.", "arguments": "See the page of the style."}
+    descriptions = {
+        "ID": f"Name of the {noun}.",
+        "arguments": "See the page of the style.",
+        "active": "``true`` or ``false`` (the default).",
+    }
     # Derived styles inherit descriptions.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
         init = owner.__init__.__doc__ if "__init__" in vars(owner) else None

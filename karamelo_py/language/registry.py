@@ -84,7 +84,7 @@ def modules_of(*folders: Path) -> Iterator[None]:
 
 def _of_module(family: str, name: str) -> EntryPoint | None:
     dotted = _CLASS.fullmatch(name)
-    if not dotted or not forget_other(dotted[1]):
+    if not dotted or not PathFinder.find_spec(dotted[1]):
         return None
     module, _, of_module = name.rpartition(".")
     return EntryPoint(name, f"{module}:{of_module}", PREFIX + family)
@@ -126,6 +126,8 @@ def find(family: str, name: str) -> Any:
     key = family, name
     of_module = _of_module(family, name)
     if of_module or key not in _loaded:
+        if of_module:
+            forget_other(name.partition(".")[0])
         entries = _entries(family, name)
         if len(entries) > 1:
             message = f"{family} '{name}' is offered by two packages: {origin(family, name)}"
