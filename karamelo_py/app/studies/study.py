@@ -377,7 +377,7 @@ def run(options: Namespace) -> int:
     write(out, rows)
     tell(rows, study)
     if not items and not options.time:
-        print("no result was recorded: the same command with -record NAME takes it from the logs")
+        print("no result is recorded: repeat the command with -record NAME, which reads the logs")
     if not any(row["status"] == "done" for row in rows):
         raise ScriptError(
             f"no run is done: {rows[0]['reason']}",

@@ -238,7 +238,7 @@ known_failure(
 # --- limit loads ----------------------------------------------------------------------------------
 
 
-FAST = 0.02  # of the wave speed: an impact at this speed makes metals flow
+FAST = 0.02  # of the wave speed: metals yield in impacts above it
 
 
 def _locks(law, scene):

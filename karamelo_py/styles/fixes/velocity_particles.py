@@ -165,10 +165,10 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
 
 
 def _slips(fix: Any, scene: Any) -> dict[str, Any] | None:
-    """Check whether the grid sees the velocities of led points too late.
+    """Check whether strains miss the prescribed velocities.
 
-    Strains follow from nodal velocities: those before the points are led (usl), or with an affine
-    part that the points keep from the grid.
+    Strains follow from nodal velocities. With usl these precede the prescribed ones; with affine
+    transfers they contain the affine part of the points, which nothing prescribes.
     """
     again, affine = scene.scheme.traits.maps_velocity_again, stores_moment(scene.transfer)
     if not fix.leads_points or scene.simulation.implicit or (again and not affine):
@@ -234,8 +234,8 @@ known_failure(
     VelocityOfPoints,
     "grip '{part.id}'",
     when=_slips,
-    reason="with {what} the grid does not follow points that are led: the rest of the body slips "
-    "past them, and the force is far too small (in a pulled bar 19 times with a grip of one cell, "
-    "4 times with two)",
+    reason="with {what} the grid does not follow points of prescribed velocity: the rest of the "
+    "body slips past them, and the force is far too small (in a pulled bar by a factor of 19 with "
+    "a grip of one cell, 4 with two)",
     cure="tlmpm with velocity_nodes at the grip; or FLIP with scheme musl",
 )
