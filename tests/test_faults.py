@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -44,7 +43,8 @@ NAMES = {"oneword": "OneWord", "forget": "forget"}
 def site(tmp_path_factory):
     """A folder with the package mpm-broken."""
     folder = tmp_path_factory.mktemp("faults")
-    shutil.copy(Path(__file__).with_name("mpm_broken.py"), folder)
+    # A link: a file newer than this process would leave later tests without keys of kernels.
+    (folder / "mpm_broken.py").symlink_to(Path(__file__).with_name("mpm_broken.py"))
     styles = {
         f"karamelo_py.{family}": {
             name: f"mpm_broken:{NAMES.get(name, name.title())}" for name in names.split()

@@ -153,11 +153,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     text = (INPUTS / "in.two_disks").read_text(encoding="utf-8")
     run_script(text.replace("run_time(3.5)", "run(2)"))
     steps = [kinds for kinds in advance.units if {*names_in(kinds)} >= STEPS]
-    keys = []
-    for kinds in steps:
-        with suppress(cache.Unknown):  # with a plug-in of another test, whose file is new
-            keys.append(advance.files._key(kinds, None))  # found by its sources
-    assert all(keys)
+    assert all(advance.files._key(kinds, None) for kinds in steps)  # found by its sources
     words, find = set(), PointFunction.find
 
     def noted(self, classes):
