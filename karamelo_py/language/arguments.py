@@ -117,6 +117,19 @@ class Argument:
         end = self._raw.end if end is None else end
         return Argument(Raw(self._raw.source, start, end), self._interpreter)
 
+    def listed(self) -> list[Argument]:
+        """The parts of ``(a, b, ...)``, or the argument itself."""
+        if not self.text.startswith("("):
+            return [self]
+        code, start, parts = self._raw.code, self._raw.start, []
+        begin, depth = 1, 0
+        for k, letter in enumerate(code):
+            depth += (letter == "(") - (letter == ")")
+            if depth == (letter != ")") and letter in ",)":
+                parts.append(self._from(start + begin, start + k))
+                begin = k + 1
+        return parts
+
     def numbers(self) -> list[str]:
         variables = self._interpreter.variables.items()
         return [name for name, value in variables if isinstance(value, float)]

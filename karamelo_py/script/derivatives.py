@@ -72,6 +72,10 @@ def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
         first = s if is_number(s, 0) else applied("/", s, b)
         second = ZERO if is_number(t, 0) else applied("neg", applied("/", times(term, t), b))
         return plus(first, second)
+    if operation in ("max", "min"):
+        above, below = (s, t) if operation == "max" else (t, s)
+        first = times(applied(">=", a, b), above)
+        return plus(first, times(applied("-", ONE, applied(">=", a, b)), below))
     if b.operation == "number":
         return times(times(b, to_power(a, b.value - 1)), s)
     of_base = times(applied("/", times(b, term), a), s)

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import importable, where
+from karamelo_py.compiler import importable, point_function, real, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, total, tr
@@ -34,11 +34,14 @@ from karamelo_py.script.derivatives import (
 )
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.script.terms import Term
+from karamelo_py.script.terms import Term, constant
 
 INVARIANTS = ("I1", "I2", "J")
+FIBRES = ("I4", "I6")  # squared stretches of two fibre families
 STRETCHES = ("l1", "l2", "l3")
 WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
+
+OF_TWO = ("+", "-", "*", "/", "^", "max", "min", ">=")
 
 Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
 
@@ -80,6 +83,10 @@ def applied(operation, a, b):
         return a + b if operation == "+" else a - b
     if operation in ("*", "/"):
         return a * b if operation == "*" else a / b
+    if operation in ("max", "min"):
+        return max(a, b) if operation == "max" else min(a, b)
+    if operation == ">=":
+        return where(a >= b, real(1, a), real(0, a))
     return power(a, b)
 
 
@@ -106,10 +113,10 @@ def evaluated(code, law, arguments):
         if operation == "name":
             stack = (arguments[operand], *stack)
         elif operation == "number":
-            stack = (law[FIRST + operand], *stack)
+            stack = (law[law.start + operand], *stack)
         elif operation == "whole power":
             stack = (whole_power(stack[0], operand), *stack[1:])
-        elif operation in ("+", "-", "*", "/", "^"):
+        elif operation in OF_TWO:
             stack = (applied(operation, stack[1], stack[0]), *stack[2:])
         elif operation == "neg":
             stack = (-stack[0], *stack[1:])
@@ -127,6 +134,8 @@ class ByEnergy(OfDeformation):
     __slots__ = ()
     traits = LawTraits(rebounds=True)
     in_lanes = True
+    directions: ClassVar[tuple[str, ...]] = ()  # fields with components of fibres at rest
+    start: ClassVar[int]  # index of the first number of the formula
     energy: ClassVar[Code]
     first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
     second: ClassVar[tuple[Code, ...]]  # by aa, ab, ac, bb, bc, cc
@@ -136,13 +145,22 @@ class OfInvariants(ByEnergy):
     __slots__ = ()
 
 
+class OfFibres(OfInvariants):
+    """Also of I4 = a0.C a0 and I6 = b0.C b0, for the unit vectors a0 and b0 of two families."""
+
+    __slots__ = ()
+    directions = ("a1", "a2", "a3", "b1", "b2", "b3")
+    along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
+    twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
+    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # of `along` by I1, I2, J
+
+
 class OfStretches(ByEnergy):
     __slots__ = ()
     scalarised = ("kirchhoff_stress", "wave_speed_squared", "shear_part", "energy_density")
 
 
 FIELDS = ("specific_volume", "lam", "G", "at_rest")
-FIRST = len(FIELDS)  # index of the first number of the formula
 
 _L = [Term("name", (), name) for name in STRETCHES]
 _A, _B, _C = [to_power(one, 2) for one in _L]
@@ -150,18 +168,20 @@ IN_STRETCHES = {
     "I1": plus(plus(_A, _B), _C),
     "I2": plus(plus(times(_A, _B), times(_B, _C)), times(_C, _A)),
     "J": times(times(_L[0], _L[1]), _L[2]),
+    **dict.fromkeys(FIBRES, constant(1.0)),  # the matrix alone
 }
 
 
-def law_of(rho: float, energy: Expression) -> NamedTuple:
+def law_of(rho: float, energy: Expression, directions: Sequence[float] = ()) -> NamedTuple:
     """Make the law of a stored energy per reference volume.
 
-    Raises ScriptError for operations without a derivative, stress or no stiffness at rest, and
-    formulas that distinguish directions.
+    `directions`: unit vectors a0 and b0, if the formula contains I4 or I6. Raises ScriptError for
+    operations without a derivative, stress or no stiffness at rest, and formulas that distinguish
+    principal directions.
     """
     term = energy._term
     for one in terms.in_order(term):
-        smooth = one.operation in OF_ONE or one.operation in ("number", "name", *"+-*/^")
+        smooth = one.operation in OF_ONE or one.operation in ("number", "name", *OF_TWO[:-1])
         if not smooth:
             raise ScriptError(
                 f"{one.operation} has no derivative that a stress could come from",
@@ -174,17 +194,40 @@ def law_of(rho: float, energy: Expression) -> NamedTuple:
     lam, G, at_rest = _judged(stretched, slopes, curves)
     names, kind = INVARIANTS, OfInvariants
     if energy.names.intersection(STRETCHES):
-        names, kind, term = STRETCHES, OfStretches, stretched
-    writer = _ProgramWriter(names)
+        names, kind, term = STRETCHES, OfStretches, replaced(term, IN_STRETCHES)
+    elif directions:
+        kind = OfFibres
+    writer = _ProgramWriter((*names, *FIBRES))
     first = [derivative(term, name) for name in names]
     second = [derivative(first[names.index(a)], b) for k, a in enumerate(names) for b in names[k:]]
-    codes = {
+    codes: dict[str, Any] = {
         "energy": writer.code(term),
         "first": tuple(map(writer.code, first)),
         "second": tuple(map(writer.code, second)),
     }
+    if directions:
+        codes |= _along_fibres(term, writer)
     made = _class_of(kind, codes, len(writer.numbers))
-    return made(1 / rho, lam, G, at_rest, *writer.numbers)
+    return made(1 / rho, lam, G, at_rest, *directions, *writer.numbers)
+
+
+def _along_fibres(term: Term, writer: _ProgramWriter) -> dict[str, Any]:
+    slopes = [derivative(term, name) for name in FIBRES]
+    for name, slope in zip(FIBRES, slopes, strict=True):
+        tension = terms.evaluated(slope, dict.fromkeys((*INVARIANTS, *FIBRES), 1.0).__getitem__)
+        if abs(tension) > 0:
+            raise ScriptError(
+                f"the energy changes by {tension:.4g} {name} at rest: the fibres have a stress",
+                argument="energy",
+                expected=f"an energy that is least for {name} = 1, such as ({name} - 1)^2",
+            )
+    curves = [derivative(slopes[i], FIBRES[j]) for i, j in ((0, 0), (1, 1), (0, 1))]
+    mixed = [[derivative(slope, name) for name in INVARIANTS] for slope in slopes]
+    return {
+        "along": tuple(map(writer.code, slopes)),
+        "twice_along": tuple(map(writer.code, curves)),
+        "mixed": tuple(tuple(map(writer.code, row)) for row in mixed),
+    }
 
 
 def _class_of(kind: type, codes: dict, count: int) -> type:
@@ -192,8 +235,10 @@ def _class_of(kind: type, codes: dict, count: int) -> type:
     name = f"{kind.__name__}_{sha256(repr((codes, count)).encode()).hexdigest()[:16]}"
 
     def made() -> type:
-        fields = namedtuple(name, (*FIELDS, *[f"number{k}" for k in range(count)]))
-        return type(name, (kind, fields), {**codes, "__slots__": (), "__module__": __name__})
+        known = (*FIELDS, *kind.directions)
+        fields = namedtuple(name, (*known, *[f"number{k}" for k in range(count)]))
+        traits = {**codes, "start": len(known), "__slots__": (), "__module__": __name__}
+        return type(name, (kind, fields), traits)
 
     return importable(__name__, name, made)
 
@@ -285,6 +330,16 @@ def squared(s):
     )
 
 
+@point_function()
+def variables(law, F, b):
+    """Variables of the formula: I1, I2, J, and those of fibres."""
+
+
+@variables.on(OfInvariants)
+def _variables_of_invariants(law, F, b):
+    return invariants(b, det(F))
+
+
 def invariants(b, J):
     first = tr(b)
     return first, 0.5 * (first * first - inner(b, b)), J
@@ -292,9 +347,12 @@ def invariants(b, J):
 
 @laws.kirchhoff_stress.on(OfInvariants)
 def _kirchhoff_stress_of_invariants(law, kin, state):
-    # tau = 2 (W_1 + I1 W_2) b - 2 W_2 b b + J W_J I (Holzapfel 2000, equation 6.30)
     b = state.F.left_cauchy_green()
-    at = invariants(b, det(state.F))
+    return stress_of_matrix(law, b, variables(law, state.F, b))
+
+
+def stress_of_matrix(law, b, at):
+    # tau = 2 (W_1 + I1 W_2) b - 2 W_2 b b + J W_J I (Holzapfel 2000, equation 6.30)
     W1, W2, WJ = [evaluated(code, law, at) for code in law.first]
     tau = 2 * (W1 + at[0] * W2) * b + at[2] * WJ * I
     return tau - 2 * W2 * squared(b) if len(law.first[1]) else tau
@@ -302,16 +360,21 @@ def _kirchhoff_stress_of_invariants(law, kin, state):
 
 @laws.energy_density.on(OfInvariants)
 def _energy_density_of_invariants(law, kin, state):
-    at = invariants(state.F.left_cauchy_green(), det(state.F))
+    at = variables(law, state.F, state.F.left_cauchy_green())
     return evaluated(law.energy, law, at) - law.at_rest
 
 
 @laws.wave_speed_squared.on(OfInvariants)
 def _wave_speed_squared_of_invariants(law, kin, state):
+    b = state.F.left_cauchy_green()
+    at = variables(law, state.F, b)
+    return max(stiffness_of_matrix(law, b, at), 0) * law.specific_volume
+
+
+def stiffness_of_matrix(law, b, at):
     # Bounds of l^2 d2W/dl^2 (`along_direction`) and of shear, 2 x_a (W_1 + x_c W_2), term by term:
     # the squares x of principal stretches lie between the bounds of Gershgorin, and above J^2/I2.
-    b = state.F.left_cauchy_green()
-    I1, I2, J = at = invariants(b, det(state.F))
+    I1, I2, J, *_ = at
     high = b.largest_row_sum()
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
@@ -328,12 +391,12 @@ def _wave_speed_squared_of_invariants(law, kin, state):
         along += 8 * high * most * max(W12, 0) + 4 * most * most * max(W22, 0)
         along += 4 * J * (most * max(W2J, 0) + least * min(W2J, 0))
         shear += 2 * high * high * max(W2, 0)
-    return max(along, shear, 0) * law.specific_volume
+    return max(along, shear)
 
 
 def along_direction(law, at, x, rest):
     """l^2 d2W/dl^2 of a stretch l = sqrt(x); the squares of the other two sum to `rest`."""
-    J = at[2]
+    J, at = at[2], (*at, 1, 1)
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
     along = 2 * x * (W1 + rest * W2) + 4 * x * x * (W11 + 2 * rest * W12 + rest * rest * W22)
@@ -343,13 +406,16 @@ def along_direction(law, at, x, rest):
 @laws.shear_part.on(OfInvariants)
 def _shear_part_of_invariants(law, kin, state):
     b = state.F.left_cauchy_green()
-    at = invariants(b, det(state.F))
+    return shear_of_matrix(law, b, variables(law, state.F, b)) * law.specific_volume
+
+
+def shear_of_matrix(law, b, at):
     x = b.largest_row_sum()
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, _, _, W22, _, _ = [evaluated(code, law, at) for code in law.second]
     y = max(at[0] - x, 0)
     stiffer = max(4 * x * x * (W11 + y * y * W22), 0)
-    return (2 * (1 + x) * (W1 + y * W2) + stiffer) * law.specific_volume
+    return 2 * (1 + x) * (W1 + y * W2) + stiffer
 
 
 # --- of principal stretches ---------------------------------------------------------------------

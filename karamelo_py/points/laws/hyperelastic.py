@@ -1,24 +1,48 @@
 """Materials by their stored energy: hyperelastic, and ready formulas for rubber and tissue."""
 
 from collections import namedtuple
+from collections.abc import Sequence
+from math import hypot
 from typing import Any, ClassVar
 
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws.by_energy import FIELDS, INVARIANTS, STRETCHES, OfInvariants, law_of
+from karamelo_py.points.laws.by_energy import (
+    FIBRES,
+    FIELDS,
+    INVARIANTS,
+    STRETCHES,
+    OfInvariants,
+    law_of,
+)
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.parser import parse_text
 
-SEEDS = (*INVARIANTS, *STRETCHES)
+SEEDS = (*INVARIANTS, *FIBRES, *STRETCHES)
+
+
+class Direction:
+    """For signatures: a unit vector from ``(x, y, z)``."""
+
+    script_kind: ClassVar[str] = "a direction (x, y, z)"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> tuple[float, ...]:
+        values = [one.value(hub) for one in argument.listed()]
+        components = [one for one in values if isinstance(one, float)]
+        if len(values) != 3 or len(components) != 3 or not any(components):
+            message = f"'{argument.text}' is no direction"
+            raise ScriptError(message, place=argument.place, expected="(x, y, z), not (0, 0, 0)")
+        return tuple(one / hypot(*components) for one in components)
 
 
 class EnergyFormula:
     """For signatures: a stored energy as a formula of invariants or principal stretches."""
 
-    script_kind: ClassVar[str] = "a formula of I1, I2 and J, or of l1, l2 and l3"
+    script_kind: ClassVar[str] = "a formula of I1, I2, J, I4 and I6, or of l1, l2, l3 and J"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Expression:
@@ -43,10 +67,10 @@ class EnergyFormula:
         return energy
 
 
-_Fields = namedtuple("_Fields", FIELDS)
+Fields = namedtuple("Fields", FIELDS)
 
 
-class HyperelasticFormula(OfInvariants, _Fields):
+class HyperelasticFormula(OfInvariants, Fields):
     """Elastic solid given by its stored energy, a formula.
 
     Parameters
@@ -55,12 +79,16 @@ class HyperelasticFormula(OfInvariants, _Fields):
         Density before deformation.
     energy
         Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, J = det
-        F, with C = F^T F, and/or of the principal stretches l1, l2, l3. Variables of the script are
-        numbers in it. At rest, I1 = I2 = 3 and J = l1 = l2 = l3 = 1.
+        F, with C = F^T F, and of I4 and I6, the squared stretches of two families of fibres; or of
+        the principal stretches l1, l2, l3 and J. Variables of the script are numbers in it. At
+        rest, I1 = I2 = 3 and all others are 1.
+    fibre, fibre2
+        Directions of the fibres at rest, for I4 and I6.
 
     Example
     -------
     material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
+    material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e7*log(J)^2 + 1e6*max(I4 - 1, 0)^2, fibre=(1, 1, 0))
     material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
 
     Notes
@@ -74,15 +102,30 @@ class HyperelasticFormula(OfInvariants, _Fields):
 
     See Also
     --------
-    neo-hookean, mooney-rivlin, ogden, yeoh, gent, saint-venant-kirchhoff
+    neo-hookean, mooney-rivlin, ogden, yeoh, gent, arruda-boyce, holzapfel, saint-venant-kirchhoff
     """
 
     __slots__ = ()
-    syntax = "rho, energy"
+    syntax = "rho, energy[, fibre=(x, y, z)][, fibre2=(x, y, z)]"
 
     @classmethod
-    def given(cls, rho: AboveZero, energy: EnergyFormula) -> Any:
-        return law_of(rho, energy)
+    def given(
+        cls,
+        rho: AboveZero,
+        energy: EnergyFormula,
+        *,
+        fibre: Direction | None = None,
+        fibre2: Direction | None = None,
+    ) -> Any:
+        directions = {"I4": fibre, "I6": fibre2}
+        for option, (name, direction) in zip(("fibre", "fibre2"), directions.items(), strict=True):
+            if name in energy.names and direction is None:
+                raise ScriptError(f"{name} needs a direction", expected=f"{option}=(x, y, z)")
+            if direction and name not in energy.names:
+                message = f"the energy does not contain {name}"
+                raise ScriptError(message, argument=option, expected=f"a formula with {name}")
+        one = fibre or fibre2
+        return law_of(rho, energy, (*(fibre or one), *(fibre2 or one)) if one else ())
 
 
 class _Numbers:
@@ -101,16 +144,17 @@ class _Numbers:
         return False
 
 
-def ready(rho: float, formula: str, **numbers: float) -> Any:
+def ready(rho: float, formula: str, directions: Sequence[float] = (), **numbers: float) -> Any:
     raw, node = parse_text(formula)
     value = evaluation.evaluate(node, raw, _Numbers(numbers))
-    return law_of(rho, Expression(value))
+    return law_of(rho, Expression(value), directions)
 
 
 VOLUME = "K/2*(J - 1)^2"
+LANGEVIN = "1/2", "1/20", "11/1050", "19/7000", "519/673750"
 
 
-class MooneyRivlin(OfInvariants, _Fields):
+class MooneyRivlin(OfInvariants, Fields):
     """Rubber of Mooney (1940) and Rivlin (1948), slightly compressible.
 
     Parameters
@@ -144,7 +188,7 @@ class MooneyRivlin(OfInvariants, _Fields):
         return ready(rho, formula, C10=C10, C01=C01, K=K)
 
 
-class Yeoh(OfInvariants, _Fields):
+class Yeoh(OfInvariants, Fields):
     """Rubber of Yeoh (1993), slightly compressible: filled rubber that stiffens.
 
     Parameters
@@ -183,7 +227,7 @@ class Yeoh(OfInvariants, _Fields):
         return ready(rho, " + ".join([*parts, VOLUME]), K=K, **numbers)
 
 
-class Gent(OfInvariants, _Fields):
+class Gent(OfInvariants, Fields):
     """Rubber of Gent (1996), whose chains have a limit of extension; slightly compressible.
 
     Parameters
@@ -207,7 +251,7 @@ class Gent(OfInvariants, _Fields):
 
     See Also
     --------
-    hyperelastic, yeoh
+    hyperelastic, yeoh, arruda-boyce
     """
 
     __slots__ = ()
@@ -219,7 +263,53 @@ class Gent(OfInvariants, _Fields):
         return ready(rho, formula, G=G, Jm=Jm, K=K)
 
 
-class SaintVenantKirchhoff(OfInvariants, _Fields):
+class ArrudaBoyce(OfInvariants, Fields):
+    """Rubber as a network of eight chains, which have a limit of extension; slightly compressible.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    mu
+        Stiffness of the network; the shear modulus is mu (1 + 3/(5 L^2) + 99/(175 L^4) + ...).
+    limit
+        Stretch L at which the chains are straight.
+    K
+        Bulk modulus.
+
+    Example
+    -------
+    material(rubber, arruda-boyce, 1000, 2.8e5, 5.4, 2e7)
+
+    Notes
+    -----
+    W = mu sum C_k/L^(2 k - 2) ((I1 J^(-2/3))^k - 3^k) + K/2 (J - 1)^2 with C = 1/2, 1/20, 11/1050,
+    19/7000, 519/673750: five terms of the inverse Langevin function (Arruda & Boyce 1993, J. Mech.
+    Phys. Solids 41, 389-412).
+
+    See Also
+    --------
+    hyperelastic, gent, ogden
+    """
+
+    __slots__ = ()
+    syntax = "rho, mu, limit, K"
+
+    @classmethod
+    def given(cls, rho: AboveZero, mu: AboveZero, limit: AboveZero, K: AboveZero) -> Any:
+        if not limit > 1:
+            raise ScriptError(
+                f"chains straight at a stretch of {limit:g} have no rest",
+                argument="limit",
+                expected="a stretch above 1",
+            )
+        terms = [
+            f"{C}/L^{2 * k - 2}*((I1*J^(-2/3))^{k} - 3^{k})" for k, C in enumerate(LANGEVIN, 1)
+        ]
+        return ready(rho, f"mu*({' + '.join(terms)}) + {VOLUME}", mu=mu, L=limit, K=K)
+
+
+class SaintVenantKirchhoff(OfInvariants, Fields):
     """Hooke's law between second Piola-Kirchhoff stress and Green-Lagrange strain.
 
     Parameters
@@ -252,7 +342,7 @@ class SaintVenantKirchhoff(OfInvariants, _Fields):
         return ready(rho, formula, lam=lam, G=G)
 
 
-class Ogden(OfInvariants, _Fields):
+class Ogden(OfInvariants, Fields):
     """Rubber of Ogden (1972) with up to four terms, slightly compressible.
 
     Parameters

@@ -1,0 +1,153 @@
+"""Fibres in hyperelastic laws: their stress and stiffness, and material holzapfel."""
+
+from typing import Any
+
+from karamelo_py.language.rules import known_failure
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import I, det, inner
+from karamelo_py.points.laws.by_energy import (
+    FIELDS,
+    OfFibres,
+    evaluated,
+    invariants,
+    shear_of_matrix,
+    stiffness_of_matrix,
+    stress_of_matrix,
+    variables,
+)
+from karamelo_py.points.laws.hyperelastic import VOLUME, Direction, Fields, ready
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
+
+LEANS = 1e-9
+FIRST = len(FIELDS)  # index of the first component of a direction
+
+
+class Holzapfel(OfFibres, Fields):
+    """Artery or other soft tissue with two families of fibres (Holzapfel, Gasser, Ogden).
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    G
+        Shear modulus of the matrix.
+    k1
+        Stiffness of the fibres, a stress.
+    k2
+        Exponent by which they stiffen.
+    K
+        Bulk modulus.
+    fibre, fibre2
+        Directions of the two families at rest; fibre2 is fibre by default. In axisymmetry
+        (radius, axis, hoop).
+
+    Example
+    -------
+    material(artery, holzapfel, 1100, 3e3, 2.36e3, 0.84, 1e6, fibre=(0, 1, 1.8), fibre2=(0, -1, 1.8))
+
+    Notes
+    -----
+    W = G/2 (I1 J^(-2/3) - 3) + K/2 (J - 1)^2 + k1/(2 k2) sum (exp(k2 <I - 1>^2) - 1), with the
+    squared stretches I = I4, I6 of the fibres, which are slack in compression: <x> = max(x, 0)
+    (Holzapfel, Gasser & Ogden 2000, J. Elasticity 61, 1-48; with whole stretches, Nolan et al.
+    2014).
+
+    See Also
+    --------
+    hyperelastic, transverse
+    """
+
+    __slots__ = ()
+    syntax = "rho, G, k1, k2, K, fibre=(x, y, z)[, fibre2=(x, y, z)]"
+
+    @classmethod
+    def given(
+        cls, rho: AboveZero, G: AboveZero, k1: FromZero, k2: AboveZero, K: AboveZero, *,
+        fibre: Direction, fibre2: Direction | None = None,
+    ) -> Any:  # fmt: skip
+        fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in ("I4", "I6")]
+        formula = f"G/2*(I1*J^(-2/3) - 3) + {VOLUME} + k1/(2*k2)*({' + '.join(fibres)})"
+        directions = (*fibre, *(fibre2 or fibre))
+        return ready(rho, formula, directions, G=G, k1=k1, k2=k2, K=K)
+
+
+def _leans(law: Any, scene: Any) -> bool:
+    """Check whether the fibres together would shear a body in 2D or 1D out of its plane."""
+    a, b = law[FIRST : FIRST + 3], law[FIRST + 3 : FIRST + 6]
+    pairs = {1: ((0, 1), (0, 2), (1, 2)), 2: ((0, 2), (1, 2)), 3: ()}[scene.d]
+    return any(abs(a[i] * a[j] + b[i] * b[j]) > LEANS for i, j in pairs)
+
+
+known_failure(
+    OfFibres,
+    "directions out of the plane",
+    when=_leans,
+    reason="the fibres of material '{owner.id}' lean: the body would shear out of its plane, which "
+    "{scene.d}D prevents",
+    cure="a 3D scene, fibres along x, y or z, or two families that mirror each other",
+)
+
+
+def fibre(law, F, family):
+    """a0 a0 of a family, with the components of C."""
+    a = law[FIRST + 3 * family : FIRST + 3 * family + 3]
+    made = F.symmetric
+    return made._make([a[i] * a[j] for i, j in made.places])
+
+
+@variables.on(OfFibres)
+def _variables_of_fibres(law, F, b):
+    C = F.right_cauchy_green()
+    return (*invariants(b, det(F)), inner(C, fibre(law, F, 0)), inner(C, fibre(law, F, 1)))
+
+
+@laws.kirchhoff_stress.on(OfFibres)
+def _kirchhoff_stress_of_fibres(law, kin, state):
+    # 2 W_4 a a + 2 W_6 b b with a = F a0 (Holzapfel 2000, equation 6.212)
+    F = state.F
+    b = F.left_cauchy_green()
+    at = variables(law, F, b)
+    tau = stress_of_matrix(law, b, at)
+    for family in (0, 1):
+        if len(law.along[family]):
+            pull = 2 * evaluated(law.along[family], law, at)
+            tau = tau + pull * fibre(law, F, family).carried(F - I)
+    return tau
+
+
+def stiffness_of_fibres(law, b, at):
+    """Bound of rho c^2 by the fibres: |a n|^2 is at most I4 for a unit vector n."""
+    # Slack fibres count with their stiffness at rest: the next step may stretch them.
+    at = (*at[:3], max(at[3], 1), max(at[4], 1))
+    _, _, J, *squares = at
+    high = b.largest_row_sum()
+    most = min(0.25 * at[0] * at[0], high * at[0])  # of x (I1 - x)
+    both = 8 * squares[0] * squares[1] * max(evaluated(law.twice_along[2], law, at), 0)
+    for family in (0, 1):
+        x = squares[family]
+        both += 2 * x * max(evaluated(law.along[family], law, at), 0)
+        both += 4 * x * x * max(evaluated(law.twice_along[family], law, at), 0)
+        W1, W2, WJ = [abs(evaluated(code, law, at)) for code in law.mixed[family]]
+        both += 4 * x * (2 * high * W1 + 2 * most * W2 + J * WJ)
+    return both
+
+
+@laws.wave_speed_squared.on(OfFibres)
+def _wave_speed_squared_of_fibres(law, kin, state):
+    b = state.F.left_cauchy_green()
+    at = variables(law, state.F, b)
+    both = max(stiffness_of_matrix(law, b, at), 0) + stiffness_of_fibres(law, b, at)
+    return both * law.specific_volume
+
+
+@laws.shear_part.on(OfFibres)
+def _shear_part_of_fibres(law, kin, state):
+    b = state.F.left_cauchy_green()
+    at = variables(law, state.F, b)
+    both = shear_of_matrix(law, b, at) + stiffness_of_fibres(law, b, at)
+    return both * law.specific_volume
+
+
+@laws.is_round.on(OfFibres)
+def _is_round_of_fibres(law):
+    return False
