@@ -43,7 +43,7 @@ class Holzapfel(OfFibres, Fields):
 
     Example
     -------
-    material(artery, holzapfel, 1100, 3e3, 2.36e3, 0.84, 1e6, fibre=(0, 1, 1.8), fibre2=(0, -1, 1.8))
+    material(artery, holzapfel, 1100, 3e3, 2.36e3, 0.84, 1e6, fibre=(0, 1, 2), fibre2=(0, -1, 2))
 
     Notes
     -----

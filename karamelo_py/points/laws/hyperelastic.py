@@ -88,7 +88,7 @@ class HyperelasticFormula(OfInvariants, Fields):
     Example
     -------
     material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
-    material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e7*log(J)^2 + 1e6*max(I4 - 1, 0)^2, fibre=(1, 1, 0))
+    material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e6*(I4 - 1)^2, fibre=(1, 1, 0))
     material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
 
     Notes
