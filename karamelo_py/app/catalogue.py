@@ -16,14 +16,10 @@ from karamelo_py.script.errors import ScriptError, codes, instead, meant, table
 COMMAND = "command"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
 HELP_USAGE = "karamelo-py help COMMAND, karamelo-py help STYLE, or karamelo-py help FAMILY STYLE"
-_WIDEST = 88  # characters of a line of text
-
-
-# ---- contents -----------------------------------------------------------------------------------
+_WIDEST = 88  # characters per line
 
 
 def families() -> list[str]:
-    """List families of styles, commands first."""
     return sorted(registry.families(), key=lambda family: (family != COMMAND, family))
 
 
@@ -56,9 +52,6 @@ def describe_parameter(parameter: Parameter) -> str:
             default = f"{default:g}"
         parts.append("may be left out" if default is None else f"{default} when left out")
     return ", ".join(parts)
-
-
-# ---- the two commands ---------------------------------------------------------------------------
 
 
 def print_styles(words: Sequence[str]) -> int:
@@ -137,7 +130,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """Return the family of a word: fixes, Fix and fix are the same."""
+    """The family of a word: fixes, Fix and fix are the same."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -216,7 +209,7 @@ def _about(word: str) -> list[tuple[str, str]]:
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
-    """Find arguments of this name, else with this value, by style."""
+    """Arguments of this name, else with this value, by style."""
     parameters = {}
     for family in families():
         for name in registry.names(family):
@@ -229,7 +222,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
 
 
 def _explain_argument(word: str, parameters: dict[str, Parameter]) -> None:
-    """Print the longest explanation of an argument, and where else it is used."""
+    """Print the longest explanation of an argument, and its other uses."""
     page = _Page()
     owner, parameter = max(parameters.items(), key=lambda item: len(item[1].description))
     page.say(word, "bold")
@@ -243,12 +236,7 @@ def _explain_argument(word: str, parameters: dict[str, Parameter]) -> None:
     page.say(f"karamelo-py help {owner} explains the rest.")
 
 
-# ---- layout -------------------------------------------------------------------------------------
-
-
 class _Page(Console):
-    """Standard output, bold and coloured on a terminal."""
-
     def _write(self, text: str) -> None:
         super()._write(text)
         if self._broken:

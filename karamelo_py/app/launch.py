@@ -1,7 +1,7 @@
 """karamelo-py --ranks N: mpiexec starts the processes; they report and end as one.
 
 Each reports over a socket to the `Launcher` in the user's process. Rank 0 gets the terminal and the
-signals; others report what rank 0 cannot know. Output of mpiexec is shown only if nothing started.
+signals. Output of mpiexec is shown only if nothing started.
 """
 
 import errno
@@ -74,7 +74,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
         return INTERRUPTED, render_message("error", "interrupted")
     # Rich makes it a SystemExit.
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-        # Our output's reader is gone.
+        # The reader of our output is gone.
         sys.stderr.close()
         return ERROR, ""
     if debugging:
@@ -96,9 +96,6 @@ def rendered(error: BaseException) -> str:
         message = f"internal error: {type(error).__name__}: {error}"
         hint = "run again with --debug to see where, and please report it"
     return render_message("error", message, hint=hint)
-
-
-# ---- the launcher -------------------------------------------------------------------------------
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
@@ -166,8 +163,6 @@ class Launcher:
             self._say(words)
         return status
 
-    # --- while they run ---------------------------------------------------------------------------
-
     def _pass_on(self, number: int, _: object) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
@@ -202,8 +197,6 @@ class Launcher:
             self.links[link] = message
             if message["rank"] == 0:
                 socket.send_fds(link, [b"0"], [1, 2])
-
-    # --- when they have ended ---------------------------------------------------------------------
 
     def _outcome(self) -> int:
         """Determine the exit status; report what no process could."""
@@ -260,8 +253,6 @@ def _received(link: socket.socket) -> bytes:
     link.close()
     return data
 
-
-# ---- one of the processes -----------------------------------------------------------------------
 
 _link: socket.socket | None = None  # to the launcher
 

@@ -33,7 +33,6 @@ def add_variables(parser: argparse.ArgumentParser, text: str) -> None:
 
 
 def threads_option(text: str) -> int | None:
-    """Read --threads: a number, or None for auto."""
     if text == "auto":
         return None
     if not text.isdecimal() or int(text) < 1:

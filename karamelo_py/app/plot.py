@@ -1,4 +1,4 @@
-"""Read logs of earlier runs; karamelo-py plot."""
+"""Logs of earlier runs; karamelo-py plot."""
 
 import argparse
 import csv
@@ -56,7 +56,7 @@ def read_rows(path: str | Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Read the columns of a folder's log; empty if it cannot be read.
+    """Columns of a folder's log; empty if it cannot be read.
 
     Columns that change between runs have all their rows.
     """

@@ -109,7 +109,6 @@ class Columns(Mapping, dict):  # type: ignore[metaclass]
     update = pop = popitem = setdefault = clear = _refuse
 
     def copy(self) -> dict[str, np.ndarray]:
-        """Return the present columns."""
         return dict(self)
 
     def to_pandas(self) -> Any:
@@ -136,15 +135,14 @@ class LivePage:
         return f"<live page {self.address}>"
 
     def close(self) -> None:
-        """Close the page."""
         self._page.detach()
 
 
 class PointColumns(Columns):
     """Columns of the points; ``points["vx"] = values`` sets one between two runs.
 
-    x, y, z, velocities, temperatures, stresses (of rate-form materials) and declared fields can be
-    set, to a number or to one number per point (n,). Other columns are derived.
+    Positions, velocities, temperatures, stresses (of rate-form materials) and declared fields can
+    be set, to a number or one per point (n,). Other columns are derived.
     """
 
     def __init__(self, hub: Hub):
@@ -197,8 +195,6 @@ class Variables(MutableMapping):
 
 
 class ShownPicture:
-    """A picture of the points; notebooks display it."""
-
     def __init__(self, png: bytes):
         self.png = png
 
@@ -216,12 +212,12 @@ class Simulation:
     Parameters
     ----------
     script
-        Name or text of a script. A str that names no file and contains a line break, a parenthesis
-        or an equals sign is text; a Path is always a name. The script is executed up to its first
-        run command; ``run()`` without a number continues from there.
+        Name or text of a script, executed up to its first run command; ``run()`` without a number
+        continues from there. A str that names no file and contains a line break, a parenthesis or
+        an equals sign is text; a Path is always a name.
     out
-        Folder for log, dumps, plots and restart files. By default none is written: the log is kept
-        in memory, and dumps and plots of the script have no effect.
+        Folder for log, dumps, plots and restart files. By default none is written; the log stays in
+        memory.
     threads
         Number of threads; by default all cores if the scene is large enough.
     gpu
@@ -231,29 +227,27 @@ class Simulation:
     trust_geometries
         Allow .geo files to run programs and write files.
     alone
-        For several processes started by mpiexec: each has a separate scene. Otherwise this is
-        refused, because all would repeat the same run.
+        Allow several processes of mpiexec, each with a separate scene; otherwise they are refused,
+        because all would repeat the same run.
     variables
         Override assignments in the script, like ``-var``.
 
     Raises
     ------
     SimulationError
-        For an error in the script, the number of threads, the folder, or a missing GPU; with the
-        message and place that the command line shows.
+        For an error in the script, the number of threads, the folder, or a missing GPU.
 
     Notes
     -----
     Script commands are methods with the same arguments: ``sim.solid("body", "region", "box", 2,
     "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Strings are
-    names and formulas as in a script; numbers and booleans are passed as they are, and None is
-    NULL. ``sim.fix(ID, "python", group, function)`` takes a function, ``sim.solid(ID, "points",
-    columns, ...)`` arrays by name or a DataFrame.
+    names and formulas as in a script; None is NULL. ``sim.fix(ID, "python", group, function)``
+    takes a function, ``sim.solid(ID, "points", columns, ...)`` arrays by name or a DataFrame.
 
     Commands with a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return it.
 
-    Several simulations may run in different Python threads. One simulation takes one call at a
-    time; a second thread gets a SimulationError.
+    Simulations may run in different Python threads; a second thread's call of one gets a
+    SimulationError.
 
     Examples
     --------
@@ -332,16 +326,8 @@ class Simulation:
                 error.expected = SCRIPT
             raise
 
-    # -- commands ---------------------------------------------------------------------------------
-
     def command(self, text: str) -> None:
-        """Execute one or more lines of script.
-
-        Raises
-        ------
-        SimulationError
-            As on the command line.
-        """
+        """Execute one or more lines of script; raises SimulationError."""
         self._do(text, "command")
 
     def _do(self, text: str, name: str) -> None:
@@ -371,7 +357,6 @@ class Simulation:
 
     @contextmanager
     def _in_one_thread(self) -> Iterator[None]:
-        """Refuse calls from a second thread."""
         if not self._at_work.acquire(blocking=False):
             raise SimulationError(
                 "this simulation is at work in another thread",
@@ -434,8 +419,6 @@ class Simulation:
             return name
         return _as_script_text(value)
 
-    # -- time -------------------------------------------------------------------------------------
-
     def run(self, steps: int | None = None) -> None:
         """Take a number of steps; without one, execute the rest of the script and its runs."""
         if steps is not None:
@@ -462,8 +445,6 @@ class Simulation:
     def dt(self) -> float:
         """Length of the next step."""
         return self.hub.update.dt
-
-    # -- results ----------------------------------------------------------------------------------
 
     @property
     def points(self) -> PointColumns:
@@ -567,9 +548,6 @@ class Simulation:
     def __repr__(self) -> str:
         count = sum(solid.count for solid in self.hub.solids.values())
         return f"<{self._name}: {count} points, step {self.step}, time {self.time:.6g}>"
-
-
-# ---- conversion of values and errors between Python and scripts ---------------------------------
 
 
 @contextmanager

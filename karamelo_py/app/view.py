@@ -186,7 +186,7 @@ def _log_beside(
 
 
 def _tools(scene: Hub) -> list[Any]:
-    """List walls and tools of all runs at their present positions."""
+    """Walls and tools of all runs at their present positions."""
     fixes = [candidate for candidate in dict.fromkeys(scene.in_runs) if isinstance(candidate, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
@@ -362,7 +362,7 @@ def _all(
     made_look: Look,
     chosen: Callable[[Snapshot], Snapshot],
 ) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Return bounds of all snapshots, and limits of a column."""
+    """Bounds of all snapshots, and limits of a column."""
     from karamelo_py.output.pictures import grown, in_window, within
 
     corners, ends, count, left = [], [], 0, 0

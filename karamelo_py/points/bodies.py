@@ -75,7 +75,7 @@ def _force_between_minimize_penetration(law, kin, pair):
 
 
 class FrictionMemory(NamedTuple):
-    hold: Any  # force of the spring along the surface, a vector
+    hold: Any  # spring force along the surface, a vector
     mean: Any  # running mean of the load
     unused: Any  # friction left from earlier steps
 
@@ -83,12 +83,11 @@ class FrictionMemory(NamedTuple):
 def rub(mu, load, memory, stop):
     """Coulomb friction with memory: the force, and the memory after the step.
 
-    `stop` = m v/dt stops a free point. Alone, it would let a point creep that carries others,
-    loaded again in each step. Therefore slip stretches a spring along the surface, as stiff as the
-    normal contact; its force `hold` is returned to the friction cone (Wriggers 2006, "Computational
-    Contact Mechanics", chapter 5). The load comes in pulses, because points bounce on a stiff
-    contact: a step may use friction `unused` in earlier steps, up to mu times the `mean` load. A
-    point that always slides has mu times the load of each step.
+    `stop` = m v/dt stops a free point. Alone, it would let loaded points creep. So slip stretches a
+    spring along the surface, as stiff as the normal contact; its force `hold` is returned to the
+    friction cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Points bounce on a
+    stiff contact, so the load pulses: a step may use friction `unused` in earlier steps, up to mu
+    times the `mean` load. A point that always slides has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)

@@ -1,4 +1,4 @@
-"""Frames: weights and gradients at present (``Updated``) or reference positions (``Total``).
+"""Frames: present positions (``Updated``) or reference positions (``Total``).
 
 ``Updated``: spatial gradients and Kirchhoff stress. ``Total``: reference gradients, first
 Piola-Kirchhoff stress and deformation gradient F.
@@ -41,8 +41,8 @@ def spatial_increment(frame, kin, dl, f):
 
 def of_places_before(frame, kin, dl):
     """`dl` at the positions before a motion, from `dl` after it."""
-    # grad v there is grad v here (I - dl)^-1, so F grows by (I - dl)^-1 exactly. As a product it is
-    # accurate for small dl. Gradients of the total frame belong to the reference.
+    # grad v there is grad v (I - dl)^-1, so F grows by (I - dl)^-1 exactly; accurate for small dl.
+    # Gradients of the total frame belong to the reference.
     return dl @ inv(I - dl) if frame.moves else dl
 
 

@@ -17,15 +17,15 @@ class Grid(NamedTuple):
     z0: Length
     h: Length  # cell size
     inv_h: Length  # 1 / h
-    spacing: Length  # distance between nodes
-    nx: Count  # cells per direction
+    spacing: Length  # between nodes
+    nx: Count  # cells
     ny: Count
     nz: Count
     lx: Length  # size in cells, not always an integer
     ly: Length
     lz: Length
-    slack: Length  # distance outside at which points count as on it, in cells
-    step_x: Count  # difference of node numbers along x
+    slack: Length  # distance outside at which points count as inside, in cells
+    step_x: Count  # difference of node numbers
     step_y: Count
     first: Count  # number of the first node
     first_cell: Count  # number of the first cell
@@ -63,9 +63,6 @@ def node_position(grid, n):
     x = grid.x0 + (local // grid.step_x) * grid.spacing
     y = grid.y0 + (local % grid.step_x // grid.step_y) * grid.spacing
     return x, y, grid.z0 + (local % grid.step_y) * grid.spacing
-
-
-# --- an edge that reflects points (boundary reflect) ---------------------------------------------
 
 
 class Bounces(Field):

@@ -1,7 +1,7 @@
 """Limits of drift and rotation through the grid, which amplify null-space noise.
 
 From disks of rubber and metal, 4 to 16 cells across the radius, vibrating with 0.01 to 2 % of
-strain while they drift or rotate (docs/energy-measurements.md).
+strain (docs/energy-measurements.md).
 """
 
 from math import inf
@@ -13,10 +13,10 @@ from karamelo_py.language.rules import known_failure
 class DriftLimits(NamedTuple):
     """Bounds of cells crossed times c dt/h for conserved energy, two points per cell or one."""
 
-    drift: tuple[float, float]  # by the centre of mass, in 2D and 3D, musl and usf
+    drift: tuple[float, float]  # of the centre of mass, in 2D and 3D, musl and usf
     line: float  # in 1D
     averaged: tuple[float, float]  # as `drift`, with usavg
-    rim: tuple[float, float]  # by the rim of a rotating body, musl and usf
+    rim: tuple[float, float]  # of the rim of a rotating body, musl and usf
     rim_averaged: tuple[float, float]  # with usavg
     fastest: float = inf  # times the wave speed; a faster drift adds no noise
     damps: bool = False  # a faster drift damps vibrations in 3D
@@ -29,7 +29,6 @@ CUBIC = DriftLimits((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1,
 
 
 def drift_limits(basis: Any) -> DriftLimits:
-    """Limits of a basis, or limits of similar bases."""
     traits = basis.traits
     usual = BOXES if traits.steep_edge else QUADRATIC
     return traits.drift_limits or (JUMPS if traits.gradient_jumps else usual)

@@ -1,1 +1,1 @@
-"""karamelo-py bench: known scenes, and how fast this machine runs them."""
+"""karamelo-py bench: speed of this machine on known scenes."""

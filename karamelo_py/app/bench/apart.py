@@ -1,6 +1,6 @@
 """Workloads measured in separate processes, whose memory does not affect each other.
 
-``python -m karamelo_py.app.bench.apart`` gets a `Measurement` in JSON, writes results to a file,
+``python -m karamelo_py.app.bench.apart`` takes a `Measurement` in JSON, writes results to a file,
 and ends when its input is closed.
 """
 
@@ -28,7 +28,7 @@ from karamelo_py.script.errors import ScriptError
 _SIGNALS = {one.value: one.name for one in signal.Signals}
 MODULE = "karamelo_py.app.bench.apart"
 COMMAND = (sys.executable, "-m", MODULE)
-# Default workloads with --ranks.
+# with --ranks
 USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
 HEADING = (
     f"  {'processes x threads':<22}{'points':>9} {'million/s':>10} {'times one':>10} "
@@ -41,7 +41,7 @@ class Measurement(NamedTuple):
     threads: int
     presets: dict[str, str]
     seconds: float
-    triad: float = 0.0  # memory bandwidth (bytes/s)
+    triad: float = 0.0  # memory bandwidth, bytes/s
     debug: bool = False
     ranks: int = 1
     scaling: bool = False  # measure a `Scaled`
@@ -65,7 +65,7 @@ def measured_apart(job: Measurement) -> Measured | Solved | int:
 
 
 def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
-    """Return exit status and results of separate processes."""
+    """Exit status and results of separate processes."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(job._replace(file=str(file)))]
@@ -81,19 +81,17 @@ def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
 
 
 class Scaled(NamedTuple):
-    """Measured speed with several processes and threads."""
-
     ranks: int
     threads: int
-    weak: bool  # weak scaling: the scene grows with `ranks`
+    weak: bool  # the scene grows with `ranks`
     points: int
-    best: float  # best particle-steps per second
+    best: float  # particle-steps per second
     exchange: float  # fraction of time that the process with the least waits
     imbalance: float  # mean fraction of longer waits
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
-    """Measure a workload with 1 and several processes and as many threads, then weak scaling."""
+    """Measure with 1 and several processes and as many threads, then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
         yield measured_with_ranks(job._replace(ranks=n))
@@ -105,7 +103,7 @@ def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[S
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
-    """Return the variable that gives a scene `times` the points."""
+    """The variable that gives a scene `times` the points."""
     d = int(re.search(r"dimension\((\d)", script)[1])
     name, value = re.search(r"^(N|coarser) = (\S+)$", script, re.M).groups()
     value = float(presets.get(name, value))
@@ -140,7 +138,6 @@ def _share(job: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
 
 
 def line(row: Scaled, one: Scaled) -> str:
-    """Format a line of the table."""
     who = f"{row.ranks} x {row.threads}" + (" (larger)" if row.weak else "")
     shares = f"{'-':>9} {'-':>10}"
     if row.ranks > 1:

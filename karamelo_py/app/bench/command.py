@@ -189,7 +189,7 @@ def _print_solved(one: measure.Solved) -> None:
 
 
 def commit() -> str | None:
-    """Return the commit if the program runs from its repository."""
+    """The commit, if the program runs from its repository."""
     folder = Path(karamelo_py.__file__).parent
 
     def git(*words: str) -> str:
@@ -220,7 +220,6 @@ def read(path: Path) -> dict:
 
 
 def comparison(now: Record, then: Record) -> list[str]:
-    """Return lines that compare two benches."""
     lines = [f"{'workload':<24} {'then':>10} {'now':>10} {'ratio':>7}   (best, million/s)"]
     ours, theirs = now["workloads"], then["workloads"]
     for name in dict.fromkeys((*ours, *theirs)):

@@ -1,4 +1,4 @@
-"""Speed of a scene: times of stages, memory traffic, and memory bandwidth."""
+"""Speed of a scene: times of stages, memory traffic, memory bandwidth."""
 
 import statistics
 import time
@@ -37,10 +37,8 @@ APART = 1.5  # largest trusted ratio of separate sweeps to a compiled step
 class Workload(NamedTuple):
     title: str
     script: str
-    # Steps before the measurement.
-    lead: int = 3
-    # Published: million particle-steps/s of one core of a small AMD EPYC.
-    karamelo: float | None = None
+    lead: int = 3  # before the measurement
+    karamelo: float | None = None  # published: million/s of one core of a small AMD EPYC
 
 
 def _read_workloads() -> dict[str, Workload]:
@@ -74,11 +72,11 @@ class Timed(NamedTuple):
 
 class Measured(NamedTuple):
     points: int
-    speeds: list[float]  # particle-steps per second of each repetition
+    speeds: list[float]  # particle-steps per second
     bytes_per_particle: int
     bytes_per_particle_step: float  # without caches
     roofline: float  # fraction of the memory bandwidth at the best speed
-    roofline_in_place: float  # likewise, of arrays as large as the scene, which may be cached
+    roofline_in_place: float  # of arrays as large as the scene, which may be cached
     # Seconds per step, without call overhead.
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
@@ -95,13 +93,13 @@ class Measured(NamedTuple):
 
     @property
     def swept(self) -> float:
-        """Separate sweeps over one compiled step, in time."""
+        """Time of separate sweeps over one compiled step."""
         swept = sum(self.sweeps_of_points.values()) + sum(self.sweeps_of_nodes.values())
         return (swept - self.waits) * self.best / self.points
 
     @property
     def told_apart(self) -> bool:
-        """True if sweeps are long enough to be timed, with many points."""
+        """True if sweeps are long enough to be timed."""
         return self.swept <= APART
 
     @property
@@ -118,7 +116,7 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """Return what takes at least half of a step: ``overhead``, ``nodes``, ``memory``.
+        """What takes at least half of a step: ``overhead``, ``nodes``, ``memory``.
 
         Memory is relative to arrays as large as the scene. Else ``arithmetic`` (instructions or
         latency), or ``unknown`` if not `told_apart`.
@@ -132,7 +130,7 @@ class Measured(NamedTuple):
         return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
     def record(self) -> dict[str, Any]:
-        """Return the results; speeds in particle-steps/s, times in seconds."""
+        """Results; speeds in particle-steps/s, times in seconds."""
         speeds = {"best": self.best, "median": self.median, "limited_by": self.limit}
         return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
@@ -141,7 +139,7 @@ class Solved(NamedTuple):
     """Measured speed of load steps."""
 
     points: int
-    speeds: list[float]  # particle-steps per second of each repetition
+    speeds: list[float]  # particle-steps per second
     unknowns: int
     corrections: float  # Newton iterations per step
     stages: dict[str, float]  # fractions of a step
@@ -244,7 +242,7 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Returns the steps per repetition, and the seconds taken and waited by each process.
+    Returns steps per repetition, and the seconds taken and waited by each process.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -278,10 +276,7 @@ def timed_steps(simulation: Simulation, count: int) -> float:
 
 
 def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Seconds per step of each sweep over points, and over nodes.
-
-    Sweeps are called separately; medians of repeated ones are summed.
-    """
+    """Seconds per step of each sweep over points, and over nodes: summed medians."""
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {}, {})
     begin(StepKind(scheme, Fused(), timed), s)
@@ -348,7 +343,7 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
     """Bytes per particle-step without caches, bytes of the scene, and parallel regions.
 
-    Point fields count per sweep that reads and that writes them; node fields in node loops; tile
+    Point fields count per sweep that reads and that writes them, node fields in node loops, tile
     buffers when written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme

@@ -23,7 +23,7 @@ SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
 
 class OnCard(NamedTuple):
     points: int
-    speeds: list[float]  # particle-steps per second of each repetition
+    speeds: list[float]  # particle-steps per second
     bytes_per_particle_step: float  # without caches
     roofline: float  # fraction of the memory bandwidth at the best speed
     bytes_on_card: int
@@ -35,7 +35,7 @@ class OnCard(NamedTuple):
 
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Yield variables for each of `SIZES`; `presets` if they set the size."""
+    """Variables for each of `SIZES`, or `presets` if they set the size."""
     if {"N", "coarser"} & {*presets}:
         yield dict(presets)
         return

@@ -18,7 +18,7 @@ from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
 PAUSE = 0.5  # seconds between polls once all files are read
-FILES = 8  # files per poll, so that the first are shown early
+FILES = 8  # per poll, so that the first are shown early
 WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 
 
@@ -50,7 +50,6 @@ class FolderPage:
         )
 
     def follow(self) -> None:
-        """Poll until interrupted."""
         while True:
             if self.look():
                 self.server.changed()
@@ -79,7 +78,7 @@ class FolderPage:
         return grown or len(self._states) > before
 
     def _dumps(self) -> list[Path]:
-        """List the particle dumps with most columns whose names differ by number only."""
+        """The particle dumps with most columns whose names differ by number only."""
         kinds: dict[str, list[Path]] = {}
         for path in sorted(self.folder.iterdir()):
             if path.is_file() and (path.suffix in WHOLE or _is_text_dump(path)):

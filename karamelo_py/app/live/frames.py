@@ -19,8 +19,6 @@ SEEN = 1.0  # seconds for a page to request a frame
 
 
 class Frame(NamedTuple):
-    """Points at one time."""
-
     step: int
     time: float
     column: str
@@ -88,20 +86,20 @@ class KeptFrames:
             return [[k, f.step, plain(f.time), f.column, f.of] for k, f in self._kept.items()]
 
     def answer(self, words: Mapping[str, str]) -> bytes | None:
-        """Return the positions of a frame, one coordinate after another, then its column."""
+        """Positions of a frame, one coordinate after another, then its column."""
         with self._lock:
             frame = self._kept.get(number_in(words))
         return None if frame is None else frame.numbers.tobytes()
 
 
 def number_in(words: Mapping[str, str]) -> int:
-    """Return the number of a frame, or -1."""
+    """Number of a frame, or -1."""
     text = words.get("k", "")
     return int(text) if text.isdecimal() and len(text) < 19 else -1
 
 
 def plain(value: object) -> object:
-    """Return None for numbers that JSON lacks."""
+    """None for numbers that JSON lacks."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return value

@@ -29,8 +29,6 @@ GRACE = 10.0  # seconds that a paused run waits for its page to be reloaded
 
 
 class Row(NamedTuple):
-    """State of a run at an output."""
-
     step: int
     time: float
     dt: float
@@ -40,7 +38,7 @@ class Row(NamedTuple):
 
 
 class RunPage(Rhythmic, Listener):
-    """The page of a run: updated with the log; can pause the run."""
+    """The page of a run, updated with the log; can pause the run."""
 
     remembers = ()
     id, place = "live", None
@@ -65,8 +63,6 @@ class RunPage(Rhythmic, Listener):
     def signalled(self, number: int) -> None:
         self._paused = False
 
-    # ---- in the thread of the run ---------------------------------------------------------------
-
     def write(self) -> None:
         """Show the present state; wait while the page pauses the run."""
         hub, simulation = self.hub, self.hub.simulation
@@ -85,7 +81,7 @@ class RunPage(Rhythmic, Listener):
         self._wait()
 
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
-        """Send the last news, with an error that ends the run, and wait for open pages to close.
+        """Send the last news and a final error, and wait for open pages to close.
 
         With `waits`, at a terminal, wait for a first page.
         """
@@ -135,8 +131,6 @@ class RunPage(Rhythmic, Listener):
     def _take_again(self) -> None:
         self.frames.replace_last(self._taken)
         self.server.changed()
-
-    # ---- in threads of the server ---------------------------------------------------------------
 
     def _news(self, seen: int) -> tuple[int, dict]:
         rows = new = self._rows[seen:]

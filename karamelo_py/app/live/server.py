@@ -22,7 +22,7 @@ STUCK = 30.0  # seconds until a page that receives nothing counts as closed
 UNKNOWN = 5.0  # seconds to send the secret word
 MOST = 64  # connections; leaves file descriptors for the run
 LARGEST = 1 << 16  # bytes of a request's body, which is ignored
-# Names of this machine; a site could resolve another name to it.
+# A site could resolve another name to this machine.
 HERE = ("127.0.0.1", "localhost", "::1")
 # Plotly creates styles and functions while drawing.
 POLICY = (
@@ -69,7 +69,6 @@ class Server:
         threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
-        """Announce news to all pages."""
         with self._changed:
             self.version += 1
             self._changed.notify_all()
@@ -142,7 +141,7 @@ class _Quiet(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, *_: object) -> None:
-        """Print nothing on the terminal of the run."""
+        """Nothing on the terminal of the run."""
 
 
 def _plotly(_: Mapping[str, str]) -> bytes:
@@ -162,7 +161,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
         server_version, sys_version = "karamelo-py", ""
 
         def log_message(self, *_: object) -> None:
-            """Print nothing on the terminal of the study."""
+            """Nothing on the terminal of the study."""
 
         def do_GET(self) -> None:
             name, words = self._asked()
@@ -203,7 +202,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 self._give(b"{}", "application/json")
 
         def _is_from_here(self) -> bool:
-            """Return True if Host and Origin, if sent, are this server."""
+            """Host and Origin, if sent, are this server."""
             host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
             try:
                 here = urlsplit(f"//{host}").hostname in HERE
@@ -212,7 +211,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 return False
 
         def _asked(self) -> tuple[str | None, dict[str, str]]:
-            """Return the requested name (None without the secret word) and the query."""
+            """The requested name (None without the secret word) and the query."""
             asked = urlsplit(self.path)
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())

@@ -78,8 +78,8 @@ def forecast(
     """Forecast a run at `x` from the runs at `xs`, coarse ones first.
 
     The error continues with the last order. Its bounds follow from the least and largest order, at
-    least a third of it above and half below; a falling order may fall as much again, and one below
-    2 may reach 2. Errors small by chance count as large as they may be (`credible`). The time is
+    least 33 % of it above and half below; a falling order may fall as much again, and one below 2
+    may reach 2. Errors small by chance count as large as they may be (`credible`). The time is
     steps times (a + b points), fitted; other costs continue as between the last two runs. None with
     fewer than two errors, or if the last run got worse.
     """
@@ -142,7 +142,7 @@ class ChoiceRuns:
 
     @property
     def kind(self) -> set[str]:
-        """Words of basis and method, which decide where errors end."""
+        """Words of basis and method, which limit the order."""
         return {*self.values.values(), *self.words} & {*REACHED, *look.FAMILIES[2]}
 
     @property
@@ -222,7 +222,7 @@ class Adviser:
         ]
 
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
-        """Return True if gradients jump, and points may cross cells at a step."""
+        """True if gradients jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
         stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN if unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
@@ -230,7 +230,7 @@ class Adviser:
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
     ) -> Candidate | None:
-        """Return a choice's cheapest variant that meets the target, known or expected.
+        """A choice's cheapest variant that meets the target, known or expected.
 
         With `hope`, by the lower bound of the error; with `lucky`, perhaps by chance.
         """
@@ -249,7 +249,7 @@ class Adviser:
         return None
 
     def lucky(self) -> Candidate | None:
-        """Return the cheapest variant that meets the target, if only by chance."""
+        """The cheapest variant that meets the target, if only by chance."""
         candidates = filter(None, (self.candidate(choice, lucky=True) for choice in self.choices))
         return min(candidates, key=lambda c: c.cost, default=None)
 
@@ -258,7 +258,7 @@ class Adviser:
         return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """Return the cheapest candidate, after runs that may change it.
+        """The cheapest candidate, after runs that may change it.
 
         Choices that could become the cheapest are followed until their candidate is the next finer
         variant.
@@ -279,7 +279,7 @@ class Adviser:
             self.go_on(follow)
 
     def _doubted(self, limit: float) -> ChoiceRuns | None:
-        """Return a choice that meets the target below a cost, if only by chance."""
+        """A choice that meets the target below a cost, if only by chance."""
         for choice in self.choices:
             finest = len(choice.rows) - 1
             for last in self._met(choice)[-1:] if finest < len(self.values) - 1 else ():
@@ -288,7 +288,7 @@ class Adviser:
         return None
 
     def _risen(self, limit: float) -> ChoiceRuns | None:
-        """Return a choice whose last error alone has grown, if its next run is cheap."""
+        """A choice whose last error alone has grown, if its next run is cheap."""
         for choice in self.choices:
             count = len(choice.rows)
             fell = np.diff(sizes(choice.rows, self.accuracy)) < 0
@@ -299,7 +299,7 @@ class Adviser:
         return None
 
     def doubts(self, best: Candidate) -> list[str]:
-        """List reasons why the error of a forecast may stop falling."""
+        """Reasons why the error of a forecast may stop falling."""
         reasons = [f"its runs warn: {text}" for text in best.choice.warnings[:1]]
         if self._crosses(best.choice, best.step):
             basis = ", ".join(best.choice.kind & {*JUMPING})
@@ -319,7 +319,7 @@ class Adviser:
         return reasons
 
     def hopeful(self) -> Candidate | None:
-        """Return the cheapest variant that may meet the target, though not expected to."""
+        """The cheapest variant that may meet the target, though not expected to."""
         return next((c for c in self.candidates(hope=True) if c.forecast), None)
 
     def label(self, choice: ChoiceRuns, step: int) -> str:

@@ -56,11 +56,10 @@ PICTURES = (".png", ".svg")
 class Entry:
     """A picture or table, with its commands."""
 
-    name: str  # its folder; the part before a slash is its group
+    name: str  # folder; the part before a slash is its group
     text: str = ""  # what it shows
     commands: list[str] = field(default_factory=list)  # without the word karamelo-py
-    # Values of the words in braces.
-    whole: dict[str, str] = field(default_factory=dict)
+    whole: dict[str, str] = field(default_factory=dict)  # values of words in braces
     small: dict[str, str] = field(default_factory=dict)
     interpreted: bool = False  # its scenes are too small to be worth compiling
     page: bool = True  # is on the page
@@ -152,7 +151,7 @@ def run(options: Namespace) -> int:
 
 
 def ended(folder: Path) -> tuple[list[str], int]:
-    """List the runs in an entry's tables that did not end well, and count all."""
+    """The runs in an entry's tables that did not end well, and the count of all."""
     tables = [records.read(path) for path in sorted(folder.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)

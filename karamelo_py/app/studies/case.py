@@ -30,8 +30,8 @@ Record = Mapping[str, Any]  # a JSON object
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Codes of errors before the first step. No mistake of the script: larger scenes, longer steps. No
-# fault of the run: of the program, another run in the folder.
+# Codes of errors before the first step that are no mistake of the script (larger scenes, longer
+# steps), and of the program or another run in the folder.
 _NOT_OF_SCRIPT = ("memory", "step-above-limit")
 _NOT_OF_RUN = ("internal", "busy")
 
@@ -67,7 +67,7 @@ COLUMNS = {
     "points": "points",  # at the beginning
     "dt": "first step (time of the script)",
     "stable_dt": "stable step (time of the script)",  # at the beginning
-    # The program's own choice of the first step, if the script chose another.
+    # The program's own choice, if the script chose another.
     "own_dt": "the program's own step (time of the script)",
     "path": "path of the fastest points (cells)",  # upper bound
     "bytes_per_particle": "bytes per particle",  # all fields, mean over points
@@ -123,7 +123,7 @@ class Launch:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """Return this case's outcome from an earlier study, or None to run it again."""
+        """This case's outcome from an earlier study, or None to run it again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
@@ -202,7 +202,7 @@ class Launch:
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
                 if WAIT4:
-                    os.kill(process.pid, signal.SIGKILL)  # Popen.kill might reap it before wait4.
+                    os.kill(process.pid, signal.SIGKILL)  # Popen.kill might reap it before wait4
                 else:
                     process.kill()
             if not WAIT4:
@@ -221,7 +221,7 @@ class Launch:
 
 
 def kind_of(values: Iterable[str]) -> tuple[str, ...]:
-    """Return the words of a case, which decide what is compiled."""
+    """Words of a case, which decide what is compiled."""
     return tuple(value for value in values if number_of(value) is None)
 
 
@@ -234,7 +234,7 @@ def command_of(script: str | Path, case: Mapping[str, str]) -> str:
 
 
 def environment() -> dict[str, str]:
-    """Return the environment of a run, which imports this very program."""
+    """Environment of a run, which imports this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}
@@ -245,7 +245,7 @@ def record_of(folder: Path) -> Record:
 
 
 def facts_of(record: Record) -> dict[str, float]:
-    """Return numbers of all runs of a script, or of the first: `COLUMNS`."""
+    """Numbers of all runs of a script, or of the first: `COLUMNS`."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
     names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")

@@ -260,8 +260,6 @@ def tell(family: Family, *, costs: bool) -> None:
         )
 
 
-# ---- one page (HTML) that needs no server: a point shows its run --------------------------------
-
 _WIDEST = 480  # pixels of a picture in the page
 _MOST = 60  # pictures in a page
 

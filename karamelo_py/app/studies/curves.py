@@ -23,12 +23,11 @@ class Order(NamedTuple):
     """Exponent of y = c x^exponent, by least squares of logarithms."""
 
     exponent: float  # NaN with fewer than two points
-    lowest: float  # exponents between neighbouring points
+    lowest: float  # between neighbouring points
     highest: float
 
     @property
     def of_fall(self) -> "Order":
-        """Order by which y falls as x grows."""
         return Order(-self.exponent, -self.highest, -self.lowest)
 
     def towards(self, x: Sequence[float]) -> "Order":
@@ -44,7 +43,6 @@ class Order(NamedTuple):
 
 
 def order(x: Sequence[float], y: Sequence[float]) -> Order:
-    """Fit the order of positive y in positive x."""
     pairs = sorted((a, b) for a, b in zip(x, y, strict=True) if usable(a) and usable(b))
     logs = np.log(np.array(pairs).reshape(-1, 2))
     if len(np.unique(logs[:, 0])) < 2:
@@ -71,12 +69,12 @@ WORSE = 1.1  # ratio of a worse error
 
 
 def reached(words: Iterable[str]) -> float:
-    """Return the highest order to expect of a choice."""
+    """The highest order to expect of a choice."""
     return min((REACHED[word] for word in words if word in REACHED), default=4)
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """Return why errors of runs, coarse ones first, are small by chance; "" where they are not.
+    """Why errors of runs, coarse ones first, are small by chance; "" where they are not.
 
     An error is chance if a finer run is worse. If no finer run is as good, also if the sign
     changes, the error falls faster than by `highest`, the order of the basis, or it grows.
@@ -99,7 +97,7 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 
 
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
-    """Return sizes of errors for a forecast, without reductions by chance.
+    """Sizes of errors for a forecast, without reductions by chance.
 
     At least the change since the run before over the reduction by the order `highest`, and the
     error of each finer run.
@@ -118,8 +116,6 @@ def usable(a: float | None) -> bool:
 
 
 class Table(NamedTuple):
-    """A table of runs."""
-
     rows: list[Mapping[str, str]]
     variables: list[str]
     path: Path = Path()
@@ -235,7 +231,7 @@ class Family:
         return by_chance(x[::way], signed[::way], highest)[::way]
 
     def place(self, row: Mapping[str, str]) -> float:
-        """Return a run's position along its line."""
+        """A run's position along its line."""
         end = row[self.along]
         return self.words.index(end) if self.words else number_of(end)
 
@@ -250,7 +246,7 @@ class Family:
         return f"{self.accuracy} = {f'abs({formula})' if signed else formula}"
 
     def front(self) -> list[Mapping[str, str]]:
-        """Return the runs that none beats in cost and error, cheapest first, without chance."""
+        """Runs that none beats in cost and error, cheapest first, without chance."""
         members = [
             (c, e, k, row)
             for line in self.lines
@@ -268,13 +264,13 @@ class Family:
 
 
 def errors(rows: Sequence[Row], name: str) -> np.ndarray:
-    """Read errors, signed where possible; NaN where missing."""
+    """Errors, signed where possible; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
 def sizes(rows: Sequence[Row], name: str) -> np.ndarray:
-    """Read absolute values; NaN where missing."""
+    """Absolute values; NaN where missing."""
     return np.abs(column(rows, name))
 
 
@@ -284,7 +280,6 @@ def column(rows: Sequence[Row], name: str) -> np.ndarray:
 
 
 def require(option: str, names: Iterable[str], names_of_table: Iterable[str]) -> None:
-    """Raise an error for names that a table does not have."""
     for name in names:
         if name not in names_of_table:
             raise missing(option, name, list(names_of_table))

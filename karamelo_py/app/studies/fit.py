@@ -35,7 +35,7 @@ value at the end of its range, which has to be wider. A run that fails counts as
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # of each range
 # Fraction of a range, for derivatives and around an end. Waves and points that cross cells make
-# curves rough: derivatives over 0.01 of a range read the roughness and end in a local minimum.
+# curves rough: derivatives over 0.01 of a range end in a local minimum.
 STEP = 0.04
 NEAR = 0.01  # fraction of a range: at its end; distance of equal ends
 ENOUGH = 1e-3  # relative change of the misfit or of the values that ends a search
@@ -69,7 +69,7 @@ class Observation:
             self.times, self.wanted = next(iter(table.values())), table[column]
 
     def differences(self, log: Mapping[str, np.ndarray], case: Mapping[str, str]) -> np.ndarray:
-        """Return log minus measurement (n,), over the largest measurement."""
+        """Log minus measurement (n,), over the largest measurement."""
         if self.times is None:
             values = np.array([self.item.of(log, case)])
         elif log["Time"][-1] < self.times[-1] * (1 - 1e-9):
@@ -117,7 +117,7 @@ class Search:
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *shares: np.ndarray) -> list[np.ndarray]:
-        """Return the differences at these positions; inf for a failed run."""
+        """The differences at these positions; inf for a failed run."""
         cases, results = [self.case(share) for share in shares], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:
@@ -135,7 +135,7 @@ class Search:
         return results
 
     def slopes(self, share: np.ndarray, both: bool = False) -> np.ndarray:
-        """Return derivatives (n, variables) towards the middle, or over `both` sides.
+        """Derivatives (n, variables) towards the middle, or over `both` sides.
 
         Raises NoDerivatives if runs on both sides fail.
         """
@@ -170,7 +170,7 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """Return the lowest point around an end, along variables and the weakest direction.
+        """The lowest point around an end, along variables and the weakest direction.
 
         `end` gets slopes over both sides.
         """
@@ -261,7 +261,7 @@ def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[E
 
 
 def disagree(best: End, other: End, half: np.ndarray) -> bool:
-    """Return True if ends differ by more than both 95 % ranges."""
+    """True if ends differ by more than both 95 % ranges."""
     off = abs(best.share - other.share)
     wide = np.maximum(np.where(np.isnan(half), 0, 2 * half), NEAR)
     return bool((off > wide)[best.slopes.any(axis=0)].any())
@@ -279,7 +279,7 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
 
 
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Return half the 95 % ranges, and pairs of variables that cannot be told apart.
+    """Half the 95 % ranges, and pairs of variables that cannot be told apart.
 
     NaN without effect or enough measurements, inf if only a combination is determined. Covariance
     s^2 (J^T J)^-1, s^2 from the n - p differences `off` (Seber & Wild 2003, Nonlinear Regression,

@@ -1,4 +1,4 @@
-"""Runs judged by a log column that should stay, such as an energy: a cell for each."""
+"""Runs judged by a log column that should stay, such as an energy."""
 
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
@@ -35,7 +35,7 @@ class Kept(NamedTuple):
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """Return the verdict on `y` over `x`, and the mean of its last part over the first."""
+    """Verdict on `y` over `x`, and the mean of its last part over the first."""
     span = SHARE * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:
@@ -73,7 +73,7 @@ def look_at(
 
 
 def _general(note: Mapping[str, str]) -> str:
-    """Return the cause in a message, else its title, else its text."""
+    """The cause in a message, else its title, else its text."""
     title = codes().get(note.get("code", ""), {}).get("title")
     return note.get("cause") or title or note["text"]
 

@@ -44,7 +44,7 @@ def known(word: str) -> bool:
 
 
 def place(word: str, others: Sequence[str] = ()) -> int:
-    """Return the style number of a word: fixed for methods, else by order."""
+    """Style number of a word: fixed for methods, else by order."""
     for family in FAMILIES:
         if word in family:
             return family.index(word) % len(PALETTE)
@@ -54,7 +54,7 @@ def place(word: str, others: Sequence[str] = ()) -> int:
 
 
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
-    """Return colour, marker and dashes (by number) of each line.
+    """Colour, marker and dashes (by number) of each line.
 
     The first variable sets colour and marker, the others the dashes: fixed for known words, else
     the next unused.
@@ -98,7 +98,7 @@ def readable(colour: str) -> str:
 
 
 def contrast(rgb: Sequence[float] | np.ndarray) -> float:
-    """Return the contrast with white of an sRGB colour, 0 to 1 (WCAG 2.1)."""
+    """Contrast with white of an sRGB colour, 0 to 1 (WCAG 2.1)."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
@@ -109,7 +109,7 @@ def label(name: str) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Return round ticks of a logarithmic axis, whose labels do not touch."""
+    """Round ticks of a logarithmic axis, whose labels do not touch."""
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)

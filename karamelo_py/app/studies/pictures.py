@@ -35,8 +35,6 @@ Curve = tuple[float, float, str, str]  # x and y of its end, name, colour
 
 
 class Sheet(NamedTuple):
-    """File and labels of a picture."""
-
     path: Path
     x: str = ""  # labels of the axes
     y: str = ""
@@ -99,7 +97,7 @@ def lines(family: Family, sheet: Sheet) -> None:
 
 
 def _bars(family: Family, line: GroupedRuns) -> np.ndarray:
-    """Return half the spread of repeated costs."""
+    """Half the spread of repeated costs."""
     spread = column(line.rows, f"{family.cost}_spread")
     return np.zeros(len(spread)) if family.convergence else np.nan_to_num(spread) / 2
 
@@ -211,9 +209,6 @@ def _sorted(rows: Sequence[Mapping[str, str]], name: str) -> list[str]:
     )
 
 
-# ---- columns of logs, a curve for each run -------------------------------------------------------
-
-
 class History(NamedTuple):
     """One column over another in a run."""
 
@@ -245,7 +240,7 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Return the rows (n,) of a log with increasing time.
+    """Mask (n,) of a log's rows with increasing time.
 
     A stopped run ends with an earlier good state; one that went back has discarded rows.
     """
@@ -288,9 +283,6 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
     sheet.finish(figure, axes, ends)
 
 
-# ---- two values of a variable side by side, scene by scene ---------------------------------------
-
-
 @dataclass
 class Pair:
     """Numbers of a scene for two values of one variable; NaN where missing."""
@@ -302,7 +294,6 @@ class Pair:
 
     @property
     def cost_ratio(self) -> float:
-        """Second cost over the first."""
         return self.cost[1] / self.cost[0]
 
 

@@ -69,8 +69,8 @@ class Reduction:
 class Recorded:
     """A number from a log: ``err`` (the last value), ``max:err``, ...
 
-    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and variables. One that is
-    abs(...) as a whole is also recorded with its sign (`signed`).
+    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and variables; abs(...) as a
+    whole is also recorded with its sign (`signed`).
     """
 
     signed: "Recorded | None" = None
@@ -102,7 +102,7 @@ class Recorded:
             self.parts[name] = Reduction("last", name, None, word)
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
-        """List the log columns it reads, which are not among `variables`."""
+        """The log columns it reads, which are not among `variables`."""
         return [reduction.column for name, reduction in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Row) -> float:
@@ -124,7 +124,6 @@ class Recorded:
 def recorded(
     text: str, script: ScriptFiles, variables: Container[str] = (), option: str = "-record"
 ) -> list[Recorded]:
-    """Read the numbers that an option requests."""
     items = [Recorded(word.strip()) for word in _apart(text) if word.strip()]
     headings = script.logged()
     for item in items:
@@ -138,7 +137,7 @@ def recorded(
 
 
 def _is_closed(text: str) -> bool:
-    """Return True if every closing parenthesis was opened before."""
+    """True if every closing parenthesis was opened before."""
     depths = itertools.accumulate((sign == "(") - (sign == ")") for sign in text)
     return min(depths, default=0) >= 0
 
@@ -182,7 +181,6 @@ def row(
 
 
 def write(path: Path, rows: Sequence[Row]) -> None:
-    """Write a table atomically."""
     file = io.StringIO()
     writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
     writer.writeheader()

@@ -46,7 +46,7 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
 
 
 def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) -> list[History]:
-    """Return a line for each result and each group of runs that differ only in `x`."""
+    """A line for each result and each group of runs that differ only in `x`."""
     differing = [
         name
         for name in by or table.variables

@@ -145,7 +145,7 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Return the largest mean of an energy over its first; inf for NaN.
+    """The largest mean of an energy over its first; inf for NaN.
 
     Means are over a tenth of the rows; from rest the median replaces the first.
     """
@@ -162,7 +162,7 @@ def growth(energy: np.ndarray) -> float:
 
 
 def remains(energy: np.ndarray) -> float:
-    """Return the mean of an energy over the last tenth of its rows over the first tenth's."""
+    """Mean of an energy over the last tenth of its rows over the first tenth's."""
     rows = max(1, ceil(FIRST * len(energy)))
     first, last = (float(np.abs(end).mean()) if len(end) else 0.0
                    for end in (energy[:rows], energy[-rows:]))  # fmt: skip
@@ -272,7 +272,6 @@ class Map:
         return {**row, **verdict}
 
     def rows(self) -> list[dict]:
-        """Make the table of all cells."""
         rows = []
         for cell, kind in sorted(self.classes.items()):
             row = self.results.get(cell, {})
@@ -285,7 +284,7 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Return each row's x where the first step equals the column `step`, or None.
+        """Each row's x where the first step equals the column `step`, or None.
 
         Extrapolates the ratio of the steps as a power of x; interpolates rows with too few runs.
         """
@@ -304,7 +303,7 @@ class Map:
         return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
-        """Return where a ratio is 1, at or beyond its known values."""
+        """Position where a ratio is 1, at or beyond its known values."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
@@ -319,7 +318,7 @@ class Map:
         return exp(at) if at <= log(high) and exp(at) >= low else None
 
     def margins(self) -> list[tuple[float, int]]:
-        """Return the largest stable step over the program's, and its steps, by row."""
+        """The largest stable step over the program's, and its steps, by row."""
         ratios, classes = [], self.classes
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
@@ -452,16 +451,13 @@ def edges(centres: Sequence[float]) -> np.ndarray:
     return np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
 
 
-# ---- where a plane of cells changes, with few runs -----------------------------------------------
-
-
 def explore(
     shape: tuple[int, int],
     classify: Callable[[Sequence[Cell]], Sequence[Hashable]],
     stride: int = 6,
     apart: Sequence[bool] = (False, False),
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """Return the classes of the cells that were run, and of the others, which are inferred.
+    """Classes of the cells that were run, and of the others, which are inferred.
 
     Lines and columns about `stride` cells apart are run first. Cells between two of one class in a
     row or column get that class, the nearest first; between different ones the middle is run,
@@ -485,7 +481,7 @@ def explore(
 
 
 def unseen(shape: Sequence[int], stride: int) -> int:
-    """Return the largest width of unseen islands and strips, in cells."""
+    """Largest width of unseen islands and strips, in cells."""
     return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
 
 
@@ -530,7 +526,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield length and middle of stretches along an edge without a run."""
+    """Length and middle of stretches along an edge without a run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])
@@ -540,7 +536,7 @@ def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]
 
 
 def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
-    """Find stretches longer than 1 where two lines differ and one is unknown."""
+    """Stretches longer than 1 where two lines differ and one is unknown."""
     line = (near, far)[which]
     stretches: list[list[int]] = [[]]
     for i in np.flatnonzero((near != far) & (runs == UNKNOWN)):

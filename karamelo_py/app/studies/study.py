@@ -47,8 +47,6 @@ _STATUS = 24  # least width of the status while facts are shown
 
 @dataclass
 class Study:
-    """A family of runs of one script."""
-
     launch: Launch
     out: Path  # table or picture; runs have folders in a folder of that name
     names: list[str]  # variables
@@ -60,10 +58,10 @@ class Study:
     most: int = 0  # upper bound of an adaptive study; 0: `run` gets all cases
     writes: bool = True  # write the table after each run
     page: StudyPage | None = None  # with --live
-    # Rows of finished runs, by the values of the case.
+    # Finished runs, by the values of the case.
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
     claim: Claim | None = None  # of the folder
-    ran: int = 0  # runs made by this study
+    ran: int = 0  # made by this study
     begun: float = field(default_factory=time.perf_counter)
 
     def __post_init__(self) -> None:
@@ -98,7 +96,7 @@ class Study:
             write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
-        """Return the rows of cases, in order, after running unknown ones.
+        """The rows of cases, in order, after running unknown ones.
 
         An interrupt ends runs in progress; finished ones are stored.
         """
@@ -246,7 +244,7 @@ def guessed_time(
     """
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
-        """Return logarithms of numbers above 0, and 1 for each other word."""
+        """Logarithms of numbers above 0, and 1 for each other word."""
         logs: dict[Any, float] = {}
         for name, word in case.items():
             number = number_of(word)
@@ -341,9 +339,6 @@ def open_study(
         print(f"live: {study.page.server.address}", flush=True)
     study.describe(variables=plan.values, **facts)
     return study
-
-
-# ---- karamelo-py sweep --------------------------------------------------------------------------
 
 
 def add_options(parser: ArgumentParser) -> None:

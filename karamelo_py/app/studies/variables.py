@@ -139,8 +139,6 @@ def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) ->
 
 
 class ScriptFiles:
-    """The statements of a script and its includes."""
-
     def __init__(self, path: Path):
         self.path = path
         self.statements: dict[Path, list[Any]] = {}
@@ -166,7 +164,6 @@ class ScriptFiles:
         return tuple(map(read_script, sorted(self.statements)))
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise an error for a variable that the script does not read."""
         read: set[str] = set()
         assigned: set[str] = set()
         for statement in (each for statements in self.statements.values() for each in statements):
@@ -184,7 +181,7 @@ class ScriptFiles:
                 raise unknown(f"-var {name}: {self.path} {fault}", name, sorted(assigned & read))
 
     def logged(self) -> list[str] | None:
-        """List the log columns that the script names; None with includes."""
+        """The log columns that the script names; None with includes."""
         if self.calls("include", self.path):
             return None
         headings = ["Step", "dt", "Time"]
@@ -221,9 +218,6 @@ def _published(family: str, style: str) -> tuple[str, ...]:
     return ()
 
 
-# ---- options ------------------------------------------------------------------------------------
-
-
 def add_family(parser: ArgumentParser) -> None:
     parser.set_defaults(zip=[])
     parser.add_argument("script", type=Path, help="the script")
@@ -256,7 +250,7 @@ def add_axes(parser: ArgumentParser) -> None:
 
 
 def along(options: Namespace, x: str, y: str) -> tuple[str, str]:
-    """Return the axis labels of the options, by default `x` and `y`."""
+    """Axis labels of the options, by default `x` and `y`."""
     words = split(options.axes or ",")
     if len(words) != 2:
         raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")
@@ -264,7 +258,6 @@ def along(options: Namespace, x: str, y: str) -> tuple[str, str]:
 
 
 def split(text: str) -> list[str]:
-    """Split at commas outside double quotes."""
     return [word.strip() for word in next(csv.reader([text], skipinitialspace=True), [])]
 
 
@@ -292,8 +285,6 @@ def zipped(options: Namespace) -> list[list[str]]:
 
 
 class StudyPlan(NamedTuple):
-    """Variables, script and settings of a study."""
-
     values: dict[str, list[str]]
     script: ScriptFiles
     launch: Launch
@@ -301,7 +292,6 @@ class StudyPlan(NamedTuple):
 
 
 def family(options: Namespace, *, timed: bool = False, repeat: int = 1) -> StudyPlan:
-    """Read variables, script and settings from the options."""
     script, threads = ScriptFiles(options.script), options.threads or 1
     in_step = {name for group in zipped(options) for name in group}
     values = choices(options.var, in_step)
@@ -317,7 +307,6 @@ def family(options: Namespace, *, timed: bool = False, repeat: int = 1) -> Study
 
 
 def out_file(path: Path, *suffixes: str) -> Path:
-    """Check the suffix and folder of a file to write."""
     if suffixes and path.suffix.lower() not in suffixes:
         raise ScriptError(f"-o {path}: unknown kind of file", expected=", ".join(suffixes))
     if not path.parent.is_dir():

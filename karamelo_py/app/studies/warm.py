@@ -1,4 +1,4 @@
-"""Start runs as copies (forks) of warm processes, which have imported the program.
+"""Start runs as forks of warm processes, which have imported the program.
 
 A run leaves a copy of itself, with its kernels, for later runs of its kind. Runs are children of
 the study. On Linux only, where it can adopt orphans; otherwise, or if anything fails, a run starts
@@ -41,7 +41,7 @@ class WarmProcess:
         self.link, self.pid = link, pid
 
     def is_ready(self) -> bool:
-        """Return True if it can be copied; ConnectionError if it has gone."""
+        """True if it can be copied; ConnectionError if it has gone."""
         if self.pid is None:
             with suppress(BlockingIOError):
                 answer = self.link.recv(32, socket.MSG_DONTWAIT)
@@ -141,9 +141,6 @@ def _end(keepers: dict[Any, WarmProcess]) -> None:
         keepers.popitem()[1].end()
 
 
-# ---- in the warm processes ----------------------------------------------------------------------
-
-
 def begin() -> NoReturn:
     gc.disable()
     link = socket.socket(fileno=os.dup(0))
@@ -217,7 +214,7 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
 
 
 def _is_clean() -> bool:
-    """Return True if only the program itself has run here."""
+    """True if only the program itself has run here."""
     from karamelo_py.language import registry
 
     return NOT_OURS not in sys.modules and not registry.foreign()

@@ -1,11 +1,10 @@
 """Bases: the nodes in a point's stencil, with weights and gradients. One file each.
 
-A basis is a NamedTuple of parameters (its class is the tag), with `traits` and the point functions
-declared here. `grid` is the point's :class:`~karamelo_py.points.grid.Grid`; `place` a flat tuple of
-its position and the stored shape of its domain (nothing, half sizes, corners ...); `stencil` the
-result of `locate`. A product of one function per direction only needs `along` and
-:func:`karamelo_py.points.basis.product.register`. A basis with corners has an `element`
-(:class:`~karamelo_py.points.basis.cpdi.Element`).
+A basis is a NamedTuple of parameters (its class is the tag) with `traits` and the point functions
+declared here. `grid` is the point's :class:`~karamelo_py.points.grid.Grid`, `place` a flat tuple of
+its position and the stored shape of its domain, `stencil` the result of `locate`. Products of one
+function per direction only need `along` and :func:`karamelo_py.points.basis.product.register`;
+bases with corners an `element` (:class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
 from math import inf
@@ -16,35 +15,32 @@ from karamelo_py.points.noise import DriftLimits
 
 
 class BasisTraits(NamedTuple):
-    cells: int  # spanned by the nodes of all points of a cell; 1: the cell's corners only
-    least_nodes: int  # of the grid per direction
-    steady_moment: bool  # D of the affine transfers is nowhere near zero
-    # |grad N|^2 / N exceeds 2 / h^2 per direction where a weight vanishes: usl limits the effect of
-    # light nodes on the strain.
+    cells: int  # spanned by the nodes of all points of a cell
+    least_nodes: int  # per direction
+    steady_moment: bool  # D of the affine transfers stays away from zero
+    # |grad N|^2 / N exceeds 2 / h^2 where a weight vanishes: usl limits the strain by light nodes.
     steep_edge: bool
     nodes_per_cell: int = 1  # 2 with nodes between the corners of cells
-    # At cell faces. Points that cross cells then add energy to a body, less with a smaller step.
+    # At cell faces: crossing points then add energy, less with a smaller step.
     gradient_jumps: bool = False
-    # Stable step over h/c while points stay at their positions: in the updated frame, its bound if
-    # the strain comes before the forces (usf), in the total frame.
+    # Stable step over h/c of points at rest: updated frame, updated with the strain first (usf),
+    # total.
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
-    # Stiffness of a point alone at its nodes, for smooth gradients: h^2 / D, and the largest h^2
-    # sum_I |grad N_I|^2 / N_I per direction, away from walls.
+    # h^2 / D, and the largest h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls:
+    # stiffness of a point alone at its nodes.
     lone: tuple[float, float] | None = None
     bears_drift: bool = False  # drifting bodies conserve energy with the step of bodies at rest
-    drift_limits: DriftLimits | None = (
-        None  # limits of drift and rotation; None: as similar functions
-    )
-    # Stored parts of a point's domain, in order: ``half_size`` (d numbers), ``half_edges`` (d
-    # vectors), ``deformation`` (F in 2D or 3D), ``corners`` (of the basis's `element`).
+    drift_limits: DriftLimits | None = None  # None: as similar bases
+    # Stored parts of a domain, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
+    # ``deformation`` (F in 2D or 3D), ``corners`` (of the basis's `element`).
     shape: tuple[str, ...] = ()
 
 
 @point_function()
 def locate(basis, kin, grid, place):
-    """Stencil of a point: what the functions below need, computed once per point."""
+    """Stencil of a point: data for the functions below, computed once per point."""
 
 
 @point_function()
@@ -56,14 +52,14 @@ def support(basis, kin):
 def entry(basis, kin, grid, stencil, k):
     """(node number, weight N, gradient of N) of the k-th node of a stencil.
 
-    The gradient is a vector; in axisymmetry followed by N / r (`Gradient` of the kinematics). A
-    node may occur more than once: its parts are summed.
+    In axisymmetry N / r follows the gradient (`Gradient` of the kinematics). Parts of a repeated
+    node are summed.
     """
 
 
 @point_function()
 def reach(basis, kin, grid, stencil, k):
-    """X_I - x, from the point to the k-th node of its stencil."""
+    """X_I - x of the k-th node."""
 
 
 @point_function()
@@ -73,20 +69,20 @@ def affine_weight(basis, kin, grid, stencil, k):
 
 @point_function(otherwise=True)
 def walled(basis, faces):
-    """The basis, modified at walls inside the grid, too (`splines.AtWalls`)."""
+    """The basis, modified at walls inside the grid (`splines.AtWalls`)."""
     return basis
 
 
 @point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
-    """The part of the affine moment in MUSL's second mapping to the nodes."""
+    """Part of the affine moment used in MUSL's second mapping."""
     return moment
 
 
 def without_moment(basis, grid, moment):
-    """No moment in the second mapping: B D^-1 is unbounded where D vanishes.
+    """No moment in MUSL's second mapping, because B D^-1 is unbounded where D vanishes.
 
-    The velocity that deforms the points omits it; the points retain B.
+    Points retain B, but their deformation omits it.
     """
     return (grid.h - grid.h) * moment
 
@@ -95,9 +91,6 @@ def without_moment(basis, grid, moment):
 def first_node(basis, like):
     """Offset to a position in cells whose integer part is then the first node."""
     return 0
-
-
-# --- the shape of a point's domain ------------------------------------------------------------
 
 
 def shape_size(basis: type, d: int) -> int:
@@ -114,13 +107,13 @@ def blank(basis, kin, x):
 
 @point_function(otherwise=True)
 def deformed(basis, kin, place, dl):
-    """`place` after dl = dt grad v: its shape changes, not its position."""
+    """`place` with its shape deformed by dl = dt grad v."""
     return place
 
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """Reach in cells of the domain's corners, or of the nodes they scatter to; or 0."""
+    """Cells that the domain's corners, or the nodes they scatter to, may reach."""
     return grid.h - grid.h
 
 
@@ -138,7 +131,7 @@ def placed(basis, kin):
 
 @point_function(otherwise=True)
 def carrier(basis, kin, grid, stencil, corner):
-    """Nodes that carry a corner, and their weights: a :class:`Weighted`."""
+    """Nodes and weights that carry a corner: a :class:`Weighted`."""
     return ()
 
 

@@ -11,9 +11,8 @@ from karamelo_py.points.grid import cells_along, in_cells
 class BernsteinQuadratic(NamedTuple):
     """Quadratic Bernstein polynomials (de Vaucorbeil, Nguyen & Hutchinson 2020).
 
-    Nodes every h/2: four times as many in 2D. The stencil is the point's cell. Weights are not
-    negative, but gradients jump at cell faces, as in a linear basis. Meant for method tlmpm, where
-    no point crosses a face.
+    Nodes every h/2: four times as many in 2D. Weights are not negative, but gradients jump at cell
+    faces, as in a linear basis: use it with tlmpm, where no point crosses a face.
 
     Example
     -------
@@ -50,7 +49,7 @@ def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     twice = grid.inv_h + grid.inv_h
     weights = (t * t, (s + s) * t, s * s)
     gradients = (-twice * t, twice * (t - s), twice * s)
-    # D = s (1 - s) h^2 / 2 vanishes at corners; N D^-1 (X - x) is the gradient everywhere.
+    # D = s (1 - s) h^2 / 2 vanishes at corners; N D^-1 (X - x) is the gradient.
     return Along(i + i, s, weights, gradients, gradients)
 
 

@@ -1,4 +1,4 @@
-"""GIMP: hat functions averaged over a point's box, which may deform with it."""
+"""GIMP: hat functions averaged over a point's box."""
 
 from types import MappingProxyType
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 
-# Range of half sizes for weights, in cells.
+# Bounds of half sizes for weights, in cells.
 LEAST = 1e-3
 MOST = 1.0
 STRETCHED = "half_size", "half_size", "deformation"  # present and initial, F
@@ -29,9 +29,9 @@ class _Box(NamedTuple):
 class UGIMP(_Box):
     """Uniform GIMP: each point has a box of constant size (Bardenhagen & Kober 2004).
 
-    Weights are averages of the linear basis over [x - l, x + l] per direction, l the initial half
-    size. At large stretch gaps open between boxes, unlike with cpgimp. A wall cuts the box; the
-    point then acts from the centre of the rest.
+    Weights average the linear basis over [x - l, x + l] per direction, l the initial half size. At
+    large stretch gaps open between boxes, unlike with cpgimp. A wall cuts the box; the point then
+    acts from the centre of the rest.
 
     Example
     -------
@@ -40,13 +40,13 @@ class UGIMP(_Box):
 
 
 class _Following(_Box):
-    """Base of boxes that follow the deformation."""
+    pass
 
 
 class CPGIMPDet(_Following):
     """Boxes of constant shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
 
-    Unchanged by rotation; a stretch in one direction is distributed to all equally.
+    Unchanged by rotation; a stretch in one direction is spread over all.
 
     Example
     -------
@@ -57,9 +57,9 @@ class CPGIMPDet(_Following):
 
 
 class CPGIMPDiagonal(_Following):
-    """Boxes with the half sizes l0 |F_ii|, for bodies that do not rotate.
+    """Boxes with half sizes l0 |F_ii|, for bodies that do not rotate.
 
-    Rotated by 90 degrees, the boxes vanish: the basis `linear`.
+    Rotated by 90 degrees they vanish, which leaves the linear basis.
 
     Example
     -------
@@ -82,7 +82,7 @@ known_failure(
 
 
 class CPGIMPStretch(_Following):
-    """Boxes with the half sizes l0 U_ii, with the right stretch U = sqrt(F^T F).
+    """Boxes with half sizes l0 U_ii, U = sqrt(F^T F) the right stretch.
 
     Unchanged by rotation (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit generalised
     interpolation material point method for large deformations").
@@ -99,10 +99,10 @@ class CPGIMPStretch(_Following):
 class CPGIMPCorners(_Following):
     """Boxes as wide as the mean distance of their corners, which the grid moves.
 
-    l_i <- l_i + sum_c s_ci u_ci / 2^d, with the displacements u of the 2^d corners c and their
-    sides s_ci = -1 or 1 in direction i (after Coombs et al. 2020, "On Lagrangian mechanics and the
-    implicit material point method for large deformation elasto-plasticity"). Beyond a wall the
-    velocity of the last cell is extrapolated.
+    l_i <- l_i + sum_c s_ci u_ci / 2^d, with displacements u of the 2^d corners c and sides s_ci =
+    -1 or 1 (after Coombs et al. 2020, "On Lagrangian mechanics and the implicit material point
+    method for large deformation elasto-plasticity"). Beyond a wall the velocity of the last cell is
+    extrapolated.
 
     Example
     -------
@@ -113,20 +113,19 @@ class CPGIMPCorners(_Following):
 
 
 class CPGIMP(_Box):
-    """Contiguous-particle GIMP: each point has a box that deforms with it.
+    """Contiguous-particle GIMP: ugimp with boxes that deform (Bardenhagen & Kober 2004).
 
-    Like ugimp, but the box follows the deformation (Bardenhagen & Kober 2004): ``det`` (its
-    volume), ``diagonal`` (F_ii; vanishes in a rotation by 90 degrees), ``stretch`` (U_ii of the
-    right stretch, the default) or ``corners`` (which move with the grid). Boxes stay aligned with
-    the axes; for large shear use a cpdi method.
+    The box follows ``det`` (the volume), ``diagonal`` (F_ii; vanishes when rotated by 90 degrees),
+    ``stretch`` (U_ii of the right stretch, the default) or ``corners`` (moved by the grid). Boxes
+    stay aligned with the axes; for large shear use a cpdi method.
 
-    Weights use half sizes between 0.001 and 1 cell; beyond, the body fractures numerically. In
-    total Lagrangian methods no box deforms, and cpgimp equals ugimp.
+    Half sizes are limited to 0.001 to 1 cell; beyond, the body fractures numerically. In total
+    Lagrangian methods no box deforms: cpgimp equals ugimp.
 
     Parameters
     ----------
     variant
-        How the box follows the deformation.
+        How the box deforms.
 
     Example
     -------
@@ -146,10 +145,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, place, direction, halves):
-    """Centre and ends of a domain along one direction, in cells, before cuts at walls.
-
-    `halves` bound its half size.
-    """
+    """Centre and ends of a box in one direction, in cells, uncut; `halves` bound its half size."""
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
@@ -165,10 +161,7 @@ def in_cell(lo, hi, j):
 
 
 def averaged_hats(cells, grid, first, lo, hi):
-    """Hats from node `first`, averaged over [lo, hi].
-
-    Lengths are in cells from that node; the domain lies within `cells` from it.
-    """
+    """Hats from node `first`, averaged over [lo, hi] (in cells from it, within `cells`)."""
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
     between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
@@ -210,10 +203,7 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
 
 
 def _end(at, first, top):
-    """Cell, from node `first`, of an end of a box, and the position in it.
-
-    Beyond a wall: the cell at the wall, at most the `top`-th.
-    """
+    """Cell of a box's end, from node `first`, and the position in it; at most the `top`-th cell."""
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i
@@ -223,7 +213,6 @@ def _end(at, first, top):
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
-# --- boxes ------------------------------------------------------------------------------------
 # F in 2D is enough: axisymmetric points need no part around the axis.
 
 
@@ -244,9 +233,8 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
     return (*place[:d], *half, *start, *F)
 
 
-# --- corners ----------------------------------------------------------------------------------
-# Bit k of a corner's number: its side of the point in direction k; of a carrying node's number: its
-# side of the cell.
+# Bit k of a corner's number is its side in direction k; of a carrying node's number, its side of
+# the cell.
 
 
 @bases.carried.on(CPGIMPCorners)

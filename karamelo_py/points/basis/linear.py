@@ -17,8 +17,8 @@ TOLD = 0.03  # loss of stress that gives a warning
 class Linear(NamedTuple):
     """Linear hat functions on the nodes: the basis of the original MPM (Sulsky et al. 1994).
 
-    The cheapest basis. Its gradient jumps at cell faces: a stressed point that crosses one changes
-    nodal forces by the order of its stress (cell-crossing error).
+    The cheapest basis. Its gradient jumps at cell faces: when a stressed point crosses one, nodal
+    forces jump too (cell-crossing error).
 
     Example
     -------
@@ -105,9 +105,8 @@ def _along_linear(basis, kin, grid, place, direction):
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face is in the last cell
     r = a - i
     gradients = (-grid.inv_h, grid.inv_h)
-    # D = r (1 - r) h^2 vanishes at the nodes, but N D^-1 (X - x) is the gradient everywhere
-    # (Jiang, Schroeder & Teran 2017, "An angular momentum conserving affine-particle-in-cell
-    # method", section 5.3).
+    # D = r (1 - r) h^2 vanishes at nodes; N D^-1 (X - x) is the gradient (Jiang, Schroeder & Teran
+    # 2017, "An angular momentum conserving affine-particle-in-cell method", section 5.3).
     return Along(i, r, (1 - r, r), gradients, gradients)
 
 

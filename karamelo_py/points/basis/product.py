@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import gradient, product, vector
 
 
 class Along(NamedTuple):
-    first: int  # number of the first node in this direction
+    first: int  # number of the first node
     r: float  # distance from it, in cells
     weights: tuple[float, ...]  # N
     gradients: tuple[float, ...]  # dN/dx
@@ -38,7 +38,7 @@ def with_one_node(stencil):
 
 @point_function()
 def along(basis, kin, grid, place, direction):
-    """Nodes of a stencil in one direction: an :class:`Along`."""
+    """The :class:`Along` of a stencil in one direction."""
 
 
 @point_function(otherwise=True)
@@ -66,14 +66,14 @@ def evenly(basis, grid, stencil):
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """Gradient of a weight; around an axis or centre followed by N / r, there by dN/dr."""
+    """Gradient of a weight; around an axis or centre followed by N / r, at r = 0 by dN/dr."""
     if kin.hoops:
         slopes = (*slopes, *[where(inv_r > 0, weight * inv_r, slopes[0])] * kin.hoops)
     return gradient(kin, slopes)
 
 
 def inverse_radius(r):
-    """1 / r, or 0 where r is so small that 1 / r would overflow."""
+    """1 / r, or 0 where 1 / r would overflow."""
     return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
@@ -110,7 +110,7 @@ def digits(k, base, d):
 
 
 def item(values, k):
-    """values[k], for a k known only at run time."""
+    """values[k], k known only at run time."""
     return values[k]
 
 
@@ -162,7 +162,7 @@ def _affine_weight_product(basis, kin, grid, stencil, k):
 
 
 def register(basis: type, width: int) -> None:
-    """Give `basis` (a class with `along`, `width` nodes per direction) all point functions."""
+    """Define all point functions of `basis`, which has `along` and `width` nodes per direction."""
     basis.line_nodes = width
     locate.on(basis)(_locate_product)
     support.on(basis)(_support_product)

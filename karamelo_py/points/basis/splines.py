@@ -1,7 +1,6 @@
-"""B-splines, modified at the walls of the grid: three or four nodes per direction.
+"""B-splines, modified at walls: three or four nodes per direction.
 
-Nodes held inside the grid make walls, too (:class:`AtWalls`, a separate class: without such walls
-there is no cost).
+Walls inside the grid have separate classes (:class:`AtWalls`): a scene without them pays nothing.
 """
 
 from typing import NamedTuple
@@ -45,9 +44,8 @@ def hats(grid, a, cell, first, count):
 class QuadraticSpline(NamedTuple):
     """Quadratic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    Continuous gradients: no cell-crossing error. Nine nodes in 2D (linear: four). Linear
-    extrapolation to the node beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives linear hats within
-    half a cell of it.
+    Continuous gradients: no cell-crossing error. Nine nodes in 2D (linear: four). Extrapolation
+    beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives linear hats within half a cell of it.
 
     Example
     -------
@@ -55,8 +53,8 @@ class QuadraticSpline(NamedTuple):
     """
 
     in_lanes = True
-    # courant_still from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5 in
-    # 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
+    # courant_still, from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5
+    # in 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios to 0.49.
     traits = BasisTraits(
         cells=3,
         least_nodes=3,
@@ -98,7 +96,7 @@ def in_bulk(basis, grid, line, direction):
 
 @product.affine_along.on(QuadraticSpline)
 def _affine_along_quadratic_spline(basis, grid, line, direction):
-    # D = h^2 / 4. For hat functions, N D^-1 (X - x) is the gradient.
+    # D = h^2 / 4. For hats, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
     affine = tuple([four * (k - line.r) * weight for k, weight in enumerate(line.weights)])
     return where(in_bulk(basis, grid, line, direction), affine, line.gradients)
@@ -126,11 +124,11 @@ product.register(QuadraticSpline, 3)
 
 
 class QuadraticSplineAtWalls(AtWalls):
-    """Quadratic B-splines with walls inside the grid."""
+    pass
 
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
-    """Give `of`, a basis with walls inside the grid, the functions of `basis` without them."""
+    """Give `of`, for walls inside the grid, the functions of `basis`."""
     of.traits = basis.traits
 
     @walled.on(basis)
@@ -153,8 +151,8 @@ of_splines(
 class CubicSpline(NamedTuple):
     """Cubic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    The smoothest and most costly spline: 16 nodes in 2D, 64 in 3D. Linear extrapolation of nodal
-    values beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives their four types of boundary functions.
+    The smoothest and most costly spline: 16 nodes in 2D, 64 in 3D. Extrapolation beyond a wall,
+    phi(-1) = 2 phi(0) - phi(1), gives the boundary functions.
 
     Example
     -------
@@ -162,13 +160,12 @@ class CubicSpline(NamedTuple):
     """
 
     in_lanes = True
-    # courant_total: the shortest waves are nearly averaged away. A shaken block is stable up to 2.1
-    # to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D and 1.4 to 2.3 in 3D (Poisson's
-    # ratio 0.45 and 0). courant_still, from the highest frequency of a free block: 1.9 to 2.7, 1.84
-    # to 2.6 and 1.46 to 2.7, over positions, spacings, walls and ratios up to 0.49.
-    # courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the longer
-    # step, 1 % with 0.9 h/c. No instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at 0.03,
-    # none at 0.001), but strains then lacked (dt grad v)^2. Not measured since.
+    # courant_total: the shortest waves are nearly averaged away; a shaken block is stable up to 2.1
+    # to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's
+    # ratio 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to
+    # 2.7. courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the
+    # longer step, 1 % with 0.9 h/c. No instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at
+    # 0.03, none at 0.001), but strains then lacked (dt grad v)^2. Not measured since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,
@@ -229,7 +226,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     """
     last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)
-    between = hats(grid, a, cell, first, 4)  # the functions between two walls
+    between = hats(grid, a, cell, first, 4)  # between two walls
     between = between._replace(affine=between.gradients)
     if last == 1:
         return between
@@ -250,8 +247,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
 def next_to_wall(grid, t):
     """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall, `t` cells away.
 
-    The ghost node changes D to h^2 t (1 - t + t^2/3), which vanishes at the wall, but t cancels out
-    of N D^-1 (X - x).
+    The ghost node changes D to h^2 t (1 - t + t^2/3); t cancels out of N D^-1 (X - x).
     """
     tt = t * t
     weights = (1 - t + 1 / 6 * tt * t, t * (1 - 1 / 3 * tt), 1 / 6 * tt * t)
@@ -266,7 +262,7 @@ product.warn_of_many_nodes(CubicSpline)
 
 
 class CubicSplineAtWalls(AtWalls):
-    """Cubic B-splines with walls inside the grid."""
+    pass
 
 
 of_splines(CubicSpline, CubicSplineAtWalls, (product.along,))

@@ -1,4 +1,4 @@
-"""Distance of a body's surface from a node, from sums over its points at the node."""
+"""Distance of a body's surface from a node, from sums over its points."""
 
 from typing import NamedTuple
 
@@ -13,10 +13,9 @@ ENTRIES = 256  # of a table, per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positions, in cells from a node, and the node's weights there.
+    """Positions in cells from a node, and its weights there, averaged over point domains if any.
 
-    `half`: half a point's size in cells. For bases with point domains, hats are averaged over a
-    domain.
+    `half`: half a point's size in cells.
     """
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
@@ -37,12 +36,13 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Distance of a plane surface from a node, by the mean position of the body's points there.
+    """Distance of a plane surface from a node, by the mean position of the body's points at the
+    node.
 
-    Points of equal mass lie in layers below the surface, the first at half their size; both
-    distances are in cells along the outward normal. Row k belongs to a mean of k / ENTRIES - 3
-    (after Nairn 2013, "Modeling imperfect interfaces in the material point method using
-    multimaterial methods", CMES 92(3), section 4, who uses a power law). `half` as in `profile`.
+    Points of equal mass lie in layers below the surface, the first at half their size; distances
+    are in cells along the outward normal. Row k: a mean of k / ENTRIES - 3 (after Nairn 2013,
+    "Modeling imperfect interfaces in the material point method using multimaterial methods", CMES
+    92(3), section 4, who uses a power law).
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:

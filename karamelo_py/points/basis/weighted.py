@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class Weighted(NamedTuple):
-    """Rows of an array used as one: reading gives their weighted sum, writing distributes."""
+    """Rows of an array used as one: reading sums them by weight, writing distributes."""
 
     rows: tuple[int, ...]
     weights: tuple[float, ...]

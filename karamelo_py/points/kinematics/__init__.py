@@ -3,20 +3,17 @@
 ================  ==============  =============================  =================================
 tag               vector          velocity gradient, F           symmetric tensor (stress, strain)
 ================  ==============  =============================  =================================
-``Line``          x               xx                             xx yy zz
-``PlaneStrain``   x y             xx xy yx yy                    xx yy zz xy
-``Axisymmetric``  r z             rr rz zr zz tt                 rr zz tt rz
-``Cylindrical``   r               rr tt                          rr tt zz
-``Spherical``     r               rr tt pp                       rr tt pp
-``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
-================  ==============  =============================  =================================
+``Line``          x               xx                             xx yy zz ``PlaneStrain``   x y
+xx xy yx yy                    xx yy zz xy ``Axisymmetric``  r z             rr rz zr zz tt
+rr zz tt rz ``Cylindrical``   r               rr tt                          rr tt zz ``Spherical``
+r               rr tt pp                       rr tt pp ``Space``         x y z           xx xy xz
+yx yy yz zx zy zz     xx yy zz xy xz yz ================  ==============
+=============================  =================================
 
 The gradient of a basis function has the components of a vector, and N/r for each direction around
-an axis or a centre: it gives the hoop strain, and the force of the hoop stress. The tags are empty
-NamedTuples, and kernels are compiled for each of them, without branches. Each tag has its own
-classes, NamedTuples of the components that exist, so objects know their kinematics. Kernels are
-traced: loops, classes and operators here cost nothing at run time. A number times a tensor added to
-another tensor is rounded once (`fma`): a + dt * b.
+an axis or centre (hoop strain and force). Tags are empty NamedTuples with classes of vectors and
+tensors; kernels are compiled for each tag. They are traced, so loops, classes and operators here
+cost nothing at run time. a + dt * b of tensors is rounded once (`fma`).
 """
 
 from collections import namedtuple
@@ -30,13 +27,10 @@ from karamelo_py.compiler import algebra, fma, real
 COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 
 
-# --- tags ----------------------------------------------------------------------------------------
-
-
 class Line(NamedTuple):
     word = "1D"
-    per = ""  # what forces, masses and energies refer to
-    hoops = 0  # directions around an axis or a centre; x is the distance from it
+    per = ""  # unit of forces, masses and energies
+    hoops = 0  # directions around an axis or centre; x is the distance from it
     dimension = 1
     tensor_size = 1
     tensor_names = ("11",)
@@ -106,12 +100,12 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 def free_from(kin):
-    """First direction along which a body may translate: not the radius."""
+    """First direction in which a body may translate: not the radius."""
     return 1 if kin.hoops else 0
 
 
 def planar(kin):
-    """The tag whose tensors are d x d matrices over the same vectors: no hoop component."""
+    """Tag of d x d matrices over the same vectors, without hoop components."""
     return kin.plane
 
 
@@ -135,20 +129,17 @@ def dot(*vectors):
     return total([product(components) for components in zip(*vectors, strict=True)])
 
 
-# --- base of vectors and tensors ---------------------------------------------------------------
-
-
 class Elements(tuple):
     """Components that exist in a kinematics `kin`.
 
-    `places` are row and column of each component (for vectors the direction, twice), from 0; `axes`
-    the indices of rows. Tensors also have `acting`, which is `places` with the direction that a row
-    acts along (the radius for hoop components), and `rows`: for each direction, index and column of
-    the components that act along it, the last first.
+    `places`: row and column of each component (of vectors: the direction, twice), from 0. `axes`:
+    indices of rows. Of tensors also `acting` (`places` with the direction in which a row acts, the
+    radius for hoop components) and `rows` (per direction, index and column of the components that
+    act along it, the last first).
     """
 
     __slots__ = ()
-    __array_ufunc__ = None  # products with NumPy numbers are left to these classes
+    __array_ufunc__ = None  # leave products with NumPy numbers to these classes
     origin = None  # of a product: the function that adds it with one rounding, and its factors
 
     def __add__(self, other):
@@ -233,11 +224,8 @@ algebra(Isotropic)
 I = Isotropic(1)  # noqa: E741
 
 
-# --- vectors ----------------------------------------------------------------------------------
-
-
 class Vector(Elements):
-    """A vector, or the gradient of a basis function (followed by N/r around an axis or centre)."""
+    """A vector, or the gradient of a basis function (with N/r around an axis or centre)."""
 
     __slots__ = ()
 
@@ -249,9 +237,6 @@ class Vector(Elements):
 
     def largest(self):
         return max(*map(abs, self)) if len(self) > 1 else abs(self[0])
-
-
-# --- tensors ----------------------------------------------------------------------------------
 
 
 class Matrix(Elements):
@@ -301,7 +286,7 @@ class Tensor(Matrix):
         return self if made is type(self) else made._make(self[: len(made.places)])
 
     def generator(self):
-        """The matrix that gives strain and rotation of this increment, dt grad v."""
+        """Matrix of this increment's strain and rotation: dt grad v."""
         return self
 
     def strain_at_end(self):
@@ -309,7 +294,7 @@ class Tensor(Matrix):
         return sym(self)
 
     def after(self, dl):
-        """(I + dl) F, computed as F + dl F to preserve the digits of small increments."""
+        """(I + dl) F as F + dl F, which preserves the digits of small increments."""
         a, b = dl.at(), self.at()
         return self._make(
             [
@@ -318,7 +303,7 @@ class Tensor(Matrix):
             ]
         )
 
-    # If a kinematics has no component F_ii, F_ii is 1.
+    # Without a component F_ii, F_ii is 1.
 
     def left_cauchy_green(self):
         a = self.at()
@@ -334,7 +319,7 @@ class Tensor(Matrix):
         In 2D U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
         1984, J. Elasticity 14). In 3D Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
         rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius
-        norms). Unlike closed forms it is accurate to round-off for equal principal stretches too.
+        norms): accurate to round-off for equal stretches too, unlike closed forms.
         """
         if self.kin.dimension == 3:
             r = self
@@ -375,8 +360,7 @@ def further_terms(squared):
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
-# Four steps reach round-off for ratios of principal stretches up to 2, seven for any F that can be
-# inverted.
+# Four steps reach round-off for ratios of principal stretches to 2, seven for any invertible F.
 POLAR_STEPS = 7
 
 
@@ -394,7 +378,7 @@ def determinant(a, d):
 
 
 def squares(a, axes, i, j):
-    """a_ik a_jk; 1 if there is no such component."""
+    """a_ik a_jk; 1 without such a component."""
     terms = [a[i, k] * a[j, k] for k in axes if (i, k) in a and (j, k) in a]
     return total(terms) if len(terms) else 1
 
@@ -445,16 +429,15 @@ class SymmetricTensor(Matrix):
         return a | {(j, i): value for (i, j), value in a.items()}
 
     def mean_of_stretching(self):
-        """Mean over the directions that can stretch."""
         axes = self.kin.Tensor.axes
         return total([self[i] for i in axes]) / len(axes)
 
     def turned(self, dl):
         """Rotate by the increment dl: R s R^T with its rotation R, objective (Jaumann).
 
-        R rotates about w = axial(skew(dl)), by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
-        |w|^2/12): orthogonal to round-off, with an angle error of |w|^5/120 (Hughes & Winget 1980
-        use tan(|w|/2) ~ |w|/2, with |w|^3/12). A `LargeIncrement` uses two more terms.
+        R rotates about w = axial(skew(dl)) by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
+        |w|^2/12): orthogonal to round-off, angle error |w|^5/120 (Hughes & Winget 1980 use
+        tan(|w|/2) ~ |w|/2, error |w|^3/12). A `LargeIncrement` uses two more terms.
         """
         if self.kin.dimension == 1:
             return self
@@ -471,8 +454,8 @@ class SymmetricTensor(Matrix):
         scale = 1 / (1 + tt)
         cosine = (1 - tt) * scale
         sine = (t + t) * scale
-        # The in-plane deviator rotates by twice the angle; written as a change, which is exactly
-        # zero without rotation.
+        # The in-plane deviator rotates by twice the angle; as a change, exactly zero without
+        # rotation.
         double_sine = 2 * sine * cosine
         double_versine = -2 * sine * sine
         apart = 0.5 * (xx - yy)
@@ -515,13 +498,13 @@ class SymmetricTensor(Matrix):
         return self._make([component(i, j) for i, j in self.places])
 
     def largest_row_sum(self):
-        """max_i sum_j |s_ij|: a bound of the largest eigenvalue (Gershgorin)."""
+        """max_i sum_j |s_ij|: bounds the largest eigenvalue (Gershgorin)."""
         a = self.at()
         rows = [[(i, i), *[(i, j) for j in range(3) if j != i]] for i in range(3)]
         return max(*[total([abs(a[place]) for place in row if place in a]) for row in rows])
 
     def smallest_row_difference(self):
-        """min_i (s_ii - sum_j |s_ij|), j not i: a bound of the smallest eigenvalue (Gershgorin)."""
+        """min_i (s_ii - sum_j |s_ij|), j not i: bounds the smallest eigenvalue (Gershgorin)."""
         a = self.at()
         rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
@@ -543,11 +526,8 @@ for _kind in (Elements, Vector, Matrix, Tensor, SymmetricTensor):
     algebra(_kind)
 
 
-# --- one class for each kinematics ------------------------------------------------------------
-
-
 def _class(kind: type, tag: type, names: tuple, around: tuple = ()) -> type:
-    """Make the class of tensors of a kinematics; for gradients, `around` names the hoop parts."""
+    """Make the class of tensors of a kinematics; `around` names the hoop parts of gradients."""
     words = [name.translate(_WORDS) for name in names] + [f"around_{k + 1}" for k in around]
     name = f"{tag.__name__}{kind.__name__}" + ("Gradient" if around else "")
     one = type(name, (kind, namedtuple(name, words)), {"__module__": __name__})
@@ -613,7 +593,7 @@ def nothing(kin):
 
 
 def zero(kin, like):
-    """The tensor 0, with numbers of the type of `like`, to start sums in loops."""
+    """The tensor 0, with the number type of `like`."""
     return kin.Tensor._make([real(0, like) for _ in kin.Tensor.places])
 
 
@@ -621,11 +601,7 @@ def zero_vector(kin, like):
     return kin.Vector._make([real(0, like) for _ in kin.Vector.places])
 
 
-# --- notation of formulas -------------------------------------------------------------------------
-
-
 def det(f):
-    """Determinant, with the hoop stretches."""
     a, d = f.at(), f.kin.dimension
     return product([determinant(a, d), *[a[i, i] for i in f.axes[d:]]])
 
@@ -663,7 +639,7 @@ def inner(s, e):
 
 
 def von_mises(s):
-    """sqrt(3/2 s:s) of a deviatoric tensor: |s_xx - s_yy| in uniaxial stress."""
+    """sqrt(3/2 s:s) of a deviator: |s_xx - s_yy| in uniaxial stress."""
     return sqrt(1.5 * inner(s, s))
 
 

@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Principal values (3,) of a symmetric tensor, unordered, and their directions."""
+    """Principal values (3,), unordered, and directions of a symmetric tensor."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -21,8 +21,8 @@ def principal(s):
 def from_principal(s, values, directions, slopes=None):
     """Symmetric tensor of the class of `s` from principal values and directions.
 
-    If each value is a function of the corresponding value of another tensor, `slopes` (3,) are its
-    derivatives, for derivatives at equal values.
+    `slopes` (3,): derivatives of values that are functions of another tensor's, for derivatives at
+    equal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)
@@ -65,8 +65,8 @@ _SWEEPS = 8
 
 
 def principal_in_space(s):
-    # Jacobi rotations (Golub & Van Loan 2013, section 8.5): unlike closed forms, accurate to
-    # round-off for equal principal values too.
+    # Jacobi rotations (Golub & Van Loan 2013, section 8.5): accurate to round-off for equal values
+    # too, unlike closed forms.
     a, b, c, d, e, f = s
     u, v, w = Space.Vector(1, 0, 0), Space.Vector(0, 1, 0), Space.Vector(0, 0, 1)
     enough = 1e-3 * round_off(a)
@@ -110,22 +110,21 @@ def exponential_of(s):
     return from_principal(s, exponentials, directions, exponentials)
 
 
-# Jacobi rotations stop when a tensor is diagonal, which its slopes need not be. With S' in the
-# frame of the principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b)
-# (n_a . S' n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section
-# 6.1).
+# Jacobi rotations stop when a tensor is diagonal; its slopes need not be. With S' in the frame of
+# principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S'
+# n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section 6.1).
 
 PAIRS = (0, 1), (0, 2), (1, 2)
 
 
 class TurningFrame(NamedTuple):
     directions: Any
-    shears: tuple  # n_a . S' n_b of the pairs of directions, for each slope
+    shears: tuple  # n_a . S' n_b of the pairs, for each slope
     apart: tuple  # s_a - s_b of the pairs
 
 
 def in_frame(s, directions):
-    """Components of a tensor in a frame: (3,) of the diagonal, and of the pairs."""
+    """Components in a frame: (3,) of the diagonal, and of the pairs."""
     if s.kin.dimension == 2:
         k, g = directions
         apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
@@ -138,7 +137,7 @@ def in_frame(s, directions):
 
 
 def out_of_frame(s, diagonal, shears, directions):
-    """Inverse of `in_frame`; of the class of `s`."""
+    """Inverse of `in_frame`, of the class of `s`."""
     if s.kin.dimension == 2:
         a, b, c = diagonal
         k, g = directions
@@ -171,14 +170,14 @@ def _principal_slopes(s):
 
 
 class PairLimits(NamedTuple):
-    """(f_a - f_b) / (s_a - s_b) of the pairs of principal values where they are equal."""
+    """(f_a - f_b) / (s_a - s_b) of pairs of equal principal values."""
 
     first: Any
     second: Any
     third: Any
 
 
-# For values closer than this fraction, mean slopes are more accurate than quotients of differences.
+# Relative difference below which mean slopes are more accurate than difference quotients.
 ALIKE = 1e-5
 
 

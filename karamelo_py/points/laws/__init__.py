@@ -1,17 +1,16 @@
-"""Constitutive laws of one point, one file each: the script style and the point functions.
+"""Constitutive laws of a point, one file each: the script style and its point functions.
 
-A law is a NamedTuple of parameters (its class is the tag), perhaps with parts, NamedTuples among
-its parameters (`eos_strength`). Its state is a NamedTuple of numbers and tensors with the
-components of the kinematics `kin` (`karamelo_py.points.kinematics`). `j` = det F is the volume over
-the reference volume.
+A law is a NamedTuple of parameters (its class is the tag); some are NamedTuples, its parts
+(`eos_strength`). Its state is a NamedTuple of numbers and tensors in the kinematics `kin`. `j` =
+det F is the volume over the reference volume.
 
-The class docstring is the manual. The arguments of the style are the annotated fields, or the
+The class docstring is the manual. Arguments of the style are the annotated fields, or the
 parameters of a classmethod `given`, which returns the law. `checked` refuses values that
-annotations cannot, and returns the law or an equivalent simpler one. Unusual traits are a class
-attribute ``traits`` (:class:`LawTraits`). `column` declares output columns.
+annotations cannot, and returns the law or an equivalent simpler one. ``traits``
+(:class:`LawTraits`) are a class attribute; `column` declares output columns.
 
-A law with ``in_lanes``, which all its parts need, is computed for several points at once. Its point
-functions branch on numbers of a point only with `where`; exceptions are listed in ``scalarised``.
+A law with ``in_lanes`` (all its parts need it) is computed for several points at once: its point
+functions branch only with `where`, except those listed in ``scalarised``.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ class LawTraits(NamedTuple):
     flows: bool = False  # holds no shape: liquids, soils
     rings: bool = True  # vibrates, unless it has no shear modulus
     any_speed: bool = False  # may move many times faster than its waves: gases
-    least_density: float = 10.0  # kg/m^3; lower values are likely in wrong units
+    least_density: float = 10.0  # kg/m^3; lower values suggest wrong units
     wraps: bool = False  # supports what the inner law does
 
 
@@ -65,9 +64,9 @@ def can(law: NamedTuple, function: Callable) -> bool:
 
 
 def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Let the law in the field `part` of an `outer` law, with the state `kept`, answer functions.
+    """Let the law in the field `part` of `outer`, with the state `kept`, answer functions.
 
-    They take (law), (law, like), or law, kinematics (or `kin` instead), state and others.
+    Their arguments: (law), (law, like), or law, kinematics (or `kin` instead), state and more.
     """
 
     def register(function: Callable, changes: bool) -> None:
@@ -107,7 +106,7 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def of_part(law, tag):
-    """Tag by which `law` shows the column `tag` of one of its parts."""
+    """Tag by which `law` shows the column `tag` of a part."""
     return tag
 
 
@@ -118,7 +117,7 @@ def shown(tag, law, kin, state):
 
 @point_function(otherwise=True)
 def shown_by(law, kin, state, tag):
-    """Value of the column of a law, or of the law within."""
+    """Value of a column of a law, or of the law within."""
     return shown(tag, law, kin, state)
 
 
@@ -134,7 +133,7 @@ def _shown_within(tag, law, kin, state):
 def number(function: Callable) -> Callable:
     """Make a point function of (law, kin, state) an output column.
 
-    The function's module stores the class of its tag: cached kernels import it.
+    The function's module stores the tag's class: cached kernels import it.
     """
     name = f"{function.__name__}_tag"
     tag_class = namedtuple(name, (), module=function.__module__)
@@ -188,12 +187,12 @@ def jacobian(law, kin, state):
 
 @point_function()
 def deformation(law, kin, state):
-    """F, for laws whose state holds it."""
+    """F, for laws whose state has it."""
 
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """Check whether a law sums strains, so load steps need their logarithm: a constant."""
+    """Check whether a law sums strains, so load steps need their logarithm; a constant."""
     return True
 
 
@@ -234,7 +233,7 @@ def energy_density(law, kin, state):
 
 @point_function(otherwise=True)
 def constrained_velocity(law, v, v_grid):
-    """Velocity of a point after a step: `v_grid`; rigid bodies retain v."""
+    """Velocity after a step: `v_grid`; rigid bodies retain v."""
     return v_grid
 
 
@@ -282,7 +281,7 @@ def heat_capacity(law, like):
 
 @point_function(otherwise=True)
 def lit(law, kin, state, since):
-    """State of an explosive that was lit so long ago; unchanged for other laws."""
+    """State of an explosive lit `since` this time; unchanged for other laws."""
     return state
 
 

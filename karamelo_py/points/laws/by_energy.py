@@ -1,9 +1,9 @@
-"""Hyperelastic laws given by their stored energy, a formula.
+"""Hyperelastic laws given by a formula of their stored energy.
 
-The formula is differentiated once, when a script defines the material. Its structure is in the
-class of the law, so kernels contain it as code; its numbers are parameters. Laws that differ only
-in numbers share kernels, unless some of these are equal or small whole exponents. Formulas of
-invariants are computed in lanes; formulas of principal stretches take points one by one.
+The formula is differentiated when a script defines the material. Its structure is in the class of
+the law, so kernels contain it as code; its numbers are parameters. So laws that differ only in
+numbers have common kernels, unless some are equal or small whole exponents. Formulas of invariants
+are computed in lanes, formulas of principal stretches point by point.
 """
 
 from collections import namedtuple
@@ -44,8 +44,6 @@ WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
 OF_TWO = ("+", "-", "*", "/", "^", "max", "min", ">=")
 
 Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
-
-# --- stack programs -----------------------------------------------------------------------------
 
 
 class _ProgramWriter:
@@ -105,7 +103,7 @@ def whole_power(a, n):
 
 
 def evaluated(code, law, arguments):
-    """Value of a stack program at `arguments`, with the numbers of a law; 0 of no program."""
+    """Value of a stack program at `arguments`; 0 without a program."""
     if not len(code):
         return 0
     stack = ()
@@ -125,11 +123,8 @@ def evaluated(code, law, arguments):
     return stack[0]
 
 
-# --- the law ------------------------------------------------------------------------------------
-
-
 class ByEnergy(OfDeformation):
-    """Base of laws with a stored energy; one class for each formula."""
+    """Base of laws with a stored energy; one class per formula."""
 
     __slots__ = ()
     traits = LawTraits(rebounds=True)
@@ -231,7 +226,7 @@ def _along_fibres(term: Term, writer: _ProgramWriter) -> dict[str, Any]:
 
 
 def _class_of(kind: type, codes: dict, count: int) -> type:
-    """The class of laws with these programs; a digest of them is its name."""
+    """Class of laws with these programs, named by their digest."""
     name = f"{kind.__name__}_{sha256(repr((codes, count)).encode()).hexdigest()[:16]}"
 
     def made() -> type:
@@ -315,9 +310,6 @@ def first_instability(law: NamedTuple) -> tuple[str, float] | None:
                     unstable.append((abs(np.log(x)), path, float(x)))
                     break
     return min(unstable)[1:] if unstable else None
-
-
-# --- of invariants ------------------------------------------------------------------------------
 
 
 def squared(s):
@@ -418,9 +410,6 @@ def shear_of_matrix(law, b, at):
     return 2 * (1 + x) * (W1 + y * W2) + stiffer
 
 
-# --- of principal stretches ---------------------------------------------------------------------
-
-
 def stretches_of(b):
     values, directions = real_principal(b)
     return tuple([sqrt(x) for x in values]), directions
@@ -441,7 +430,7 @@ CLOSE = 1e-5  # squares of stretches that count as equal
 
 
 def limits_of(law, at, slopes):
-    """(tau_a - tau_b) / (l_a^2 - l_b^2) of the pairs of stretches, where they are equal."""
+    """(tau_a - tau_b) / (l_a^2 - l_b^2) of pairs of equal stretches."""
     W11, W12, W13, W22, W23, W33 = [evaluated(code, law, at) for code in law.second]
     twice = (W11 + W22 - 2 * W12, W11 + W33 - 2 * W13, W22 + W33 - 2 * W23)
     each = zip(PAIRS, twice, strict=True)

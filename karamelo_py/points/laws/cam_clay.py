@@ -53,19 +53,18 @@ class CamClay(NamedTuple):
     -----
     Stresses are Kirchhoff stresses, J times Cauchy: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with
     the logarithmic elastic strain e. Yield surface: q^2/M^2 + p (p - pc) = 0, with associated flow.
-    pc rises with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in
+    pc grows with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in
     logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III", Comput.
-    Methods Appl. Mech. Eng. 155). A step ends on the surface, whatever its size.
+    Methods Appl. Mech. Eng. 155). Steps of any size end on the surface.
 
     Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
-    q/p. At the critical state this is p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic
-    strain ep, and pc. A stress outside the surface from fix initial_stress raises pc. There is no
-    tension.
+    q/p. At the critical state: p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic strain ep,
+    and pc. A stress outside the surface from fix initial_stress raises pc. There is no tension.
 
     At a free surface a load must balance p0, or the first step releases it. Hold the other sides
-    and write ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or
-    ``fix(cell, edge_pressure, all, b, 100e3)`` all around, with the solid's region b. With fix
-    initial_stress, the load is its normal component.
+    and use ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or ``fix(cell,
+    edge_pressure, all, b, 100e3)`` all around, with the solid's region b. With fix initial_stress,
+    the load is its normal component.
 
     See Also
     --------
@@ -145,9 +144,8 @@ def _advance_cam_clay(law, kin, state, dl, dt):
     )
 
 
-# --- the return to the surface ----------------------------------------------------------------
-# Plastic compression y and w = 6 G / M^2 of the plastic multiplier: q shrinks to q / (1 + w), p to
-# p exp(-y / kappa), and pc becomes pc exp(y / (lam - kappa)).
+# Return to the surface with plastic compression y and w = 6 G / M^2 of the plastic multiplier: q
+# becomes q / (1 + w), p becomes p exp(-y / kappa), pc becomes pc exp(y / (lam - kappa)).
 
 
 class ClayStress(NamedTuple):
@@ -162,7 +160,7 @@ def after_flow(law, trial, y, w):
 
 
 def residuals(law, trial, y, w):
-    """Residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
+    """Residuals of the yield function and the flow rule y = w M^2/6G (2 p - pc)."""
     q, p, pc = after_flow(law, trial, y, w)
     return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
 
@@ -188,7 +186,7 @@ _NEWTON = 4
 def plastic_flow(law, q, p, pc):
     """y and w that return a trial with q and p to the surface; 0 inside it.
 
-    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution lies
+    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains, with its solution
     between y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0

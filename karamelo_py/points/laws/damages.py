@@ -1,6 +1,6 @@
 """Damages: the lost fraction D of a point's strength.
 
-A damage is a NamedTuple of parameters (its class is the tag) and a part of a composed law
+A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
 (`karamelo_py.points.laws.eos_strength`). It scales stress and tension, not compression, by 1 - D;
 equation of state and strength do not depend on it. Its memory is a tuple.
 """
@@ -75,9 +75,9 @@ class JohnsonCookDamage(NamedTuple):
     -----
     The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
     Tr) / (Tm - Tr) (Johnson & Cook 1985). The second factor is 1 up to the reference rate, the
-    third without a temperature. w is the sum of plastic strain over failure strain (dump column
-    damage_init). From w = 1, the damage D (dump column damage) grows to 1 as 10 (w - 1). Nothing
-    fails for t below -3. d1 may be negative. Failure strains are at least 1e-6.
+    third without a temperature. w (dump column damage_init) sums plastic strain over failure
+    strain. From w = 1, D (dump column damage) grows to 1 as 10 (w - 1). Nothing fails for t below
+    -3. d1 may be negative; failure strains are at least 1e-6.
 
     sigma = (1 - D) s - p I, with p times 1 - D in tension. The intact material still flows
     plastically. Lost stored energy counts as dissipated.

@@ -1,4 +1,4 @@
-"""Material constants that are possible but implausible: likely mistakes in a script."""
+"""Material constants that are possible but implausible: likely mistakes."""
 
 from collections.abc import Iterator
 from math import asin, degrees, inf, radians, sin, sqrt
@@ -33,7 +33,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     if can(law, constrained_velocity):
         return
     if hasattr(parameter(law, "strength"), "cell_size"):
-        # Viscosity damps waves by the cell size, not known yet.
+        # Viscosity damps waves by the cell size, which is set later.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)

@@ -10,8 +10,6 @@ from karamelo_py.points.laws.thermoelastic import expanding
 
 
 class ElasticLaw(NamedTuple):
-    """Elastic solid with Young's modulus and Poisson's ratio, optionally with a temperature."""
-
     in_lanes = True
     traits = LawTraits(rebounds=True)
 

@@ -1,9 +1,9 @@
 """Material eos-strength: a law of parts, named in the script.
 
 Pressure comes from an equation of state, deviatoric stress from a strength; viscosity, damage and
-temperature are optional. Parts are NamedTuples inside the law's, so their types select their point
-functions; `Absent` marks missing parts, which have no numbers in the state. Parts of other kinds,
-from plug-ins, are chained (`karamelo_py.points.laws.further`).
+temperature are optional. Parts are NamedTuples, so their types select their point functions;
+`Absent` marks missing parts, without numbers in the state. Parts of other kinds, from plug-ins, are
+chained (`karamelo_py.points.laws.further`).
 """
 
 from math import log, sqrt
@@ -42,8 +42,6 @@ from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_
 from karamelo_py.script.errors import ScriptError, unknown
 
 WARMER = 1.0, 100.0, 1000.0  # than a test point
-
-# --- the parts, as a script names them --------------------------------------------------------
 
 
 class Eos:
@@ -84,9 +82,6 @@ class Option:
         raise unknown(said, word or "", parts, place=argument.place)
 
 
-# --- the style ----------------------------------------------------------------------------------
-
-
 class EosStrength(NamedTuple):
     """Pressure from an equation of state, deviatoric stress from a strength.
 
@@ -99,9 +94,8 @@ class EosStrength(NamedTuple):
     parts
         ID of a damage, ID of a temperature, in either order; both optional.
     strain
-        ``rate``: the strain of a step is the symmetric part of dt grad v, and the skew part rotates
-        s. ``logarithmic``: the elastic part of s is based on the logarithm of the elastic stretch,
-        which is updated exactly for steps of any size.
+        ``rate``: the symmetric part of dt grad v strains, the skew part rotates s. ``logarithmic``:
+        s follows the logarithm of the elastic stretch, updated exactly for steps of any size.
 
     Example
     -------
@@ -115,9 +109,8 @@ class EosStrength(NamedTuple):
     sigma = s - p I. The deviatoric stress s rotates with the point (Jaumann rate; Hughes & Winget
     1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992). For small
     steps both agree, except at large elastic shear. The elastic strain is the strain of s plus ln J
-    / 3, J the volume over the reference volume (for soils, its elastic part). The strain energy
-    excludes plastic work, which compute dissipated_energy measures. A pressure from fix
-    initial_stress changes the volume of points.
+    / 3 (for soils, of the elastic part of J). The strain energy excludes plastic work (compute
+    dissipated_energy). Fix initial_stress changes the volume of points by its pressure.
 
     See Also
     --------
@@ -162,9 +155,6 @@ class EosStrength(NamedTuple):
 column(EosStrength, "dissipated", laws.dissipated_energy)
 
 
-# --- parts without effect, reported by `check` --------------------------------------------------
-
-
 def _idle_damage(law, scene):
     yields = strengths.equivalent_plastic_strain.defined(type(law.strength))
     return not isinstance(law.damage, Absent) and not yields
@@ -206,9 +196,6 @@ suggestion(
 )
 
 
-# --- shocks in gases ------------------------------------------------------------------------------
-
-
 def _supersonic(law, scene):
     return can(law, eos.taken_heat) and scene.speed > 1
 
@@ -233,9 +220,6 @@ known_failure(
     "quarter ten cells from it, with any basis, transfer and step",
     cure="finer cells, or TPIC with quadratic-spline, dt_factor(0.1), and no Q1 and Q2",
 )
-
-
-# --- limit loads ----------------------------------------------------------------------------------
 
 
 FAST = 0.02  # of the wave speed: metals yield in impacts above it
@@ -276,9 +260,6 @@ known_failure(
     "copper bar that hits a wall is 11 % too narrow)",
     cure="anti_volumetric_locking(true), or method ulmpm",
 )
-
-
-# --- state ------------------------------------------------------------------------------------
 
 
 class Memory(NamedTuple):
@@ -355,9 +336,6 @@ def rotated_with_point(law, kin, s, dl):
     return s, elastic_trial(law.strain, e, dl) - e
 
 
-# --- pressure ---------------------------------------------------------------------------------
-
-
 def intact_pressure(law, j, m):
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     p = eos.pressure(law.eos, elastic, m.energy, m.heat)
@@ -371,7 +349,7 @@ def volume_energy(law, j, m):
     energy = eos.compression_energy(law.eos, elastic, m.energy)
     energy -= eos.stored_heat(law.eos, sum(m.loss))
     warm = sum(thermal_pressure(law.temperature, m.heat))
-    if len(m.heat):  # the thermal pressure of the equation of state
+    if len(m.heat):  # thermal pressure of the equation of state
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
     return energy + warm * (1 - j)
@@ -392,8 +370,8 @@ def sound(law, j, m):
 def sound_lost_to_damage(law, j, m):
     """Reduction of the squared speed of sound by damage.
 
-    A broken point in tension has no waves, however far it has expanded. When it closes again, at
-    its initial volume, it has the waves of rubble; these always count, as it may close soon.
+    A broken point in tension has no waves. Closed again, at its initial volume, it has the waves of
+    rubble; these always count, as it may close soon.
     """
     if isinstance(law.damage, Absent):
         return 0
@@ -413,11 +391,8 @@ def viscous_after(law, j, m, rate):
     return (viscous_pressure(law.viscosity, rate, density, sound(law, j, m)),)
 
 
-# --- damage -----------------------------------------------------------------------------------
-
-
 def integrity_of(law, memory):
-    """Fraction of stress or energy that the damaged material sustains, 1 - D."""
+    """1 - D."""
     return 1 if isinstance(law.damage, Absent) else integrity(law.damage, memory)
 
 
@@ -445,9 +420,6 @@ def released(law, kin, state, damage):
 
 def stress_left(law, state):
     return integrity_of(law, state.m.damage) * state.s
-
-
-# --- quantities of the whole law --------------------------------------------------------------
 
 
 @laws.cauchy_stress.on(EosStrength)

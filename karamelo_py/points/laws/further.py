@@ -1,6 +1,6 @@
 """Further parts of a composed law, of kinds that plug-ins may define.
 
-A part is a NamedTuple of parameters (its class is the tag). It may have a memory, and add a
+A part is a NamedTuple of parameters (its class is the tag); it may have a memory and add a
 pressure. Lowering adds one on request: the plastic strain rate, for output.
 """
 
@@ -27,15 +27,14 @@ def chained(parts: list) -> NamedTuple:
 
 @point_function(otherwise=True)
 def initial_part(part, like):
-    """Initial memory of a point."""
     return ()
 
 
 @point_function(otherwise=True)
 def part_after(part, memory, law, step, memories):
-    """The memory after a `StrainStep`, whose s is the deviatoric stress after the step.
+    """The memory after a `StrainStep`, with its s after the step.
 
-    `memories` are the memories of the other parts of the `law`.
+    `memories` are the other parts' memories.
     """
     return memory
 
@@ -61,7 +60,6 @@ def further_after(parts, memory, law, step, memories):
 
 
 def further_pressure(parts, memory, p):
-    """p plus the pressure of all parts."""
     if isinstance(parts, Absent):
         return p
     first, rest = memory
@@ -126,7 +124,6 @@ def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
 
 
 def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
-    """Kinds of a law (`law_kind`) without the rate."""
     if PlasticRate not in kinds:
         return kinds
     k = kinds.index(PlasticRate)

@@ -19,8 +19,8 @@ class Hencky(Hyperelastic):
     nu
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
-        initially the solid's.
+        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
+        the solid's.
     alpha
         Coefficient of linear expansion.
 
@@ -33,10 +33,10 @@ class Hencky(Hyperelastic):
     Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I, with ln V = 1/2 ln F F^T of the left
     stretch V. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
     Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46).
-    Hooke's law in additive strains; the elastic part of most soil plasticity at large strain.
+    Additive strains; the elastic part of most soil plasticity at large strain.
 
-    A temperature T adds the stress -3 K alpha (T - T0), with bulk modulus K and initial temperature
-    T0. The elastic strain excludes the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0) (bulk modulus K, initial temperature T0).
+    The elastic strain excludes alpha (T - T0).
 
     See Also
     --------

@@ -94,11 +94,11 @@ class HyperelasticFormula(OfInvariants, Fields):
     Notes
     -----
     The stress is the exact derivative of the formula: tau = 2 (W_1 + I1 W_2) b - 2 W_2 b^2 + J W_J
-    I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. The tangent of load steps and the wave
-    speed are its second derivatives. The stored energy is 0 at rest. A formula with stress or
-    without stiffness at rest is refused. A warning names the stretch beyond which the energy is not
-    convex along a principal direction, so that the body would localize. Formulas of stretches cost
-    more: each point needs its principal directions.
+    I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. Tangent and wave speed are second
+    derivatives. The stored energy is 0 at rest; stress or no stiffness at rest is refused. A
+    warning names the stretch beyond which the energy is not convex along a principal direction,
+    where the body would localize. Formulas of stretches cost more: each point needs its principal
+    directions.
 
     See Also
     --------
@@ -162,7 +162,7 @@ class MooneyRivlin(OfInvariants, Fields):
     rho
         Density before deformation.
     C10, C01
-        Half the shear modulus in two parts: G = 2 (C10 + C01).
+        Shear modulus G = 2 (C10 + C01).
     K
         Bulk modulus.
 
@@ -198,7 +198,7 @@ class Yeoh(OfInvariants, Fields):
     K
         Bulk modulus.
     constants
-        C10, C20 and C30; the last ones may be left out. The shear modulus is 2 C10.
+        C10, C20 and C30, the last ones optional. The shear modulus is 2 C10.
 
     Example
     -------
@@ -325,8 +325,8 @@ class SaintVenantKirchhoff(OfInvariants, Fields):
 
     Notes
     -----
-    W = lam/2 (tr E)^2 + G E:E. For large rotations and small strains; a body that is shortened to
-    0.58 of its length loses its stiffness.
+    W = lam/2 (tr E)^2 + G E:E. For large rotations and small strains: shortened to 0.58 of its
+    length, a body loses its stiffness.
 
     See Also
     --------

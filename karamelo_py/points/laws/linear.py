@@ -11,7 +11,7 @@ from karamelo_py.points.laws.parameters import AboveZero, FromZero
 
 
 class LinearElastic(ElasticLaw):
-    """Hooke's law in rate form: the stress rate follows the strain rate and the rotation.
+    """Hooke's law in rate form, for large rotations.
 
     Parameters
     ----------
@@ -22,13 +22,13 @@ class LinearElastic(ElasticLaw):
     nu
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
-        initially the solid's.
+        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
+        the solid's.
     alpha
         Coefficient of linear expansion.
     rate
-        ``jaumann``: the stress rotates with the point. ``none``: it does not (only to reproduce
-        results of Karamelo).
+        ``jaumann``: the stress rotates with the point. ``none``: it does not (to reproduce
+        Karamelo).
 
     Example
     -------
@@ -37,12 +37,12 @@ class LinearElastic(ElasticLaw):
 
     Notes
     -----
-    sigma' = R sigma R^T + 2 G d + lambda tr(d) I (Jaumann rate; Hughes & Winget 1980). d and R are
-    the strain and rotation increments of the step. Above 10 % strain, prefer a hyperelastic law
-    such as neo-hookean. In 1D, strain is uniaxial.
+    sigma' = R sigma R^T + 2 G d + lambda tr(d) I (Jaumann rate; Hughes & Winget 1980), d and R the
+    step's strain and rotation. Above 10 % strain, prefer a hyperelastic law such as neo-hookean. In
+    1D, strain is uniaxial.
 
-    A temperature T adds the stress -3 K alpha (T - T0), with bulk modulus K and initial temperature
-    T0. The elastic strain excludes the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0) (bulk modulus K, initial temperature T0).
+    The elastic strain excludes alpha (T - T0).
 
     See Also
     --------
@@ -69,7 +69,7 @@ class LinearElastic(ElasticLaw):
 
 
 class FixedFrame(LinearElastic):
-    """The stress does not rotate with the point (Karamelo's)."""
+    """The stress does not rotate with the point, as in Karamelo."""
 
     __slots__ = ()
     traits = LawTraits()

@@ -15,12 +15,11 @@ class Logarithmic(NamedTuple):
 
 @point_function()
 def elastic_trial(strain, e, dl):
-    """Elastic strain `e` after an increment assumed elastic.
+    """Elastic strain `e` after an increment assumed elastic, exact for steps of any size.
 
     V becomes the left stretch of (I + dl) V: 1/2 ln[(I + dl) exp(2 e) (I + dl)^T] (Simo 1992,
     "Algorithms for static and dynamic multiplicative plasticity that preserve the classical return
-    mapping schemes of the infinitesimal theory", Comput. Methods Appl. Mech. Eng. 99). Exact for
-    steps of any size; the strain rotates with the point.
+    mapping schemes of the infinitesimal theory", Comput. Methods Appl. Mech. Eng. 99).
     """
 
 

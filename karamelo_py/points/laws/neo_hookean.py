@@ -20,8 +20,8 @@ class NeoHookean(Hyperelastic):
     nu
         Poisson's ratio at small strain, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. They give points a temperature,
-        initially the solid's.
+        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
+        the solid's.
     alpha
         Coefficient of linear expansion.
 
@@ -35,8 +35,8 @@ class NeoHookean(Hyperelastic):
     First Piola-Kirchhoff stress P = G (F - F^-T) + lambda ln(det F) F^-T. Stored energy W = G/2 (tr
     F^T F - 3) - G ln J + lambda/2 (ln J)^2 (Bonet & Wood 2008, section 6.4.3).
 
-    A temperature T adds the stress -3 K alpha (T - T0), with bulk modulus K and initial temperature
-    T0. The elastic strain excludes the expansion alpha (T - T0).
+    A temperature T adds the stress -3 K alpha (T - T0) (bulk modulus K, initial temperature T0).
+    The elastic strain excludes alpha (T - T0).
 
     See Also
     --------
@@ -55,8 +55,8 @@ def _kirchhoff_stress_neo_hookean(law, kin, state):
 
 @laws.wave_speed_squared.on(NeoHookean)
 def _wave_speed_squared_neo_hookean(law, kin, state):
-    # Along a principal direction of stretch a, the tangent of P gives
-    # rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest row sum of b bounds the largest a^2.
+    # Tangent of P along a principal direction of stretch a: rho c^2 = G (1 + a^2) + lam (1 - ln J);
+    # the largest row sum of b bounds a^2.
     return speed_squared(law, state.F, law.lam * (1 - log(det(state.F))))
 
 

@@ -1,4 +1,4 @@
-"""Materials orthotropic and transverse: elasticity with directions, for wood, plies and slate."""
+"""Materials orthotropic and transverse: directional elasticity of wood, plies and slate."""
 
 from collections import namedtuple
 from itertools import combinations_with_replacement
@@ -49,8 +49,8 @@ class Orthotropic(NamedTuple):
     G12, G13, G23
         Shear moduli.
     angle, tilt, spin
-        Rotation of the axes in degrees: by `angle` about z, by `tilt` about the new axis 1, and by
-        `spin` about the new axis 3. Without them, axes 1, 2 and 3 are x, y and z.
+        Rotation of the axes from x, y, z in degrees: by `angle` about z, by `tilt` about the new
+        axis 1, by `spin` about the new axis 3.
 
     Example
     -------
@@ -60,9 +60,9 @@ class Orthotropic(NamedTuple):
     Notes
     -----
     The second Piola-Kirchhoff stress is linear in the Green-Lagrange strain, S = C:E, with the
-    stiffness C of Lekhnitskii (1963, section 5). The axes are those of the undeformed body and
-    rotate with it. In axisymmetry, x, y and z are the radial, axial and hoop directions. In 2D, one
-    axis should be z (`tilt` 0 or 90 with `spin` 0), or the body shears out of its plane.
+    stiffness C of Lekhnitskii (1963, section 5). The axes rotate with the body. In axisymmetry, x,
+    y and z are the radial, axial and hoop directions. In 2D, one axis should be z (`tilt` 0 or 90
+    with `spin` 0), or the body shears out of plane.
 
     See Also
     --------
@@ -104,7 +104,7 @@ class Orthotropic(NamedTuple):
 
 
 class Transverse(NamedTuple):
-    """Elastic solid with one direction: bedded rock, fibres in one direction, for small strains.
+    """Elastic solid with one direction, such as bedding or fibres, for small strains.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def axes(angle: float, tilt: float, spin: float) -> np.ndarray:
 
 
 def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Stiffness (3, 3, 3, 3) from a matrix (6, 6) by the axes R."""
+    """Stiffness (3, 3, 3, 3) from a matrix (6, 6), by the axes R."""
     full = np.array(
         [[[[C[INDEX[i][j], INDEX[k][m]] for m in range(3)] for k in range(3)] for j in range(3)]
          for i in range(3)]

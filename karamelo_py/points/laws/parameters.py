@@ -68,8 +68,7 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers, a curve or a formula; an array in kernels.
 
-    Sequences of laws of one kind are padded with their last number: a law that needs the length
-    stores it separately.
+    In tables of laws padded with its last number: a law that needs the length stores it separately.
     """
 
     values: tuple[float, ...]

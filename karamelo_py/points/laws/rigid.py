@@ -21,10 +21,10 @@ class Rigid(NamedTuple):
 
     Notes
     -----
-    Points retain the velocity set by fix initial_velocity_particles or fix velocity_particles,
-    whatever forces act, without stress. The time step is limited only to a cell per step.
+    Points retain the velocity set by fix initial_velocity_particles or fix velocity_particles
+    whatever forces act, without stress. The step is limited only to a cell of travel.
 
-    In ulmpm and ulcpdi, nodes around its points have its velocity, whatever its density. In
+    In ulmpm and ulcpdi, nodes around its points have its velocity at any density; in
     ulmpm/contacts, contact does not move it. These methods publish the force on the solid ID as
     ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and the torque about the origin as
     ContactTorque_ID_x and so on.

@@ -1,8 +1,8 @@
 """Temperature of a point, as changed by the law itself.
 
-A temperature is a NamedTuple of parameters (its class is the tag) and a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature (`Warm`), `heat` for other
-parts: () without one.
+A temperature is a NamedTuple of parameters (its class is the tag), a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature (`Warm`), other parts'
+`heat`; or ().
 """
 
 from typing import Annotated, NamedTuple

@@ -1,9 +1,9 @@
 """Laws of thin bodies: plane stress in 2D, uniaxial stress in 1D.
 
-The wrapped law has the tensors of `Axisymmetric`: xx, xy, yx, yy and zz. A secant method finds the
-strain increment q across the body without stress across it, in 1D the same in y and z, by a fixed
-number of trials, so that points in lanes need no branches. The remaining stress enters the next
-step (de Borst 1991; Klinkel & Govindjee 2002).
+The wrapped law has the tensors of `Axisymmetric`: xx, xy, yx, yy and zz. A secant method with a
+fixed number of trials (no branches in lanes) finds the strain increment q across the body, in 1D in
+y and z, without stress across. The remaining stress enters the next step (de Borst 1991; Klinkel &
+Govindjee 2002).
 """
 
 from typing import Any, NamedTuple
@@ -12,9 +12,9 @@ from karamelo_py.compiler import real, where
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, nothing
 
-WHOLE = Axisymmetric()  # kinematics of the wrapped law
+WHOLE = Axisymmetric()  # of the wrapped law
 ENOUGH = 10  # trials of q for increments of any size
-UNROLLED = 9  # the same for laws of F, whose trials are short enough to be code without a loop
+UNROLLED = 9  # for laws of F, whose trials are short enough to be code without a loop
 FURTHEST = 0.3  # change of the stretch across in a trial
 FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over rho c^2
 

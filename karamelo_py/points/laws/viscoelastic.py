@@ -79,8 +79,8 @@ class Viscoelastic(NamedTuple):
     elastic
         ID of an isotropic elastic material: the instantaneous response.
     pairs
-        g and tau of each term: relaxing fraction of the instantaneous shear stiffness, and its
-        relaxation time.
+        g and tau of each term: relaxing fraction of the instantaneous shear stiffness, relaxation
+        time.
 
     Example
     -------
@@ -92,12 +92,12 @@ class Viscoelastic(NamedTuple):
     Finite linear viscoelasticity (Simo 1987; Simo & Hughes 1998, section 10.4): tau = tau_e - sum
     (g s - h), with the Kirchhoff stress tau_e of the elastic law, s = dev tau_e, and internal
     stresses h that follow s and decay: h' = g s' - h/tau. The rate is convected with the body. A
-    step is exact for a constant rate of s, however long it is. The relaxation modulus is G(t) = G
-    (1 - sum g (1 - exp(-t/tau))); the volume response is elastic.
+    step of any size is exact for a constant rate of s. The relaxation modulus is G(t) = G (1 - sum
+    g (1 - exp(-t/tau))); the volume response is elastic.
 
-    The strain energy contains the branches, |h|^2/(4 g G) each. Column ``dissipated``: the energy
-    they have lost, at the rate |h|^2/(2 g G tau), with the shear modulus G at rest. A relaxed body
-    has 1 - sum g of the stiffness; fix initial_stress starts from one.
+    The strain energy contains |h|^2/(4 g G) of each branch. Column ``dissipated``: the energy lost
+    at the rate |h|^2/(2 g G tau), with the shear modulus G at rest. A relaxed body has 1 - sum g of
+    the stiffness; fix initial_stress starts from one.
 
     See Also
     --------
@@ -137,7 +137,7 @@ known_failure(
 
 class State(NamedTuple):
     elastic: Any
-    branches: Any  # internal stress h of the first branch, and those of the rest
+    branches: Any  # h of the first branch, and of the rest
     loss: Any  # dissipated energy per reference volume
     gone: Any  # elastic law's energy that is not stored, per reference volume
 

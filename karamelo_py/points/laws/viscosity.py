@@ -19,7 +19,7 @@ class ArtificialViscosity(NamedTuple):
 
 
 def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
-    """The part with these coefficients, for an equation of state; none if both are 0."""
+    """The part with these coefficients; none if both are 0."""
     return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
 
 

@@ -1,10 +1,10 @@
 """Transfers: mapping of velocity from points to nodes and back. One file per family.
 
-A transfer is a NamedTuple of parameters (its class is the tag). It defines what a point stores
-besides velocity (nothing, or a tensor such as the affine moment B, in `point_fields`), and the
-velocity update from v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get
-a view: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin`
-(:mod:`karamelo_py.kernels.views`). The default is PIC: nothing is stored, only v is mapped.
+A transfer is a NamedTuple of parameters (its class is the tag). It defines what a point stores with
+its velocity (`point_fields`: nothing, or a tensor such as the affine moment B), and updates the
+velocity from v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get a
+view: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin`
+(:mod:`karamelo_py.kernels.views`). Default: PIC.
 """
 
 from typing import NamedTuple
@@ -16,20 +16,20 @@ from karamelo_py.points import noise
 
 
 class TransferTraits(NamedTuple):
-    inverts_spread: bool = False  # divides by D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
+    inverts_spread: bool = False  # by D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
     retains: bool = False  # points retain the fraction `alpha` of their velocity
     per_time: bool = False  # alpha is for a stable step, not each step
     keeps_gradient: bool = False  # a point's `Moment` is its velocity gradient
 
 
 class Moment(Field):
-    """Tensor stored by points besides velocity: moment B or gradient L."""
+    """Tensor stored by points with the velocity: moment B or gradient L."""
 
     shape = planar
 
 
 def flip_coefficient(transfer) -> float:
-    """Fraction of its velocity that a point retains in a step; 0 for PIC."""
+    """Fraction of its velocity that a point retains per step; 0 for PIC."""
     return transfer.alpha if transfer.traits.retains else 0.0
 
 
@@ -50,10 +50,9 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_fractions(transfer, like):
-    """Two fractions of the kinetic energy, removed by mapping to the nodes and back, that are lost.
+    """Fractions of the kinetic energy removed by mapping to the nodes and back that are lost: (2,).
 
-    The rest returns with the data stored by points. Undefined if unknown: the energy is then lost
-    without a record.
+    The rest returns with the data stored by points. If undefined, the loss is not recorded.
     """
 
 
@@ -92,7 +91,7 @@ def zero_moment(transfer, kin, like):
 
 @point_function(otherwise=True)
 def add_moment(transfer, node, v, moment):
-    """The moment plus the contribution of a node of velocity `v`."""
+    """The moment plus a node's contribution, with its velocity `v`."""
     return moment
 
 
@@ -100,7 +99,7 @@ def add_moment(transfer, node, v, moment):
 def by_arms(transfer, inverse_d):
     """(a,), if the stored tensor is a sum_I N_I v*_I (X_I - x)^T; otherwise ().
 
-    `inverse_d` is (D^-1,), or () if D is not constant.
+    `inverse_d` as in `affine_velocity`.
     """
     return ()
 
@@ -113,7 +112,7 @@ def gradient_weight(transfer, node):
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Check whether N_I D^-1 (X_I - x) is all of `gradient_weight`; constant at compile time."""
+    """Check whether `gradient_weight` is N_I D^-1 (X_I - x); constant when compiled."""
     return False
 
 
@@ -125,12 +124,13 @@ def straining(transfer, kin, gradient):
 
 @point_function(otherwise=True)
 def terms(transfer):
-    """Number of terms of XPIC's series on the nodes; 1: only the first."""
+    """Number of terms of XPIC's series on the nodes."""
     return 1
 
 
 def _inside_out(moment, scene):
-    by_moments = gradient_weight.defined(type(scene.transfer))  # strains, as MLS has them
+    # strains by moments, as MLS has them
+    by_moments = gradient_weight.defined(type(scene.transfer))
     growing = not scene.transfer.traits.inverts_spread or by_moments
     return scene.moments and scene.vanishing and growing
 

@@ -1,9 +1,8 @@
-"""Affine transfers: the point stores the moment of velocity B with its velocity.
+"""Affine transfers: the point stores the moment B = sum_I N_I v*_I (X_I - x_p)^T of velocity.
 
-B_p = sum_I N_I v*_I (X_I - x_p)^T, and the point gives the node
-m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). B instead of C = B D^-1 conserves angular momentum to
-round-off, also if D depends on the position in the cell (Jiang, Schroeder & Teran 2017, "An angular
-momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
+It gives the node m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). B instead of C = B D^-1 conserves
+angular momentum to round-off, also if D varies within the cell (Jiang, Schroeder & Teran 2017, "An
+angular momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
 """
 
 from typing import Annotated, NamedTuple
@@ -24,11 +23,11 @@ SEPARATE = 0.1  # strength of separation that elastic bodies tolerate
 class APIC(NamedTuple):
     """v_p = v_pic, and the point stores B_p = sum N_I v*_I (X_I - x_p)^T.
 
-    Conserves linear and angular momentum to round-off, and damps motion below the cell size (Jiang
-    et al. 2015).
+    Conserves linear and angular momentum to round-off; damps motion below the cell size (Jiang et
+    al. 2015).
 
     With bases whose D vanishes at nodes (linear, Bernstein-quadratic) in the updated frame, the
-    velocity that deforms the points omits the moments. This needs musl; usl and usf are refused.
+    velocity that deforms points omits the moments. This needs musl; usl and usf are refused.
 
     Example
     -------
@@ -41,7 +40,7 @@ class APIC(NamedTuple):
 
 
 class AFLIP(NamedTuple):
-    """FLIP's mean velocity, with the moment of velocity of APIC.
+    """FLIP's mean velocity with APIC's moment.
 
     Less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021, "Revisiting
     integration in the material point method", section 4).
@@ -66,16 +65,16 @@ class AFLIP(NamedTuple):
 class ASFLIP(NamedTuple):
     """AFLIP with point velocities that differ from the grid where the material separates.
 
-    For granular flow and splashes: points separate sooner (Fei et al. 2021, section 5). Compressed
-    by more than 0.1 % of their volume, they move with the grid and retain their order.
+    For granular flow and splashes (Fei et al. 2021, section 5). Points compressed by more than 0.1
+    % of their volume move with the grid and retain their order.
 
     Parameters
     ----------
     alpha
         FLIP coefficient.
     beta
-        Strength of separation: fraction of the velocity relative to the grid that also moves
-        points, unless compressed. 0: AFLIP.
+        Separation: fraction of the velocity relative to the grid that moves uncompressed points. 0:
+        AFLIP.
 
     Example
     -------

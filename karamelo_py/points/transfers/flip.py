@@ -20,8 +20,8 @@ TURNS = 1.5  # revolutions of a free body with a relevant loss by FLIP
 class PIC(NamedTuple):
     """v_p = v_pic, the updated nodal velocity at the point.
 
-    Very stable and very dissipative: each step smooths the velocity over a cell, and angular
-    momentum is lost (Harlow 1964).
+    Very stable and dissipative: each step smooths the velocity over a cell and loses angular
+    momentum (Harlow 1964).
 
     Example
     -------
@@ -60,8 +60,8 @@ class FLIP(NamedTuple):
 class FLIPPerTime(NamedTuple):
     """FLIP with damping per time: alpha applies to a stable step.
 
-    A shorter step uses alpha^(dt / stable dt). Plain FLIP removes 1 - alpha in each step of any
-    size: half the step damps vibrations twice as much per time.
+    A shorter step uses alpha^(dt / stable dt). Plain FLIP removes 1 - alpha per step: half the step
+    doubles the damping per time.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def _turns_away(transfer, scene):
 
 
 def warn_of_lost_angular_momentum(transfer: type) -> None:
-    """Register the warning for bodies that rotate many times.
+    """Warn of bodies that rotate many times.
 
     Points move with the grid velocity u, and store v: each step changes the angular momentum by the
     sum of m u x v dt (disks in 2D, E 100 times the rotational energy, 4 and 8 cells across the
@@ -186,9 +186,9 @@ def _brakes(transfer, scene):
 
 
 def warn_of_slow_rotation(transfer: type) -> None:
-    """Register the warning for free rotations in the total frame.
+    """Warn of free rotations in the total frame.
 
-    Points move with the grid velocity, and store another: a square of n cells rotates too slowly by
+    Points store another velocity than they move with: a square of n cells rotates too slowly by
     2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
     """
     known_failure(

@@ -1,9 +1,9 @@
-"""Taylor transfers: the point stores the velocity gradient L with its velocity.
+"""Taylor transfers: the point stores the velocity gradient L_p = sum_I v*_I (x) grad N_I.
 
-The point gives the node m_p N_I (v_p + L_p (X_I - x_p)), with L_p = sum_I v*_I (x) grad N_I. No D
-is inverted, so any basis will do. Where D^-1 N_I (X_I - x) is the gradient (linear,
-Bernstein-quadratic) this is APIC in another form. Angular momentum is then conserved as far as D is
-constant; with splines, as far as velocity is linear over their support.
+It gives the node m_p N_I (v_p + L_p (X_I - x_p)), without inverting D, so any basis will do. Where
+D^-1 N_I (X_I - x) is the gradient (linear, Bernstein-quadratic) this equals APIC. Angular momentum
+is then conserved as far as D is constant; with splines, as far as velocity is linear over their
+support.
 """
 
 from typing import Annotated, NamedTuple
@@ -19,10 +19,10 @@ from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 class TPIC(NamedTuple):
     """v_p = v_pic, and the point stores the velocity gradient L_p.
 
-    A Taylor expansion of the velocity around the point. Damps less than PIC, inverts no D
-    (Nakamura, Matsumura & Mizutani 2023, "Taylor particle-in-cell transfer and kernel correction
-    for material point method"). With bases whose D vanishes at nodes (linear, Bernstein-quadratic),
-    a drifting body in the updated frame gains energy without bounds.
+    A Taylor expansion that damps less than PIC and inverts no D (Nakamura, Matsumura & Mizutani
+    2023, "Taylor particle-in-cell transfer and kernel correction for material point method"). With
+    bases whose D vanishes at nodes (linear, Bernstein-quadratic), a drifting body in the updated
+    frame gains energy without bounds.
 
     Example
     -------
@@ -109,8 +109,7 @@ def _by_arms_mls(transfer, inverse_d):
     return inverse_d
 
 
-# The point stores the velocity gradient: gathered once if both come from v*. In axisymmetry it
-# lacks the hoop part.
+# C is the velocity gradient (but for the hoop part): gathered once if both come from v*.
 
 
 @transfers.forces_by_arms.on(MLS)

@@ -36,11 +36,10 @@ class Series(SummedField):
 class XPIC(NamedTuple):
     """v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I): m = 1 is PIC, infinite m is FLIP.
 
-    S maps nodes to points and S+ points to nodes by mass. A low order removes noise in the null
-    space and retains the motion that the grid resolves (Hammerquist & Nairn 2017, "A new method for
-    material point method particle updates that reduces noise and enhances stability", eq. 24). The
-    terms w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1) are summed at the nodes. Each further order costs
-    one pass over the points per step.
+    S maps nodes to points and S+ points to nodes by mass. A low order removes null-space noise and
+    retains what the grid resolves (Hammerquist & Nairn 2017, "A new method for material point
+    method particle updates that reduces noise and enhances stability", eq. 24). The nodes sum w_0 =
+    S+ v, w_k = w_(k-1) - S+ S w_(k-1). Each order costs one more pass over the points per step.
 
     Parameters
     ----------
@@ -60,7 +59,7 @@ class XPIC(NamedTuple):
     in_lanes = True
 
 
-# kernels.table.sum_series has replaced dv by the sum of the series, with the change.
+# kernels.table.sum_series has replaced dv by the sum of the series plus the change.
 
 
 @updated_velocity.on(XPIC)

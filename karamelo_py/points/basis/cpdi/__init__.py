@@ -1,14 +1,14 @@
-"""Convected particle domain interpolation: the nodes around the corners of a point's domain.
+"""Convected particle domain interpolation: the nodes around the corners x_c of a point's domain.
 
-Over the domain, a simple function through its values at the corners x_c replaces each basis
-function (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
+Over the domain, a simple interpolation of each basis function between the corners replaces it
+(Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
 
      N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
 
-with w_c and g_c the domain means of the function of corner c and of its gradient. Domains tile the
-body at any stretch, so it does not fracture numerically. A family derives from `ConvectedDomain`
-and defines :func:`domain`; with stored corners that the grid moves, it derives from `CarriedDomain`
-and also defines `upright`.
+w_c and g_c are domain means of corner c's function and gradient. Domains tile the body at any
+stretch, so there is no numerical fracture. A family derives from `ConvectedDomain` and defines
+:func:`domain`; with stored corners moved by the grid, from `CarriedDomain` and also defines
+`upright`.
 """
 
 from math import inf
@@ -27,19 +27,19 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 
 
 class Element(NamedTuple):
-    kind: str  # name in meshes
+    kind: str  # in meshes
     corners: int
-    edges: tuple[tuple[int, int], ...]  # between corners; with positive determinant
-    mirrored: tuple[int, ...]  # corners reordered, for elements with negative determinant
+    edges: tuple[tuple[int, int], ...]  # pairs of corners, with positive determinant
+    mirrored: tuple[int, ...]  # order of corners if the determinant is negative
     box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, if it is one
 
 
 class ConvectedDomain(NamedTuple):
-    """Base of these bases, with 2^d corners; they add `dimension` and `shape`.
+    """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
 
-    Arms of the affine transfers begin at the weighted centre x = sum_I N_I X_I, which differs from
-    the point if corners lie beyond the grid, or the domain is no parallelogram or parallelepiped.
-    Linear momentum stays exact; angular momentum belongs to the centres: about the points it varies
+    Arms of the affine transfers start at the weighted centre x = sum_I N_I X_I. It differs from the
+    point if corners lie beyond the grid or the domain is no parallelogram or parallelepiped. Linear
+    momentum stays exact; angular momentum is exact about the centres, and varies about the points
     by 0.1 % of its variation with FLIP (a spinning square, Q4).
     """
 
@@ -50,7 +50,7 @@ class ConvectedDomain(NamedTuple):
 
 
 class CarriedDomain(ConvectedDomain):
-    """Domains with stored corners that the grid moves; they add `element`."""
+    """Domains with stored corners that the grid moves; subclasses add `element`."""
 
     __slots__ = ()
     traits = ConvectedDomain.traits._replace(shape=("corners",))
@@ -77,10 +77,10 @@ known_failure(
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
-# By dimension, the minimum reach of domains in cells: in 2D points scatter to all adjacent nodes at
+# Least extent of domains in cells, by dimension; in 2D points scatter to all adjacent nodes at
 # once.
 LEAST = (0.0, 0.0, 0.5, 0.0)
-# In the order of a mesh: around the square; around the cube's lower face, then the upper
+# In mesh order: around the square; around the cube's lower face, then the upper
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
@@ -92,29 +92,27 @@ def domain(basis, kin, place):
 
 @point_function()
 def upright(basis, kin, place):
-    """Check that no domain is folded: the Jacobian is positive at every corner."""
+    """Check for a positive Jacobian at every corner: the domain is not folded."""
 
 
 class Corner(NamedTuple):
-    cell: tuple[int, ...]  # along each direction
+    cell: tuple[int, ...]  # per direction
     fractions: tuple[float, ...]  # of the cell
-    at: Any  # cell + fractions, from the corner of the grid, a vector
+    at: Any  # cell + fractions, a vector
 
 
 class CornerStencil(NamedTuple):
-    """Corners of a domain. Unused fields cost nothing."""
-
     corners: tuple[Corner, ...]
-    weights: tuple[float, ...]  # of the corners; then their gradients
+    weights: tuple[float, ...]  # of the corners
     gradients: tuple[Any, ...]
-    point: tuple[float, ...]  # position in cells
-    centre: Any  # sum_I N_I X_I, in cells, a vector
+    point: tuple[float, ...]  # in cells
+    centre: Any  # sum_I N_I X_I in cells, a vector
     spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
-    inv_r: float  # 1 / r of an axisymmetric point
+    inv_r: float  # 1 / r in axisymmetry
 
 
 class AtCorners(NamedTuple):
-    """Tag for code that uses weight or gradient of a node once, as a factor: corners as nodes.
+    """Tag for code that uses a node's weight or gradient once, as a factor: corners as nodes.
 
     A node number is then a `Weighted`.
     """
@@ -122,17 +120,14 @@ class AtCorners(NamedTuple):
     basis: NamedTuple
 
 
-# --- one corner -------------------------------------------------------------------------------
-
-
 def along_cell(grid, direction, x):
     """Cell of a corner in one direction, position in it (0 to 1), and their sum.
 
-    Corners beyond the grid are moved to its face, so weights still sum to one.
+    Corners beyond the grid move to its face, so weights sum to one.
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # NaN becomes 0 in this order
+    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
     i = min(int(a), cells - 1)
     return i, a - i, a
 
@@ -159,11 +154,7 @@ def around(grid, corner):
 
 
 def arm(grid, first, far, centre):
-    """Vector from the weighted centre to the node `far` steps from the `first`."""
     return (real(first + far, centre) - centre) * grid.h
-
-
-# --- all corners ------------------------------------------------------------------------------
 
 
 def pairs_of_spread(kin):
@@ -171,7 +162,7 @@ def pairs_of_spread(kin):
 
 
 def spread_of(kin, grid, weight, corner, centre):
-    """One corner's contribution to D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    """One corner's part of D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):
@@ -255,9 +246,6 @@ def _first_node_convected_domain(basis, like):
     return 0.5
 
 
-# --- corners that move with the grid ----------------------------------------------------------
-
-
 @bases.support.on(CarriedDomain)
 def _support_carried(basis, kin):
     return basis.element.corners * 2**kin.dimension
@@ -289,9 +277,6 @@ def _extent_corners(basis, kin, grid, place):
     for k in range(d + 1, d + d * basis.element.corners):
         far = max(abs(place[k] - place[k % d]), far)
     return where(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
-
-
-# --- corners instead of nodes -----------------------------------------------------------------
 
 
 @bases.support.on(AtCorners)

@@ -1,7 +1,7 @@
 """The nodes around a domain in 2D, each once: three by three.
 
-Most nodes belong to several corners, so contributions are summed over the corners first. In 3D this
-costs more than it saves: 27 nodes, eight corners.
+Contributions are summed over the corners first. In 3D (27 nodes, eight corners) this costs more
+than it saves.
 """
 
 from collections.abc import Iterable
@@ -15,16 +15,14 @@ from karamelo_py.points.basis.product import digits, item, node_number, with_hoo
 from karamelo_py.points.grid import cells_along
 from karamelo_py.points.kinematics import vector
 
-WIDTH = 3  # nodes along each direction
+WIDTH = 3  # nodes per direction
 
 
 class NodeBlock(NamedTuple):
-    """Nodes next to a point, with weights and gradients. Unused fields cost nothing."""
-
-    first: tuple[int, ...]  # number of the first node, along each direction
+    first: tuple[int, ...]  # number of the first node, per direction
     weights: tuple[float, ...]
-    gradients: tuple[Any, ...]  # from the corners' gradients, without N / r
-    holds: bool  # contains the corners, and no node is missing at a wall
+    gradients: tuple[Any, ...]  # of the corners, without N / r
+    holds: bool  # contains the corners, with no node missing at a wall
     seen: CornerStencil
 
 
@@ -72,7 +70,7 @@ def of_one(block):
 
 
 def _spread_out(hats: Iterable, values: Iterable) -> tuple:
-    """Values of corners at the nodes, by products of the functions of both directions."""
+    """Corner values at the nodes: products of the hats of both directions."""
     totals: tuple = ()
     for (rows, line), value in zip(hats, values, strict=True):
         pairs = [(value * row, hat) for row in rows for hat in line]

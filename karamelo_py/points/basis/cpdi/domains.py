@@ -1,4 +1,5 @@
-"""Domains: parallelograms that deform with the point; elements with corners moved by the grid."""
+"""CPDI domains: parallelograms that deform with the point, and elements with corners moved by the
+grid."""
 
 from karamelo_py.compiler import real
 from karamelo_py.points import basis as bases
@@ -14,8 +15,8 @@ class _Parallel(cpdi.ConvectedDomain):
 class R4(_Parallel):
     """Parallelograms: x and two half edges r, which rotate and stretch with the point.
 
-    In non-uniform strain, neighbouring domains may slightly overlap or separate (Sadeghirad,
-    Brannon & Burghardt 2011).
+    In non-uniform strain, neighbours may slightly overlap or separate (Sadeghirad, Brannon &
+    Burghardt 2011).
 
     Example
     -------
@@ -62,8 +63,8 @@ def _domain_parallel(basis, kin, place):
     k = weight / determinant({(e, i): edges[e][i] for e in range(d) for i in range(d)}, d)
     corners: list = []
     gradients: list = []
-    # Reciprocal vectors A, B (A . a = 1, A . b = 0 ...): N_c has the mean gradient (+-A +-B) / 4.
-    # In 3D, nine products with k before the sums beat twelve after them.
+    # Reciprocal vectors A . a = 1, A . b = 0 ...: N_c has the mean gradient (+-A +-B) / 4. In 3D,
+    # nine products with k before the sums beat twelve after them.
     A = reciprocals(kin, edges, k if d == 3 else 1)
     for signs in cpdi.SQUARE if d == 2 else cpdi.CUBE:
         corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
@@ -113,7 +114,7 @@ class T3(_Simplex):
 class Tet4(_Simplex):
     """Tetrahedra of a mesh: four corners, each with a weight of 1/4.
 
-    Used by Sinaie et al. 2017 for the cantilever.
+    As used by Sinaie et al. 2017.
 
     Example
     -------
@@ -152,10 +153,10 @@ def _upright_simplex(basis, kin, place):
 
 
 class Q4(cpdi.CarriedDomain):
-    """Quadrilaterals whose four corners move with those of neighbouring points.
+    """Quadrilaterals whose corners move with those of neighbouring points.
 
-    Domains always tile the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear
-    they tangle, which ends the run; R4 parallelograms cannot.
+    Domains tile the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear they
+    tangle, which ends the run; R4 parallelograms cannot tangle.
 
     Example
     -------
@@ -199,16 +200,16 @@ def _upright_q4(basis, kin, place):
     return least > 0
 
 
-# Weights of the ends of an edge at its nearer and farther Gauss point.
+# Weights of an edge's ends at its nearer and farther Gauss point.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
 class H8(cpdi.CarriedDomain):
-    """Trilinear hexahedra whose eight corners move with those of neighbouring points.
+    """Trilinear hexahedra whose corners move with those of neighbouring points.
 
-    Weights and gradients are exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate
-    cubics along each direction; N det J is cubic, grad N det J of lower order.
+    Weights and gradients are exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate N
+    det J, a cubic in each direction, and grad N det J, of lower order.
 
     Example
     -------
@@ -229,7 +230,7 @@ def _cross(a, b):
 def _at_gauss(a, b, c, d):
     """Bilinear interpolation of values at (-,-), (+,-), (-,+), (+,+) to the Gauss points.
 
-    The weights are symmetric: it also distributes values from the Gauss points to the corners.
+    By symmetry, also the distribution from Gauss points to corners.
     """
     e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
     g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
@@ -250,7 +251,6 @@ def _add(a, b):
 
 
 def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
-    """Signs of a corner: `s` in direction e, `a` and `b` in the others."""
     others = (a, b)
     return (*others[:e], s, *others[e:])
 
@@ -268,10 +268,11 @@ def _edges(place):
 
 @cpdi.domain.on(H8)
 def _domain_h8(basis, kin, place):
-    # Rows of the Jacobian at the Gauss points: u does not depend on xi, v not on eta, w not on
-    # zeta; the numbers are Gauss points of the other two directions.
+    # Rows of the Jacobian: u is independent of xi, v of eta, w of zeta; keys are Gauss points of
+    # the other two directions.
     u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(place)]
-    # Cofactors along xi by xi, eta, zeta; summed over the Gauss points of xi, and so on.
+    # Cofactors along xi by xi, eta, zeta, summed over the Gauss points of xi; likewise for the
+    # rest.
     first = {(a, b, c): _cross(v[a, c], w[a, b]) for a in (0, 1) for b, c in PAIRS}
     p = _at_gauss(*[_add(first[0, b, c], first[1, b, c]) for b, c in PAIRS])
     q = _at_gauss(*[_add(_cross(w[a, 0], u[0, c]), _cross(w[a, 1], u[1, c])) for a, c in PAIRS])

@@ -1,9 +1,8 @@
-"""Equations of state: pressure of a point from its volume.
+"""Equations of state: pressure of a point from its volume, positive in compression.
 
-An equation of state is a NamedTuple of parameters (its class is the tag) and a part of a composed
-law (`karamelo_py.points.laws.eos_strength`). Pressure is positive in compression; `j` = det F is
-the volume over the reference volume, `heat` the temperature (`Warm`), or () if the law has none.
-The memory is a tuple, empty for most. It has a `specific_volume`, like a law.
+An equation of state is a NamedTuple of parameters (its class is the tag) with a `specific_volume`,
+a part of a composed law (`karamelo_py.points.laws.eos_strength`). `j` = det F is the volume over
+the reference volume, `heat` the temperature (`Warm`) or (). The memory is a tuple, empty for most.
 """
 
 from typing import Any, NamedTuple
@@ -14,13 +13,12 @@ from karamelo_py.points.laws.parameters import AboveZero
 
 @point_function(otherwise=True)
 def initial_energy(eos, like):
-    """Initial memory of a point, in the number type of `like`."""
     return ()
 
 
 class VolumeStep(NamedTuple):
     before: Any  # volume ratio
-    j: Any  # volume ratio after the step
+    j: Any  # after the step
     dt: Any
 
 
@@ -32,13 +30,13 @@ def compressed(eos, memory, step, heating):
 
 @point_function(otherwise=True)
 def ignited(eos, memory, since):
-    """(memory,) of an explosive that was lit so long ago; () of other materials."""
+    """(memory,) of an explosive lit `since` this time; () of other materials."""
     return ()
 
 
 @point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
-    """(heat,), the part of `heat` that internal energy in the memory takes; () without."""
+    """(heat,), the part of `heat` taken by internal energy in the memory; () without."""
     return ()
 
 
@@ -50,7 +48,7 @@ def stored_heat(eos, loss):
 
 @point_function()
 def pressure(eos, j, memory, heat):
-    """Pressure at the volume ratio j."""
+    pass
 
 
 @point_function()

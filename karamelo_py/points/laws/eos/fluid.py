@@ -1,4 +1,4 @@
-"""Eos fluid, ideal-gas and jwl: liquids, gases with internal energy, and explosives."""
+"""Eos fluid, ideal-gas and jwl: liquids, gases with internal energy, explosives."""
 
 from math import inf, sqrt
 from typing import Any, NamedTuple
@@ -50,9 +50,9 @@ class Tait(NamedTuple):
     Notes
     -----
     p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is sqrt(K
-    gamma/rho0) at zero pressure. A smaller K than the real one allows longer steps: the density
-    stays within 1 % if speeds stay below 10 % of the speed of sound. In splashes, tension makes
-    drops swell and stick together; use ``tension=0``.
+    gamma/rho0) at zero pressure. A K below the real one allows longer steps: density stays within 1
+    % if speeds stay below 10 % of the speed of sound. In splashes, tension makes drops swell and
+    stick together: use ``tension=0``.
 
     See Also
     --------
@@ -64,9 +64,9 @@ class Tait(NamedTuple):
     scalarised = ("compression_energy",)
 
     specific_volume: float
-    K: float  # reference pressure; K gamma is the bulk modulus
+    K: float  # K gamma is the bulk modulus
     gamma: float
-    tension: float = inf  # sustainable; from K on the formula limits it
+    tension: float = inf  # sustainable; above K the formula limits it
 
     @classmethod
     def given(cls, rho0: AboveZero, K: AboveZero, gamma: AboveZero, *, tension: FromZero = inf):
@@ -159,12 +159,12 @@ class IdealGas(NamedTuple):
 
     Notes
     -----
-    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. Along an adiabat e grows as
-    rho^(gamma - 1), exactly in each step. Viscous work heats the gas, as does the kinetic energy
-    that PIC, FLIP, APIC, MLS and TPIC dissipate. With shocks, Q1 = 2 and Q2 = 0.2 are usual.
+    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. Adiabatic e grows as
+    rho^(gamma - 1), exactly in each step. Viscous work heats the gas, as does kinetic energy
+    dissipated by PIC, FLIP, APIC, MLS and TPIC. For shocks, Q1 = 2 and Q2 = 0.2 are usual.
 
     The gas has pressure from the first step: a free surface expands. Fix initial_stress changes the
-    energy, at constant volume.
+    energy at constant volume.
 
     See Also
     --------
@@ -325,7 +325,7 @@ class Jwl(NamedTuple):
     omega: float
     energy: float  # initial E, per reference volume
     D: float
-    cell_size: float  # known when the scene is lowered
+    cell_size: float  # set when the scene is lowered
 
     @classmethod
     def given(

@@ -52,19 +52,18 @@ class Shock(NamedTuple):
     Notes
     -----
     With mu = rho/rho0 - 1, p = rho0 c0^2 mu (1 + mu) / (1 - (S - 1) mu)^2 + Gamma rho0 cv (T - Tr)
-    for T above Tr (Meyers 1994, chapter 5). This is the Hugoniot curve, shifted by the heat of
-    plastic work if the material has a temperature. In tension the first part is rho0 c0^2 mu. The
-    curve has a pole at (S - 1) mu = 1. Beyond S (1 - rho0/rho) = 0.9 the pressure follows the
-    tangent.
+    for T above Tr (Meyers 1994, chapter 5). This is the Hugoniot curve plus, with a temperature,
+    the heat of plastic work. In tension the first part is rho0 c0^2 mu. The curve has a pole at (S
+    - 1) mu = 1; beyond S (1 - rho0/rho) = 0.9 the pressure follows the tangent.
 
-    The pressure is never below -tension: voids open at constant tension (spall), and close before
-    the material sustains pressure again. The velocity of a free surface then drops by du = 2
-    tension/(rho0 c0), in the acoustic approximation (Antoun et al. 2003, Spall Fracture, section
-    4.2). The remaining tension slows the spalled layer further; a damage releases it.
+    Voids open at constant tension (spall), and close before the material sustains pressure again.
+    The velocity of a free surface then drops by du = 2 tension/(rho0 c0), in the acoustic
+    approximation (Antoun et al. 2003, Spall Fracture, section 4.2). The remaining tension slows the
+    spalled layer further; a damage releases it.
 
-    In compression, at a rate of volume change d < 0, the viscous pressure rho h (Q1 h d^2 - Q2 c d)
-    is added, with the cell size h and the speed of sound c (von Neumann & Richtmyer 1950; Landshoff
-    1955). It spreads a shock over a few cells, and shortens the time step.
+    In compression, with the rate of volume change d < 0, cell size h and speed of sound c, the
+    viscous pressure is rho h (Q1 h d^2 - Q2 c d) (von Neumann & Richtmyer 1950; Landshoff 1955). It
+    spreads shocks over a few cells, and shortens the time step.
 
     See Also
     --------
@@ -96,7 +95,7 @@ class Shock(NamedTuple):
         *,
         tension: FromZero = inf,
     ):
-        # K is unused because rho0 c0^2 replaces it; it could only replace c0.
+        # K could only replace c0: rho0 c0^2 replaces K.
         if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
             raise ScriptError(
                 f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
@@ -161,7 +160,7 @@ def _bulk_modulus_shock(eos, j, memory, heat):
 
 @compression_energy.on(Shock)
 def _compression_energy_shock(eos, j, memory):
-    # Beyond the volume ratio at which cold material reaches its tension, that is constant.
+    # Constant beyond the volume ratio at which cold material reaches its tension.
     most = min(eos.tension, eos.modulus)
     bounded = most < eos.modulus
     whole = where(bounded, eos.modulus / where(bounded, eos.modulus - most, 1), inf)

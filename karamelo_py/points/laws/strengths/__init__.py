@@ -1,9 +1,9 @@
 """Strengths: deviatoric stress of a point from its strain. One file each.
 
-A strength is a NamedTuple of parameters (its class is the tag) and a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). `heat` is the temperature (`Warm`), or () without one.
-Strengths that depend on pressure and change the volume define `pressure_response` instead of
-`shear_response`. Defaults are for an elastic strength with a shear modulus ``G`` and no memory.
+A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
+(`karamelo_py.points.laws.eos_strength`). `heat` is the temperature (`Warm`), or (). Strengths that
+depend on pressure and change the volume define `pressure_response` instead of `shear_response`.
+Defaults are for an elastic strength with a shear modulus ``G``, without memory.
 """
 
 import sys
@@ -16,7 +16,7 @@ from karamelo_py.points.laws import column
 
 
 class StrainStep(NamedTuple):
-    s: Any  # deviatoric stress before the step, rotated with the point
+    s: Any  # before the step, rotated with the point
     strain: Any  # increment, not deviatoric
     j: Any  # volume ratio after the step
     dt: Any
@@ -40,8 +40,8 @@ class Remembered(NamedTuple):
 def remembers(strength: type, **numbers: float | str) -> None:
     """Declare the memory of a strength: names of numbers, also dump columns, and initial values.
 
-    An initial value is a number or the name of a parameter. ``ep``, the equivalent plastic strain,
-    comes first.
+    A value is a number or the name of a parameter; ``ep``, the equivalent plastic strain, comes
+    first.
     """
     name = f"{strength.__name__}Memory"
     memory_class = namedtuple(name, numbers, module=strength.__module__)
@@ -70,7 +70,7 @@ def initial_memory(strength, like):
 def respond(strength, law, kin, step, memories):
     """Deviatoric stress, memory, and work per volume that is not stored, after a `StrainStep`.
 
-    `memories` are the memories of all parts of the `law`.
+    `memories`: of all parts of the `law`.
     """
     return shear_response(strength, kin, step, memories.strength, memories.heat)
 
@@ -90,7 +90,7 @@ def pressure_response(strength, kin, trial, strain):
 
 @point_function()
 def fbar_fraction(strength, memory):
-    """Fraction of the averaged pressure that the yield surface uses, with F-bar.
+    """Fraction of the averaged pressure used by the yield surface, with F-bar.
 
     Undefined for strengths independent of pressure.
     """

@@ -1,4 +1,4 @@
-"""Strengths tabulated and formula: a flow stress given in the script."""
+"""Strengths tabulated and formula: a flow stress from the script."""
 
 from pathlib import Path
 from typing import ClassVar, NamedTuple
@@ -37,9 +37,9 @@ class Tabulated(NamedTuple):
 
     Notes
     -----
-    Constant beyond the last point. The flow stress may fall by less than 3 G per unit of plastic
-    strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves for the
-    plastic strain with the flow stress at its end.
+    Constant beyond the last point; a fall must be less than 3 G per unit of plastic strain.
+    ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves for the plastic
+    strain with the flow stress at its end.
 
     See Also
     --------
@@ -175,7 +175,7 @@ class FlowStress(NamedTuple):
     Notes
     -----
     Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
-    with finite-difference slopes. Y may fall by less than 3 G per unit of plastic strain. A
+    with finite-difference slopes. A fall of Y must be less than 3 G per unit of plastic strain; a
     negative Y counts as 0. Formulas are interpreted: no compilation, but ten times slower than a
     compiled law.
 
@@ -213,7 +213,7 @@ def _check_formula(law: FlowStress) -> None:
 
 
 def value(strength, ep, epdot, T):
-    """The formula at a plastic strain, rate and temperature, in double precision."""
+    """The formula in double precision."""
     stack = (0.0,) * DEPTH  # top first
     for k in range(int(strength.count)):
         op = int(strength.program[2 * k])

@@ -44,14 +44,14 @@ class DruckerPrager(NamedTuple):
     psi
         Angle of dilatancy in degrees, from 0 (no plastic volume change in shear) to phi.
     fit
-        How the cone matches the surface of mohr-coulomb: ``compression`` and ``extension``, in the
-        triaxial tests, or ``plane-strain``, at the limit load in plane strain.
+        Match with mohr-coulomb: ``compression`` or ``extension`` in triaxial tests, or
+        ``plane-strain`` at the limit load in plane strain.
     tension
         Largest mean stress in tension; default: at the apex of the cone.
     residual_cohesion, residual_phi
         Residual cohesion and friction angle; default: no softening.
     softening
-        Equivalent plastic strain over which they fall, linearly in the coefficients of the cone.
+        Equivalent plastic strain of the fall, linear in the cone's coefficients.
 
     Example
     -------
@@ -68,8 +68,7 @@ class DruckerPrager(NamedTuple):
     tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so the limit in plane strain equals
     mohr-coulomb's for any psi. The dilatancy coefficient is d, and for the other fits eta of psi.
     Tension beyond -p = tension, or the apex, is cut off. Pressure follows from the elastic part of
-    J. A step uses the strength at its beginning. With
-    softening, results depend on the cell size.
+    J. A step uses the strength at its beginning. With softening, results depend on the cell size.
 
     See Also
     --------

@@ -1,11 +1,11 @@
 """Base of pressure-dependent strengths: cohesion and friction, optional softening; memory.
 
 The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and the volume ratio Js
-of separation. Beyond the largest sustainable tension, points separate: the volume gained is closed
-before they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of
+of separation. Beyond the largest sustainable tension points separate; that volume closes before
+they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of
 granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017,
 "Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section
-4.3.4). The volume gained by plastic shear (dilatancy) remains.
+4.3.4). Volume gained by plastic shear (dilatancy) remains.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
-    """Cohesion, friction and dilation of the yield surface after a plastic strain.
+    """Cohesion, friction and dilation after a plastic strain.
 
     Linear from the peak to the residual; a step uses the values at its beginning.
     """
@@ -56,11 +56,11 @@ def tension_bound(strength, lowest):
 
 
 def fraction_by_dilatancy(strength, memory):
-    """The fraction b of the averaged pressure that the yield surface uses, with F-bar.
+    """Fraction b of the averaged pressure used by the yield surface, with F-bar.
 
-    Averaging multiplies waves by a factor a (1 for long waves, 0.1 to 0.5 for two or three cells).
-    Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with
-    the sines f of friction and d of dilatancy. With b = 0 it is negative for a between d and f:
+    Averaging multiplies waves by a (1 for long waves, 0.1 to 0.5 for two or three cells). Their
+    stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with the
+    sines f of friction and d of dilatancy. With b = 0 it is negative for a between d and f:
     pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a square.
     """
     f, d = sines_after(strength, memory.ep)
@@ -116,7 +116,7 @@ def respond_by_friction(strength, law, kin, step, memories):
 
 
 def frictional(strength: type) -> None:
-    """Give `strength` (with a field ``G`` and the fields of `surface`) memory and response."""
+    """Give `strength` (with ``G`` and the fields of `surface`) memory and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
     respond.on(strength)(respond_by_friction)

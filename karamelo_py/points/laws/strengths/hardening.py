@@ -19,22 +19,21 @@ from karamelo_py.points.laws.strengths import remembers, shear_response
 
 
 def elastic_trial(G, s, strain):
-    """Deviatoric stress after a strain increment assumed elastic."""
     # The deviator of the sum: rounding over many steps would give s a trace.
     return dev(s + 2 * G * strain)
 
 
 class LinearHardening(NamedTuple):
-    """Elastic shear up to a yield stress, constant or with linear hardening (von Mises).
+    """Von Mises yield stress, constant or with linear hardening.
 
     Parameters
     ----------
     G
         Shear modulus.
     yield_stress
-        Yield stress in uniaxial tension, sqrt(3) times that in pure shear.
+        In uniaxial tension, sqrt(3) times the value in pure shear.
     H
-        Hardening modulus: rise of the yield stress per unit of plastic strain.
+        Hardening modulus: increase of the yield stress per unit of plastic strain.
 
     Example
     -------
@@ -106,7 +105,7 @@ def flow_stress(strength, before, increment, dt):
 
 @point_function(otherwise=True)
 def precompute(strength, memory, heat):
-    """The part of the flow stress that does not depend on the step's increment."""
+    """Part of the flow stress that is independent of the step's increment."""
     return ()
 
 
@@ -114,8 +113,7 @@ def precompute(strength, memory, heat):
 def first_guess(strength, before, q, slope):
     """First guess of the plastic strain, 0 for q below the flow stress, and a bound k.
 
-    `slope` is 3 G. A change c in Newton's method is followed by about k c^2, or less the further
-    the flow stress has hardened.
+    `slope` is 3 G. A change c in Newton's method is followed by at most about k c^2.
     """
     return real(0, q), real(0, q)
 
@@ -135,8 +133,8 @@ def onto_yield_surface(trial, q, flow, x):
 def radial_return(strength, kin, step, memory, heat):
     """Radial return: scale the trial deviatoric stress by flow/q (Wilkins 1964).
 
-    The `shear_response` of strengths with a field ``G``, a `flow_stress`, and ``ep`` in the memory;
-    q is the von Mises stress of the elastic trial.
+    The `shear_response` of strengths with ``G``, a `flow_stress`, and ``ep`` in the memory; q is
+    the von Mises stress of the elastic trial.
     """
     trial = elastic_trial(strength.G, step.s, step.strain)
     q = von_mises(trial)
@@ -154,8 +152,8 @@ _MOST_ITERATIONS = 80
 def plastic_increment(strength, q, memory, heat, dt):
     """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x, the flow stress does not: unique for any step size. Newton's method
-    from a first guess, safeguarded by bisection.
+    The left side falls with x, the flow stress does not: unique for any step size. Newton's method,
+    safeguarded by bisection.
     """
     slope = 3 * strength.G
     enough = 4 * round_off(q) * q  # rounding of the three terms
@@ -173,8 +171,8 @@ def plastic_increment(strength, q, memory, heat, dt):
         high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
-        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. Next to a kink of the
-        # curve it is larger, so the excess must be small, too.
+        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n; larger next to a kink of
+        # the curve, so the excess must be small, too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))

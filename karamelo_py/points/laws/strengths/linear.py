@@ -59,7 +59,7 @@ class Viscous(NamedTuple):
     Notes
     -----
     s = 2 mu dev(D), D the strain rate. Viscosity shortens the stable step unless 4/3 mu/(rho h) is
-    small compared with the speed of sound. Viscous work counts as dissipated energy.
+    much less than the speed of sound. Viscous work counts as dissipated energy.
 
     See Also
     --------
@@ -69,7 +69,7 @@ class Viscous(NamedTuple):
     in_lanes = True
     traits = LawTraits(flows=True)
 
-    mu: float  # dynamic viscosity
+    mu: float
     cell_size: float  # h, set when the scene is lowered
 
     @classmethod

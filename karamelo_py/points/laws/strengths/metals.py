@@ -52,7 +52,7 @@ class JohnsonCook(NamedTuple):
     -----
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
     1983). The second factor is 1 up to the reference rate, the third without a temperature. Each
-    step solves for the plastic strain with the flow stress at its end, the rate of the step and the
+    step solves for the plastic strain with the flow stress at its end, the step's rate and the
     temperature at its beginning: one solution for any step size.
 
     See Also

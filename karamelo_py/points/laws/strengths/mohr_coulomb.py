@@ -43,11 +43,11 @@ class MohrCoulomb(NamedTuple):
     Notes
     -----
     s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
-    stress (tension positive). Beyond this surface, principal stresses return to a plane, an edge
-    (two equal) or, in tension, the apex p = -c cot(phi) (Simpson 2017, Practical Finite Element
-    Modeling in Earth Science using Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2).
-    Pressure follows from the elastic part of J. A step uses the strength at its beginning. With
-    softening, results depend on the cell size.
+    stress (tension positive). Principal stresses return to a plane, an edge (two equal) or, in
+    tension, the apex p = -c cot(phi) (Simpson 2017, Practical Finite Element Modeling in Earth
+    Science using Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2). Pressure follows
+    from the elastic part of J. A step uses the strength at its beginning. With softening, results
+    depend on the cell size.
 
     See Also
     --------
@@ -88,9 +88,9 @@ frictional(MohrCoulomb)
 def returned_to_plane(s, yield_surface, G, K):
     """Return principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    To a plane; if that changes their order, to an edge of two planes; failing that, to the apex
-    (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
-    sin(phi), sin(psi).
+    To a plane; if that changes their order, to an edge; failing that, to the apex (Simpson 2017,
+    section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi), sin(phi),
+    sin(psi).
     """
     k, sin_phi, sin_psi = yield_surface
     lam = K - 2 / 3 * G

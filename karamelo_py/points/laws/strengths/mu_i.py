@@ -45,8 +45,8 @@ class MuI(NamedTuple):
     sqrt(s:s/2) = mu(I) p in flow, with mu = mu_s + (mu_2 - mu_s)/(I0/I + 1) (Jop, Forterre &
     Pouliquen 2006). I = gamma' d sqrt(rho_s/p), with the plastic shear rate gamma'. Below mu_s p
     the response is elastic. A step of any size solves a quadratic equation for the shear stress at
-    its end (Dunatunga & Kamrin 2015). Below the initial density the grains are separated and
-    sustain no stress. Flow conserves the volume. Dump column ``inertial``: I.
+    its end (Dunatunga & Kamrin 2015). Below the initial density grains separate and sustain no
+    stress. Flow conserves the volume. Dump column ``inertial``: I.
 
     See Also
     --------
@@ -162,5 +162,5 @@ def _respond_mu_i(strength, law, kin, step, memories):
 
 
 def yields_early_with_fbar(strength):
-    """True for friction with little dilatancy: averaged stress yields at the point's pressure."""
+    """Check for friction with little dilatancy: averaged stress yields at the point's pressure."""
     return isinstance(strength, MuI) or little_dilatancy(strength) > 0
