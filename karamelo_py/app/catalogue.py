@@ -55,7 +55,6 @@ def describe_parameter(parameter: Parameter) -> str:
 
 
 def print_styles(words: Sequence[str]) -> int:
-    """List commands and styles, or a family; return the exit status."""
     if len(words) > 1:
         raise ScriptError(f"too many arguments: {' '.join(words)}", expected=STYLES_USAGE)
     page = _Page()
@@ -68,7 +67,7 @@ def print_styles(words: Sequence[str]) -> int:
 
 
 def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
-    """Explain a name, or a family and a name; return the exit status."""
+    """Explain a name, or a family and a name."""
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
             with registry.modules_of(Path()):
@@ -130,7 +129,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """The family of a word: fixes, Fix and fix are the same."""
+    """fixes, Fix and fix are the same."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -222,7 +221,6 @@ def _arguments(word: str) -> dict[str, Parameter]:
 
 
 def _explain_argument(word: str, parameters: dict[str, Parameter]) -> None:
-    """Print the longest explanation of an argument, and its other uses."""
     page = _Page()
     owner, parameter = max(parameters.items(), key=lambda item: len(item[1].description))
     page.say(word, "bold")

@@ -165,7 +165,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Select the last of the files that a shell has put after -restart."""
+    """The last of the files that a shell has put after -restart."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -257,7 +257,6 @@ class CommandLine(argparse.ArgumentParser):
 
 
 def _parser(command: str) -> tuple[CommandLine, Any]:
-    """Make the parsers; only that of `command` is complete."""
     parser = CommandLine(
         prog="karamelo-py",
         usage=USAGE,

@@ -62,7 +62,7 @@ PATIENCE, LONGER = 2.0, 6.0
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
-    """Run a function; return its exit status and a message to print."""
+    """Exit status of a function, and a message to print."""
     try:
         return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
@@ -83,7 +83,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
 
 
 def rendered(error: BaseException) -> str:
-    """Format any exception for the user, without a traceback."""
+    """Any exception for the user, without a traceback."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
@@ -99,7 +99,6 @@ def rendered(error: BaseException) -> str:
 
 
 def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.start") -> int:
-    """Run a program on `ranks` processes; return the exit status."""
     cores = os.cpu_count() or 1
     if ranks > A_CORE * cores:
         raise ScriptError(
@@ -199,7 +198,6 @@ class Launcher:
                 socket.send_fds(link, [b"0"], [1, 2])
 
     def _outcome(self) -> int:
-        """Determine the exit status; report what no process could."""
         first = self.reports.get(0)
         failed = [one for _, one in sorted(self.reports.items()) if one["status"]]
         if first is not None and first["status"]:
@@ -243,7 +241,6 @@ class Launcher:
 
 
 def _received(link: socket.socket) -> bytes:
-    """Read available data; close the link if the other end is closed."""
     data = b""
     with suppress(OSError):
         while chunk := link.recv(1 << 16):
@@ -294,7 +291,6 @@ def _stream(fd: int) -> TextIO:
 
 
 def _heed(link: socket.socket) -> None:
-    """Receive signals from the launcher; end the run if it is gone."""
     with suppress(OSError):
         while number := link.recv(1):
             os.kill(os.getpid(), number[0])

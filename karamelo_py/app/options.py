@@ -57,7 +57,6 @@ def above_zero(text: str) -> float:
 
 
 def make_folder(folder: Path, option: str) -> None:
-    """Make a folder for files, for an `option` such as -out {}."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -21,7 +21,7 @@ is explained by karamelo-py help command plot."""
 
 
 def read_text(path: Path, expected: str | None = None) -> str:
-    """Read a file of an earlier run; empty if it is not text."""
+    """Empty if the file is not text."""
     try:
         return reading.read_text(path, largest=None)
     except OSError as error:

@@ -57,7 +57,7 @@ class KarameloWarning(UserWarning):
 
 
 class Quiet(Console):
-    """Console that prints nothing; warnings are Python warnings."""
+    """Prints nothing; warnings are Python warnings."""
 
     def __init__(self) -> None:
         super().__init__(quiet=True)
@@ -337,7 +337,6 @@ class Simulation:
 
     @contextmanager
     def _carried_out(self) -> Iterator[None]:
-        """Execute runs at once, and handle interrupts."""
         with self._in_one_thread():
             pausing, self.hub.pausing = self.hub.pausing, False
             try:

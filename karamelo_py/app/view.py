@@ -150,7 +150,7 @@ def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _scene(options: argparse.Namespace) -> Hub:
-    """Execute the script without steps; without a script the scene is empty."""
+    """Without a script the scene is empty."""
     if options.script is None and options.var:
         raise ScriptError(
             f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
@@ -186,7 +186,6 @@ def _log_beside(
 
 
 def _tools(scene: Hub) -> list[Any]:
-    """Walls and tools of all runs at their present positions."""
     fixes = [candidate for candidate in dict.fromkeys(scene.in_runs) if isinstance(candidate, Fix)]
     tools = tools_of(fixes)
     for fix, tool in zip((fix for fix in fixes if fix.depth_of), tools, strict=True):
@@ -362,7 +361,6 @@ def _all(
     made_look: Look,
     chosen: Callable[[Snapshot], Snapshot],
 ) -> tuple[np.ndarray, np.ndarray, Any]:
-    """Bounds of all snapshots, and limits of a column."""
     from karamelo_py.output.pictures import grown, in_window, within
 
     corners, ends, count, left = [], [], 0, 0

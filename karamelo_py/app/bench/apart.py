@@ -65,7 +65,6 @@ def measured_apart(job: Measurement) -> Measured | Solved | int:
 
 
 def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
-    """Exit status and results of separate processes."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "found.json"
         words = [json.dumps(job._replace(file=str(file)))]
@@ -103,7 +102,6 @@ def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[S
 
 
 def grown(script: str, presets: Mapping[str, str], times: int) -> dict[str, str]:
-    """The variable that gives a scene `times` the points."""
     d = int(re.search(r"dimension\((\d)", script)[1])
     name, value = re.search(r"^(N|coarser) = (\S+)$", script, re.M).groups()
     value = float(presets.get(name, value))

@@ -189,7 +189,7 @@ def _print_solved(one: measure.Solved) -> None:
 
 
 def commit() -> str | None:
-    """The commit, if the program runs from its repository."""
+    """None outside a repository."""
     folder = Path(karamelo_py.__file__).parent
 
     def git(*words: str) -> str:

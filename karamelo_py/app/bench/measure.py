@@ -99,7 +99,7 @@ class Measured(NamedTuple):
 
     @property
     def told_apart(self) -> bool:
-        """True if sweeps are long enough to be timed."""
+        """Sweeps are long enough to be timed."""
         return self.swept <= APART
 
     @property
@@ -136,8 +136,6 @@ class Measured(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """Measured speed of load steps."""
-
     points: int
     speeds: list[float]  # particle-steps per second
     unknowns: int
@@ -189,7 +187,6 @@ def build(
     workload: Workload, threads: int | None, presets: Mapping[str, str],
     comm: MpiComm | None = None, card: Any = None,
 ) -> Simulation:  # fmt: skip
-    """Build a workload's simulation; `presets` set variables, a `card` runs the steps."""
     hub = Hub(Console(quiet=True))
     hub.settings.threads = threads
     if card is not None:
@@ -395,5 +392,4 @@ def bandwidth(threads: int, size: float = ARRAYS) -> float:
 
 
 def start_of_threads() -> float:
-    """Measure the seconds to start and join threads."""
     return _fastest(200, _triad, Threaded(), *np.ones((3, 64)), 0.5, config.NUMBA_NUM_THREADS, 1)

@@ -132,7 +132,6 @@ class FolderPage:
         return count, {**news, "over": False}
 
     def _frame(self, words: Mapping[str, str]) -> bytes | None:
-        """Read a state with the column that the page shows now."""
         k = number_in(words)
         if not 0 <= k < len(self._states):
             return None

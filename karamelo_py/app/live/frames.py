@@ -76,7 +76,6 @@ class KeptFrames:
                 del self._kept[number]
 
     def replace_last(self, take: Callable[[], Frame]) -> None:
-        """Replace the newest frame with one taken under the lock."""
         with self._lock:
             self._kept[self._next - 1] = take()
             self._new[-1] = (self._next - 1, time.perf_counter())

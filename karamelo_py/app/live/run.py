@@ -64,7 +64,7 @@ class RunPage(Rhythmic, Listener):
         self._paused = False
 
     def write(self) -> None:
-        """Show the present state; wait while the page pauses the run."""
+        """Waits while the page pauses the run."""
         hub, simulation = self.hub, self.hub.simulation
         self.every = hub.output.log.every  # a run starts with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
@@ -179,6 +179,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Interrupt the run like Ctrl-C: the last state is written."""
+        """Like Ctrl-C: the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

@@ -113,7 +113,6 @@ class Server:
 
 
 def require_plotly() -> None:
-    """Check that Plotly is installed, without its slow import."""
     if importlib.util.find_spec("plotly") is None:
         raise ScriptError(
             "a page needs the package plotly",

@@ -79,7 +79,7 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """New rows and cases; cases that neither run nor have a row are waiting."""
+        """Cases that neither run nor have a row are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         news = {

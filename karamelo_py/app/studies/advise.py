@@ -299,7 +299,6 @@ class Adviser:
         return None
 
     def doubts(self, best: Candidate) -> list[str]:
-        """Reasons why the error of a forecast may stop falling."""
         reasons = [f"its runs warn: {text}" for text in best.choice.warnings[:1]]
         if self._crosses(best.choice, best.step):
             basis = ", ".join(best.choice.kind & {*JUMPING})

@@ -54,8 +54,6 @@ PICTURES = (".png", ".svg")
 
 @dataclass
 class Entry:
-    """A picture or table, with its commands."""
-
     name: str  # folder; the part before a slash is its group
     text: str = ""  # what it shows
     commands: list[str] = field(default_factory=list)  # without the word karamelo-py

@@ -88,8 +88,6 @@ def said_in(file: Path) -> str:
 
 
 class Refused(ScriptError):
-    """A variant refused for a mistake of its script."""
-
     def __init__(self, case: Mapping[str, str], outcome: CaseOutcome):
         super().__init__(outcome.reason)
         message = error_of(record_of(outcome.folder)).get("rendered", outcome.complaint.rstrip())
@@ -105,8 +103,6 @@ class Stop(Exception):
 
 @dataclass
 class Launch:
-    """Settings of the runs of a study."""
-
     script: Path
     threads: int = 1  # of each run
     repeat: int = 1  # runs of each case; the time is their median
@@ -234,7 +230,7 @@ def command_of(script: str | Path, case: Mapping[str, str]) -> str:
 
 
 def environment() -> dict[str, str]:
-    """Environment of a run, which imports this very program."""
+    """Runs import this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}

@@ -194,7 +194,6 @@ def curves(options: Namespace, table: Table, by: list[str]) -> int:
 
 
 def keeps(options: Namespace, table: Table, by: list[str]) -> int:
-    """Show which runs conserve a log column, and which fail silently."""
     out = out_file(options.o, ".md") if options.o else None
     require("-by", by, table.variables)
     over, parts, folder = options.x or "Time", table.made.get("computes", ()), table.path.parent
@@ -215,7 +214,6 @@ def keeps(options: Namespace, table: Table, by: list[str]) -> int:
 
 
 def tell(family: Family, *, costs: bool) -> None:
-    """Print the runs by cost, the Pareto front, and the orders of lines."""
     front = {id(row) for row in family.front()} if costs else set()
     named = {"x": family.along, "cost": family.cost if costs else None, "error": family.accuracy}
     columns = {column: name for column, name in named.items() if name}
@@ -332,7 +330,7 @@ def write_page(family: Family, sheet: pictures.Sheet) -> None:
 
 
 def in_html(lead: str, exponent: int) -> str:
-    """Format a number in HTML; without a lead, the power of ten alone."""
+    """Without a lead, the power of ten alone."""
     return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
 
 

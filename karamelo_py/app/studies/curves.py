@@ -69,7 +69,6 @@ WORSE = 1.1  # ratio of a worse error
 
 
 def reached(words: Iterable[str]) -> float:
-    """The highest order to expect of a choice."""
     return min((REACHED[word] for word in words if word in REACHED), default=4)
 
 
@@ -160,13 +159,12 @@ class GroupedRuns:
 
     @property
     def shown(self) -> np.ndarray:
-        """Mask of runs that a diagram can show."""
         good = np.isfinite(self.error) & (self.error > 0)
         return good & np.isfinite(self.across) & (self.linear | (self.across > 0))
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Format a choice; values that mean nothing alone have their name."""
+    """Values that mean nothing alone have their name."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -221,7 +219,7 @@ class Family:
         return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
 
     def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
-        """Find chance in a line whose points only increase or only decrease."""
+        """Only in a line whose points increase or decrease throughout."""
         points = column(rows, "points")
         rise = np.diff(points[np.isfinite(points)])
         if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):
@@ -231,13 +229,11 @@ class Family:
         return by_chance(x[::way], signed[::way], highest)[::way]
 
     def place(self, row: Mapping[str, str]) -> float:
-        """A run's position along its line."""
         end = row[self.along]
         return self.words.index(end) if self.words else number_of(end)
 
     @property
     def error_label(self) -> str:
-        """Axis title of the error, with the formula of the sweep."""
         words = (word.partition("=") for word in self.table.made.get("record", ()))
         formula = {name: formula for name, _, formula in words}.get(self.accuracy)
         if not formula:

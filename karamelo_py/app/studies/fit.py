@@ -268,7 +268,6 @@ def disagree(best: End, other: End, half: np.ndarray) -> bool:
 
 
 def tell_apart(search: Search, ends: Sequence[End]) -> None:
-    """Print ends that disagree, the likely cause and a fix."""
     print("The searches end at different values, so there is no +-:")
     for end in ends:
         values = search.case(end.share)

@@ -109,7 +109,7 @@ def label(name: str) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Round ticks of a logarithmic axis, whose labels do not touch."""
+    """Round ticks whose labels do not touch."""
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
@@ -134,7 +134,7 @@ def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
 
 
 def log_axis(axis: "Axis", low: float, high: float, values: Sequence[float] | None = None) -> None:
-    """Make an axis logarithmic, with ticks at `values` if they are few."""
+    """Ticks are at `values` if they are few."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     axes = axis.axes

@@ -52,7 +52,6 @@ DECADES = 1e4  # ratio of values above which a curve gets a logarithmic axis
 
 
 def lines(family: Family, sheet: Sheet) -> None:
-    """Draw errors over costs with the Pareto front, or over a variable."""
     figure = blank_figure(8.4, 5.2)
     axes = figure.subplots()
     convergence = family.convergence
@@ -97,7 +96,6 @@ def lines(family: Family, sheet: Sheet) -> None:
 
 
 def _bars(family: Family, line: GroupedRuns) -> np.ndarray:
-    """Half the spread of repeated costs."""
     spread = column(line.rows, f"{family.cost}_spread")
     return np.zeros(len(spread)) if family.convergence else np.nan_to_num(spread) / 2
 
@@ -149,7 +147,6 @@ def _footnote(figure: "Figure", family: Family) -> None:
 
 
 def heat(family: Family, x: str, y: str, sheet: Sheet) -> None:
-    """Draw errors over two variables, as coloured cells with numbers."""
     from matplotlib import colormaps
     from matplotlib.colors import LogNorm
 
@@ -210,8 +207,6 @@ def _sorted(rows: Sequence[Mapping[str, str]], name: str) -> list[str]:
 
 
 class History(NamedTuple):
-    """One column over another in a run."""
-
     x: np.ndarray
     y: np.ndarray
     label: str  # choice of the run

@@ -137,7 +137,6 @@ def recorded(
 
 
 def _is_closed(text: str) -> bool:
-    """True if every closing parenthesis was opened before."""
     depths = itertools.accumulate((sign == "(") - (sign == ")") for sign in text)
     return min(depths, default=0) >= 0
 

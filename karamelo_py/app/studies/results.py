@@ -21,7 +21,6 @@ LAW = 200  # points on the curve of a law
 
 
 def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
-    """Draw columns of a table over -x; return the exit status."""
     results = names(options.y)
     require("-y", results, table.rows[0])
     if not options.x:
@@ -68,8 +67,6 @@ def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) ->
 
 
 class Law:
-    """A formula of `x`, for arrays."""
-
     def __init__(self, text: str, x: str):
         self.text, self.x = text, x
         self.raw, self.node = parse_text(text, "-law")

@@ -413,7 +413,6 @@ class Map:
         savefig(figure, path)
 
     def _shade(self, figure: "Figure", axes: "Axes") -> None:
-        """Shade stable cells by errors, interpolated between runs."""
         from matplotlib.colors import LinearSegmentedColormap, LogNorm
 
         stable = [cell for cell, kind in self.classes.items() if kind == "stable"]
@@ -495,7 +494,7 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill in cells between equal ones unless row and column disagree."""
+    """Cells between equal ones, unless row and column disagree."""
     filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)

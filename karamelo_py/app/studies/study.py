@@ -133,7 +133,7 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """Choose a case; the first of a kind goes ahead, because it compiles."""
+            """The first of a kind goes ahead, because it compiles."""
             kinds = (((case, folder), kind_of(case.values())) for case, folder in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
@@ -294,7 +294,6 @@ def plain_table(words: Sequence[str], numbers: Sequence[str], title: str | None 
 
 
 def results_table(rows: Sequence[Row], study: Study, console: Console) -> Table:
-    """Make a table of runs; facts are omitted before values are cut."""
     from rich.text import Text
 
     words, facts = [item.word for item in study.items], list(_FACTS)

@@ -250,7 +250,6 @@ def add_axes(parser: ArgumentParser) -> None:
 
 
 def along(options: Namespace, x: str, y: str) -> tuple[str, str]:
-    """Axis labels of the options, by default `x` and `y`."""
     words = split(options.axes or ",")
     if len(words) != 2:
         raise ScriptError(f"-axes {options.axes}", expected="two, such as -axes 'time (s),F (N)'")

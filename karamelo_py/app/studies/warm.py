@@ -62,8 +62,6 @@ class WarmProcess:
 
 
 class WarmProcesses:
-    """Warm processes by kind; they end with the study."""
-
     def __init__(self, environment: Mapping[str, str]):
         self.environment = environment
         self.tries = TRIES if sys.platform == "linux" else 0
@@ -151,7 +149,6 @@ def begin() -> NoReturn:
 
 
 def keep(link: socket.socket) -> NoReturn:
-    """Start runs as copies of this process until the study ends."""
     gc.collect()
     gc.freeze()
     gc.disable()
@@ -214,7 +211,6 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
 
 
 def _is_clean() -> bool:
-    """True if only the program itself has run here."""
     from karamelo_py.language import registry
 
     return NOT_OURS not in sys.modules and not registry.foreign()

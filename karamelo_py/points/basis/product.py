@@ -110,7 +110,6 @@ def digits(k, base, d):
 
 
 def item(values, k):
-    """values[k], k known only at run time."""
     return values[k]
 
 

@@ -527,7 +527,6 @@ for _kind in (Elements, Vector, Matrix, Tensor, SymmetricTensor):
 
 
 def _class(kind: type, tag: type, names: tuple, around: tuple = ()) -> type:
-    """Make the class of tensors of a kinematics; `around` names the hoop parts of gradients."""
     words = [name.translate(_WORDS) for name in names] + [f"around_{k + 1}" for k in around]
     name = f"{tag.__name__}{kind.__name__}" + ("Gradient" if around else "")
     one = type(name, (kind, namedtuple(name, words)), {"__module__": __name__})

@@ -137,7 +137,6 @@ def in_frame(s, directions):
 
 
 def out_of_frame(s, diagonal, shears, directions):
-    """Inverse of `in_frame`, of the class of `s`."""
     if s.kin.dimension == 2:
         a, b, c = diagonal
         k, g = directions

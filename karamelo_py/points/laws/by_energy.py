@@ -226,7 +226,6 @@ def _along_fibres(term: Term, writer: _ProgramWriter) -> dict[str, Any]:
 
 
 def _class_of(kind: type, codes: dict, count: int) -> type:
-    """Class of laws with these programs, named by their digest."""
     name = f"{kind.__name__}_{sha256(repr((codes, count)).encode()).hexdigest()[:16]}"
 
     def made() -> type:

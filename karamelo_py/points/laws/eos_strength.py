@@ -408,7 +408,6 @@ def damage_after_flow(law, state, strain, dt):
 
 
 def released(law, kin, state, damage):
-    """Stored energy released when the memory of the damage becomes `damage`."""
     if isinstance(law.damage, Absent):
         return 0
     J, s, m = state

@@ -151,7 +151,6 @@ def relaxed_part(branches):
 
 
 def internal_stress(memory, kin):
-    """Sum of the internal stresses."""
     return memory[0] + internal_stress(memory[1], kin) if len(memory) else nothing(kin)
 
 

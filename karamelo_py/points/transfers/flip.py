@@ -89,7 +89,6 @@ def _in_step_flip_per_time(transfer, kept):
 
 
 def take_nodal_velocity(transfer: type) -> None:
-    """Let points take the nodal velocity after the step, as in PIC."""
     lost_fractions.on(transfer)(_lost_fractions_pic)
     updated_velocity.on(transfer)(_updated_velocity_pic)
 
@@ -139,7 +138,7 @@ def warn_of_vibrations(transfer: type) -> None:
 
 
 def _turns_away(transfer, scene):
-    """Check whether a free body rotates so often that the loss per revolution adds up."""
+    """The loss per revolution adds up over many."""
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
@@ -170,7 +169,7 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """Check whether points lag a free rotation by 3 % or more, over a radian or more."""
+    """Lag of 3 % or more, over a radian or more."""
     lag = scene.lag
     return lag.share > LAG and 2 * pi * lag.turns > 1
 

@@ -70,7 +70,6 @@ def of_one(block):
 
 
 def _spread_out(hats: Iterable, values: Iterable) -> tuple:
-    """Corner values at the nodes: products of the hats of both directions."""
     totals: tuple = ()
     for (rows, line), value in zip(hats, values, strict=True):
         pairs = [(value * row, hat) for row in rows for hat in line]
