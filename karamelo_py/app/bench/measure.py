@@ -116,7 +116,7 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """What takes at least half of a step: ``overhead``, ``nodes``, ``memory``.
+        """The part that takes at least half of a step: ``overhead``, ``nodes``, ``memory``.
 
         Memory is relative to arrays as large as the scene. Else ``arithmetic`` (instructions or
         latency), or ``unknown`` if not `told_apart`.
