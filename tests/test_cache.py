@@ -26,6 +26,7 @@ from karamelo_py.compiler.disk import cache
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.lowering import FunctionType
+from karamelo_py.compiler.trace.session import session
 from karamelo_py.kernels.table import each_node
 from karamelo_py.output.console import Console
 from karamelo_py.run.timings import Timings
@@ -481,10 +482,10 @@ def test_a_function_that_a_kernel_is_given_is_not_described():
 
 def test_all_that_the_program_registers_has_words():
     """Without words for one of them no kernel would be found by its sources."""
-    for made in choices.registered:
+    for made in session.registered:
         if not choices.modules_of(made):
             assert cache._words(made) == cache._words(made)
-    assert len(choices.registered) > 50
+    assert len(session.registered) > 50
 
 
 def test_what_threads_do_is_followed():

@@ -43,5 +43,11 @@ def _at_points_called(hooks, stage, then, s):
         _act(hooks.address, stage)
 
 
+def _by_compiled_hooks(function):
+    @function.on(CalledHooks)
+    def act(hooks, *rest):
+        function(hooks.compiled, *rest)
+
+
 for _function in (at_nodes, add_work, at_heat_nodes, at_heated_points):
-    _function.on(CalledHooks)(lambda hooks, *rest, act=_function: act(hooks.compiled, *rest))
+    _by_compiled_hooks(_function)

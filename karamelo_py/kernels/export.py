@@ -2,10 +2,10 @@
 
 from typing import Any
 
-from karamelo_py.compiler import at_hand, index, kernel
+from karamelo_py.compiler import at_hand, index, kernel, where
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.records import put_at, row
+from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import deformation_of, place_at, state_at
 from karamelo_py.points import laws as law_functions
 from karamelo_py.points.basis import entry, locate, reach, support
@@ -40,38 +40,36 @@ def export(quantity, times_volume, matter, out):
         )
 
 
-@kernel
-def impose_stress(matter, chosen, components, stress):
-    """Set ``components`` (6,) of the Cauchy stress of chosen points to ``stress`` (n, 6)."""
+def _impose(change, matter, rows, values):
+    """Set the state of the points in `rows` to ``change(law, kin, state, value)``."""
     kin, points, laws = at_hand(matter)
-    for p in range(points.mass.size):
-        if not chosen[p]:
-            continue
+    for k in range(rows.size):
+        p = index(rows[k])
         law, state = state_at(kin, points, laws, p)
+        store(points.state, p, change(law, kin, state, values[k]))
+
+
+@kernel
+def impose_stress(matter, rows, components, stress):
+    """Set ``components`` (6,) of the Cauchy stress of the points in `rows` to ``stress`` (n, 6)."""
+
+    def changed(law, kin, state, wanted):
         old = law_functions.cauchy_stress(law, kin, state)
-        for k in range(len(old)):
-            if not components[k]:
-                stress[p, k] = old[k]
-        store(points.state, p, law_functions.with_stress(law, kin, state, row(stress, p, 0, old)))
+        new = [where(components[c], wanted[c], x) for c, x in enumerate(old)]
+        return law_functions.with_stress(law, kin, state, tuple(new))
+
+    _impose(changed, matter, rows, stress)
 
 
 @kernel
-def impose_temperature(kin, points, laws, rows, temperature):
-    points, laws = at_hand(points), at_hand(laws)
-    for k in range(rows.size):
-        p = index(rows[k])
-        law, state = state_at(kin, points, laws, p)
-        store(points.state, p, law_functions.with_temperature(law, kin, state, temperature[k]))
+def impose_temperature(matter, rows, temperature):
+    _impose(law_functions.with_temperature, matter, rows, temperature)
 
 
 @kernel
-def impose_lighting(kin, points, laws, rows, since):
+def impose_lighting(matter, rows, since):
     """Light the points in these rows, times ``since`` (n,) ago."""
-    points, laws = at_hand(points), at_hand(laws)
-    for k in range(rows.size):
-        p = index(rows[k])
-        law, state = state_at(kin, points, laws, p)
-        store(points.state, p, law_functions.lit(law, kin, state, since[k]))
+    _impose(law_functions.lit, matter, rows, since)
 
 
 @kernel

@@ -99,8 +99,7 @@ def goes_wrong(fate, number):
 
 
 def _report(fate, number, moved, rate, stride):
-    """NaN counts as failed."""
-    if (moved <= stride) & (rate < 1e300):
+    if sweep.is_good(stride, moved, rate):
         raise_to(fate, MOVED, float(moved))
         raise_to(fate, RATE, float(rate))
     else:

@@ -175,6 +175,11 @@ def _without_gather(tile, p, moved):
     return where(inside(w.grid, s.kin, position_of(w, p)), moved, real(inf, moved))
 
 
+def is_good(stride, moved, rate):
+    """Return False if a point failed; NaN counts as failed."""
+    return (moved <= stride) & (rate < 1e300)
+
+
 def _visit_at_once(tile):
     """Gather, update and scatter points one by one, or a few in lanes."""
     visit, s, lanes, w, out, begin, end = tile
@@ -192,7 +197,7 @@ def _visit_at_once(tile):
             moved, rate = updated_all(visit.tasks, PointView(w, stencil, p, dt), totals, fastest)
         else:
             moved = _without_gather(tile, p, moved)
-        good = (moved <= s.stride) & (rate < 1e300)  # in this form, NaN counts as failed
+        good = is_good(s.stride, moved, rate)
         if not all_lanes(good):
             wrong = q + 1 + first_false_lane(good)
             continue
@@ -230,7 +235,7 @@ def _visit_in_stretches(tile):
                 moved, rate = updated_all(visit.tasks, PointView(w, (), p, dt), totals, fastest)
             else:
                 moved = _without_gather(tile, p, moved)
-            good = (moved <= s.stride) & (rate < 1e300)  # in this form, NaN counts as failed
+            good = is_good(s.stride, moved, rate)
             if not all_lanes(good):
                 wrong = q + 1 + first_false_lane(good)
                 continue

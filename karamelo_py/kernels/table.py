@@ -7,6 +7,7 @@ the memory traffic of `karamelo-py bench`. F-bar, XPIC, heat and contact are row
 (`plain`).
 """
 
+import functools
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -167,84 +168,147 @@ def _kinds(tags: Any) -> Any:
     return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
+class _FusedStep:
+    """The rows of a step with the fewest visits of the points."""
+
+    def __init__(self) -> None:
+        self.rows: list[Any] = []
+        self.visits: list[Visit] = []
+        self.gathers: list[Gather] = []  # of the next visit
+        self.next_sums: Scatter | None = None  # the first scatter, of the last visit
+
+    def visit(self, scatter: Scatter | None, more: bool = False) -> None:
+        weights = scatter or Scatter((), OldWeights())
+        visit = Visit(_tasks(self.gathers), weights.quantities, weights.weights)
+        share, of_last_step = self.gathers[0][1:] if self.gathers else (1.0, False)
+        gathers, scatters = bool(self.gathers), scatter is not None
+        # The next step's scatter reads new positions.
+        moves = gathers or more
+        self.rows.append(Sweep(visit, share, of_last_step, gathers, scatters, moves, more))
+        self.visits.append(visit)
+        self.gathers = []
+
+    def end_gathers(self) -> None:
+        if self.gathers:
+            self.visit(None)
+
+
+@functools.singledispatch
+def _fuse(row: Any, step: _FusedStep) -> None:
+    """Add a row to a fused step."""
+    step.end_gathers()
+    step.rows.append(row)
+
+
+@_fuse.register
+def _fuse_gather(row: Gather, step: _FusedStep) -> None:
+    if any(row[1:] != other[1:] for other in step.gathers):
+        step.end_gathers()
+    step.gathers.append(row)
+
+
+@_fuse.register
+def _fuse_scatter(row: Scatter, step: _FusedStep) -> None:
+    if step.next_sums is None:
+        step.next_sums = row
+    else:
+        step.visit(row)
+
+
+@_fuse.register(AtPoints)
+@_fuse.register(Check)
+def _omit(row: Any, step: _FusedStep) -> None: ...
+
+
+def _fused_step(rows: Iterable[Any]) -> _FusedStep:
+    step = _FusedStep()
+    for row in rows:
+        _fuse(row, step)
+    step.visit(step.next_sums, more=True)
+    return step
+
+
 def fused(rows: Iterable[Any]) -> list[Any]:
     """List the rows of a step with the fewest visits; sums are on the nodes before it."""
-    kept = [row for row in rows if not isinstance(row, AtPoints | Check)]
-    first = next(k for k, row in enumerate(kept) if isinstance(row, Scatter))
-    next_sums = kept.pop(first)
-    out: list[Any] = []
-    waiting: list[Gather] = []
-
-    def sweep(scatter: Scatter | None, more: bool = False) -> None:
-        scattering = scatter or Scatter((), OldWeights())
-        visit = Visit(_tasks(waiting), scattering.quantities, scattering.weights)
-        share, of_last_step = waiting[0][1:] if waiting else (1.0, False)
-        # The next step's scatter reads new positions.
-        moves = bool(waiting) or more
-        scatters = scatter is not None
-        out.append(Sweep(visit, share, of_last_step, bool(waiting), scatters, moves, more))
-        waiting.clear()
-
-    for row in kept:
-        if isinstance(row, Scatter):
-            sweep(row)
-            continue
-        goes_along = isinstance(row, Gather) and all(row[1:] == other[1:] for other in waiting)
-        if waiting and not goes_along:
-            sweep(None)
-        (waiting if isinstance(row, Gather) else out).append(row)
-    sweep(next_sums, more=True)
-    return out
+    return _fused_step(rows).rows
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
     """List the rows one by one, as parts of the fused step's visits where possible."""
     rows = list(rows)
-    return one_by_one(rows, [row.visit for row in fused(rows) if isinstance(row, Sweep)])
+    return one_by_one(rows, _fused_step(rows).visits)
 
 
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
     """List rows as separate visits, or as parts of `loops`."""
-
-    def loop_of(single: Visit) -> Visit:
-        items = slice(0, 1) if single.tasks else slice(1, 3)
-        return next(
-            (visit for visit in loops if _kinds(visit[items]) == _kinds(single[items])), single
-        )
-
-    def alone(row: Any) -> Any:
-        if isinstance(row, Gather):
-            visit = loop_of(Visit(_tasks([row]), (), OldWeights()))
-            return Sweep(visit, *row[1:], gathers=True, scatters=False)
-        if isinstance(row, Scatter):
-            return Sweep(loop_of(Visit((), *row)), gathers=False, moves=False)
-        return row
-
-    return [alone(row) for row in rows]
+    return [_alone(row, loops) for row in rows]
 
 
+def _loop_of(single: Visit, loops: Iterable[Visit]) -> Visit:
+    items = slice(0, 1) if single.tasks else slice(1, 3)
+    return next((loop for loop in loops if _kinds(loop[items]) == _kinds(single[items])), single)
+
+
+@functools.singledispatch
+def _alone(row: Any, loops: Iterable[Visit]) -> Any:
+    return row
+
+
+@_alone.register
+def _gather_alone(row: Gather, loops: Iterable[Visit]) -> Sweep:
+    visit = _loop_of(Visit(_tasks([row]), (), OldWeights()), loops)
+    return Sweep(visit, *row[1:], gathers=True, scatters=False)
+
+
+@_alone.register
+def _scatter_alone(row: Scatter, loops: Iterable[Visit]) -> Sweep:
+    return Sweep(_loop_of(Visit((), *row), loops), gathers=False, moves=False)
+
+
+@functools.singledispatch
 def says(row: Any, setup: Any) -> str | None:
     """Describe a row; None if it does nothing in this scene."""
-    if isinstance(row, Sweep):
-        parts = [tag.says for tag in row.visit.tasks if row.gathers]
-        parts += [tag.says for tag in row.visit.quantities if row.scatters]
-        return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
-    if isinstance(row, NodeTask):
-        return getattr(row.task, "says", None)
-    if isinstance(row, SceneTask) and len(row.rows(setup)):
-        return row.says
     return None
 
 
+@says.register
+def _says_sweep(row: Sweep, setup: Any) -> str:
+    parts = [tag.says for tag in row.visit.tasks if row.gathers]
+    parts += [tag.says for tag in row.visit.quantities if row.scatters]
+    return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
+
+
+@says.register
+def _says_node_task(row: NodeTask, setup: Any) -> str | None:
+    return getattr(row.task, "says", None)
+
+
+@says.register
+def _says_scene_task(row: SceneTask, setup: Any) -> str | None:
+    return row.says if len(row.rows(setup)) else None
+
+
+@point_function(otherwise=True)
+def in_scene(row: Any, s: Setup) -> Iterable[Any]:
+    """Return the rows that a row becomes in a scene."""
+    return (row,)
+
+
+@in_scene.on(SceneTask)
+def _rows_of_scene(row, s):
+    return plain(row.rows(s), s)
+
+
+@in_scene.on(Sweep)
+def _with_averages(row, s):
+    """F-bar adds a visit before strains."""
+    return (*average_volumes(row), row) if isinstance(s.averaging, fbar.FBar) else (row,)
+
+
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
-    """Yield a scene's rows with those it adds; F-bar adds a visit before strains."""
+    """Yield a scene's rows with those it adds."""
     for row in rows:
-        if isinstance(row, SceneTask):
-            yield from plain(row.rows(s), s)
-        else:
-            if isinstance(row, Sweep) and isinstance(s.averaging, fbar.FBar):
-                yield from average_volumes(row)
-            yield row
+        yield from in_scene.find((type(row),))(row, s)
 
 
 class Insulated(NamedTuple):

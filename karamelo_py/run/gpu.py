@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from statistics import median
 from typing import Any
@@ -86,9 +87,8 @@ class StepsOnCard:
         self.images.of((self.fate, self.use, self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
         self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
-        first, rows = (list(self._plain(of(*program))) for of in (first_rows, rows_of))
-        sweeps = [row for row in (*first, *rows) if isinstance(row, table.Sweep)]
-        self.visits = {id(row): self._visit(row) for row in sweeps}
+        self.visits: dict[int, gpu.Stage] = {}  # of sweeps, by id
+        first, rows = (list(self.plain(of(*program))) for of in (first_rows, rows_of))
         self.cells = [self._cells(block) for block in s.blocks]
         self.begin: list[KernelLaunch] = []
         self._ahead: list[KernelLaunch] = []  # sums for the next step
@@ -113,7 +113,7 @@ class StepsOnCard:
 
     # --- device memory
 
-    def _visit(self, row: Any) -> gpu.Stage:
+    def visit(self, row: Any) -> gpu.Stage:
         nodes = (row.at(self.s) if row.at else self.s).nodes
         present = ["sums", "velocity", *(type(one) for one in nodes.fields)]
         stage = gpu.Stage(row, self.s, present)
@@ -167,13 +167,9 @@ class StepsOnCard:
         self._acted: set[int] = set()  # hook stages so far
         return [one for row in rows for one in take.find((type(row), Card))(row, self)]
 
-    def _plain(self, rows: Iterable) -> Iterator[Any]:
+    def plain(self, rows: Iterable) -> Iterator:
         for row in table.plain(rows, self.s):
-            if isinstance(row, table.Repeated):
-                for k in range(row.count(self.s)):
-                    yield from self._plain(row.rows(k))
-            else:
-                yield row
+            yield from _on_card(row, self)
 
     def gathers(self, row: Any) -> Iterator[KernelLaunch]:
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
@@ -450,6 +446,24 @@ class StepsOnCard:
 
 
 # --- rows ---------------------------------------------------------------------------------------
+
+
+@functools.singledispatch
+def _on_card(row: object, steps: StepsOnCard) -> Iterable:
+    """Return the rows that a row becomes on a card; prepare visits of the points."""
+    return (row,)
+
+
+@_on_card.register
+def _repeated(row: table.Repeated, steps: StepsOnCard) -> Iterator:
+    for k in range(row.count(steps.s)):
+        yield from steps.plain(row.rows(k))
+
+
+@_on_card.register
+def _visited(row: table.Sweep, steps: StepsOnCard) -> Iterable:
+    steps.visits[id(row)] = steps.visit(row)
+    return (row,)
 
 
 @take.on(table.Sweep, Card)

@@ -438,14 +438,9 @@ class PointsView(View):
             [np.broadcast_to(components.get(name, 0.0), len(self.ids)) for name in names], axis=1
         ).astype(s.nodes.sums.dtype)
         for block, rows, places in self._rows.parts:
-            points = arrays.known_to_laws(block.points)
             if len(rows) and can(elastic_law(block.laws), with_stress):
-                chosen = np.zeros(len(points.id), np.bool_)
-                chosen[rows] = True
-                stress = np.zeros((len(points.id), len(names)), values.dtype)
-                stress[rows] = values[places]
-                matter = arrays.Matter(s.kin, points, block.laws)
-                impose_stress(matter, chosen, flags, stress)
+                stress = np.ascontiguousarray(values[places])
+                impose_stress(arrays.matter_of(s.kin, block), np.asarray(rows), flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
         self._impose(impose_temperature, values)
@@ -457,9 +452,8 @@ class PointsView(View):
     def _impose(self, kernel: Callable, values: np.ndarray) -> None:
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
-            points = arrays.known_to_laws(block.points)
             numbers = np.ascontiguousarray(values[places], s.nodes.sums.dtype)
-            kernel(s.kin, points, block.laws, np.asarray(rows), numbers)
+            kernel(arrays.matter_of(s.kin, block), np.asarray(rows), numbers)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
         """Set a dump column (n,): position, velocity, stress, T, or a declared field."""

@@ -33,6 +33,7 @@ from karamelo_py.compiler.code import machine
 from karamelo_py.compiler.disk import lock
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.choices import name_of
+from karamelo_py.compiler.trace.session import session
 
 ROOM = 400e6  # bytes
 
@@ -188,7 +189,7 @@ class KernelFiles:
     def _key(self, kinds: tuple, result: Any) -> str:
         function = self._function
         classes = (one for kind in kinds for one in choices.classes_in(kind))
-        made = [function, *self._called, *choices.registered]
+        made = [function, *self._called, *session.registered]
         elsewhere = sorted(choices.modules_of(*made, *classes))
         words = [*map(_words, made), *map(describe, kinds)]
         words += [describe(result) if result is not None else "", self._processor, _sources()]

@@ -1,7 +1,6 @@
 """Implementations selected by type, and the modules they are written in.
 
-Keys of kernels on disk contain the sources of these modules (`cache`). Decorators fill both lists
-on import.
+Keys of kernels on disk contain the sources of these modules (`cache`).
 """
 
 import contextvars
@@ -15,6 +14,8 @@ from typing import Any
 
 from numba import config, types
 
+from karamelo_py.compiler.trace.session import session
+
 INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
@@ -26,9 +27,6 @@ ROOMS = (
     "schemes",
     "styles",
 )  # whose sources all keys have
-
-choosers: dict[Callable, list[Callable]] = {}  # of functions: implementations by argument types
-registered: list[Callable] = []  # implementations that the sources of `ROOMS` do not determine
 
 # Modules outside `ROOMS` of the functions that are being compiled, innermost last.
 _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("noted", default=())
@@ -55,7 +53,7 @@ def register(made: Callable) -> None:
     is_function = isinstance(made, python.FunctionType)
     has_values = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
     if has_values or modules_of(made):
-        registered.append(made)
+        session.registered.append(made)
 
 
 def note(modules: Iterable[str]) -> None:

@@ -19,7 +19,6 @@ from karamelo_py.compiler.code.arithmetic import OPERATIONS
 from karamelo_py.compiler.trace import choices, values
 from karamelo_py.compiler.trace.choices import (
     INTERPRETED,
-    choosers,
     modules_noted,
     modules_of,
     note,
@@ -142,7 +141,7 @@ def _copy(thing: Any) -> Any:
         return INSTEAD[thing]
     if thing in _SAFE or (isinstance(thing, type) and issubclass(thing, tuple)):
         return thing
-    is_emitted = thing in choosers or thing in values.BUILTINS or thing in OPERATIONS
+    is_emitted = thing in session.choosers or thing in session.builtins or thing in OPERATIONS
     if is_emitted or isinstance(thing, values.Intrinsic | type):
         return values.Emitted(thing)
     if isinstance(thing, python.FunctionType):
@@ -300,9 +299,9 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
     for one in _number_types(kinds):
         if dispatch in one.implements:
             return one.implements[dispatch]
-    if dispatch not in choosers:
+    if dispatch not in session.choosers:
         return dispatch
-    for chooser in choosers[dispatch]:
+    for chooser in session.choosers[dispatch]:
         chosen = chooser(*kinds)
         if chosen is not None:
             return chosen
@@ -313,7 +312,7 @@ def _chosen(dispatch: Callable, kinds: tuple) -> Callable | None:
 
 
 def _call(function: Callable, arguments: tuple) -> Any:
-    if function not in choosers:
+    if function not in session.choosers:
         return NotImplemented
     lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))

@@ -120,8 +120,8 @@ class Lowering:
         return None
 
     def call(self, function: Callable, arguments: tuple) -> Any:
-        if function in traced.BUILTINS:
-            return traced.BUILTINS[function](self, *arguments)
+        if function in session.builtins:
+            return session.builtins[function](self, *arguments)
         if function in _OF_ITEMS and _has_slice(arguments[1]):
             return self.of_item(*arguments)
         value = self.dispatch(function, arguments)

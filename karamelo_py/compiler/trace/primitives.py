@@ -13,6 +13,7 @@ from karamelo_py.compiler.code.arithmetic import common
 from karamelo_py.compiler.llvm import I64, Lanes, LaneType, scalar_of
 from karamelo_py.compiler.trace import choices
 from karamelo_py.compiler.trace.functions import INSTEAD, PointFunction, forget, outdate_kernels
+from karamelo_py.compiler.trace.session import session
 from karamelo_py.compiler.trace.values import (
     OF_REALS,
     Untraceable,
@@ -35,7 +36,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
     """
 
     def register(made: Callable) -> Callable:
-        implementations_of = choices.choosers.setdefault(function, [])
+        implementations_of = session.choosers.setdefault(function, [])
         of_numbers = any(function in (implementations(one) or ()) for one in numbers)
         if of_numbers or (implementations_of and not numbers):
             outdate_kernels()
@@ -83,7 +84,7 @@ def point_function(
                 return lambda *values: lane_by_lane(made, False, values)
             return made.find(classes)
 
-        choices.choosers[made] = [choose]
+        session.choosers[made] = [choose]
         return made
 
     return declare

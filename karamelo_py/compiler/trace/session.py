@@ -1,7 +1,6 @@
-"""Memory of the compiler: functions, types, arrays and machine code of this process.
+"""Memory of the compiler: implementations, functions, types, arrays and machine code.
 
-One per process, like LLVM's engine, the implementations of point functions and the names by which
-machine code calls other machine code.
+One per process, like LLVM's engine and the names by which machine code calls other machine code.
 """
 
 import itertools
@@ -16,6 +15,10 @@ class Session:
     """Caches; one Python thread at a time compiles (`one_at_a_time`)."""
 
     def __init__(self) -> None:
+        # Filled by decorators on import.
+        self.choosers: dict[Callable, list[Callable]] = {}  # implementations by argument types
+        self.builtins: dict[Callable, Callable] = {}  # code of functions (`values.builtin`)
+        self.registered: list[Callable] = []  # implementations in all keys (`choices.register`)
         self.seen: dict[Any, Any] = {}  # replacements of globals
         self.walked: dict[Callable, Any] = {}  # texts of functions
         self.functions: dict[tuple, Any] = {}  # with result types, by types of arguments

@@ -12,7 +12,8 @@ import numpy as np
 from numba import types
 
 from karamelo_py.compiler.llvm import Lanes, scalar_of
-from karamelo_py.compiler.trace.choices import choosers, tag_class
+from karamelo_py.compiler.trace.choices import tag_class
+from karamelo_py.compiler.trace.session import session
 
 
 class Untraceable(BaseException):
@@ -134,14 +135,11 @@ def emit(function: Callable, *arguments: Any) -> Any:
     return now().call(function, arguments)
 
 
-BUILTINS: dict[Callable, Callable] = {}
-
-
 def builtin(function: Callable) -> Callable[[Callable], Callable]:
     """Decorate the code of `function`: ``made(lowering, *arguments)``, traced."""
 
     def register(made: Callable) -> Callable:
-        BUILTINS[function] = made
+        session.builtins[function] = made
         return made
 
     return register
@@ -319,7 +317,7 @@ class Emitted:
         if made is not None:
             return now().seen(made)(*arguments)
         if self.seen in OF_REALS:
-            if self.seen not in choosers and all(map(is_literal, arguments)):
+            if self.seen not in session.choosers and all(map(is_literal, arguments)):
                 return self.seen(*arguments)
             arguments = alike(arguments)
         return emit(self.seen, *arguments)

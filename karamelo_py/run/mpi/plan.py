@@ -36,10 +36,9 @@ class _Sums(NamedTuple):
     found: list
 
 
-sweep_points.on(_Sums)(lambda mode, visit, s, block: None)
-
-
-sweep_nodes.on(_Sums)(lambda mode, task, s, dt: None)
+@sweep_points.on(_Sums)
+@sweep_nodes.on(_Sums)
+def _sweep_nothing(mode, *rest): ...
 
 
 @sum_buffers.on(_Sums)
