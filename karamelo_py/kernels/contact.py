@@ -3,27 +3,24 @@
 Where two fields have mass at a node, an impulse along their common normal removes the approach
 velocity, after Bardenhagen et al. 2001 ("An improved contact algorithm for the material point
 method and application to stress propagation in granular material", CMES 2(4)). Coulomb friction
-adds a tangential impulse, at most mu times as large. Impulses are opposite: momentum is conserved
-to round-off.
+adds a tangential impulse, at most mu times as large. Momentum is conserved to round-off.
 
 Where more than two fields meet, all pairs compute impulses from the same velocities: the order of
-the solids does not matter. Each pair takes 1 / k of its impulse, k being the larger of its two
-bodies' numbers of pairs: no body is more than stopped, and energy does not grow. Further iterations
-remove the remainder.
+the solids does not matter. Each pair takes 1 / k of its impulse, k being the larger of its bodies'
+numbers of pairs, so that energy does not grow. Further iterations remove the remainder.
 
-Fields meet up to two cells before the bodies do (the reach of the basis functions). So the gap
-between the surfaces is measured from the mean positions of each body's points around a node
+Fields meet up to two cells before the bodies do (the reach of the basis functions). So the gap is
+measured from the mean positions of each body's points around a node
 (`karamelo_py.points.basis.surface`), and bodies may approach until it is closed at the end of the
 step. Convex bodies are apart if they are apart along one direction: the grid axes are tried too,
 since normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or granular material: whenever it seems to
-leave a gap, points would sink a little into a wall, permanently. So where contact with a body of
-prescribed velocity acted in the last step, bodies may separate but not approach. For bodies that
-hold no shape this lasts 100 steps, as their points leave a wall for some steps at a time, and
-includes nodes that a moving wall reaches. Such a wall may be one cell thick and have corners that
-other bodies fill: only its faces towards the other body count, and none in a hollow corner
-may be entered.
+The mean position is not the lowest point of a liquid or granular material: points would sink into a
+wall, a little for each gap that it seems to leave. So bodies may separate but not approach where
+contact with a body of prescribed velocity acted in the last step. For bodies that hold no shape
+this lasts 100 steps, as their points leave a wall for some steps at a time, and includes nodes that
+a moving wall reaches. Such a wall may be one cell thick and have corners that other bodies fill:
+only its faces towards the other body count, and none in a hollow corner may be entered.
 """
 
 from math import sqrt
@@ -193,15 +190,14 @@ def _cosine_above(a, b, least):
 def _normal(bodies, n, other):
     """Return the outward direction of a body, and the squared sine of its scatter angle.
 
-    The mean of the sums of m grad N over the nodes around `n`: the sum of one node rotates by tens
-    of degrees as rows of points inclined to the grid pass it. With weights 1/4, 1/2, 1/4 along each
-    axis, a plane face is accurate to two degrees. Nodes whose sum points the same way as `other`,
-    the outward direction of the other body, are omitted: of a thin wall only one face counts.
+    The mean of the sums of m grad N over the nodes around `n`, with weights 1/4, 1/2, 1/4 along
+    each axis: a plane face is accurate to two degrees, the sum of one node rotates by tens as rows
+    of points inclined to the grid pass it. Nodes whose sum points the same way as `other`, the
+    outward direction of the other body, are omitted: of a thin wall only one face counts.
 
-    The length is the weight relative to the other body's direction. It grows with the surface
-    around the nodes, and falls where their directions differ, as at edges. (Lemiale, Nairn &
-    Hurmane 2010 take the larger sum of m grad N: at the edge of a block on a base of the same
-    density both are equal, and the block's direction is tilted by 15 degrees.)
+    The length weighs it against the other body's direction: more with the surface around the nodes,
+    less where their directions differ, as at edges. (Lemiale, Nairn & Hurmane 2010 take the larger
+    sum: the edge of a block on a base of its density is tilted by 15 degrees.)
     """
     contact, kin, _ = bodies
     total, lengths = zero_vector(kin, 0.0), 0.0

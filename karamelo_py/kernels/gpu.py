@@ -308,12 +308,8 @@ def _with_cell(totals, cells, cell, first, step):
     box = cells.box[index(max(cell, 0))]
     occupied = (box >= 0) & (cell >= 0)
     at = index(max(box, 0))
-    return tuple(
-        [
-            value + where(occupied, cells.boxes[j * step + first, at], value - value)
-            for j, value in enumerate(totals)
-        ]
-    )
+    sums = [cells.boxes[j * step + first, at] for j in range(len(totals))]
+    return tuple([t + where(occupied, x, t - t) for t, x in zip(totals, sums, strict=True)])
 
 
 # --- lists of the points by cell --------------------------------------------------------------

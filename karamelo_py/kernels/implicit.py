@@ -83,6 +83,11 @@ class Response(NamedTuple):
     furthest: np.ndarray  # (PARTS,) the largest component of a displacement in each part
 
 
+def row_of(pairs: Pairs, a: int, b: int) -> int:
+    """Return the number of the pair of nodes `a` and `b`."""
+    return pairs.first[a] + pairs.rank[a, pairs.middle + pairs.codes[b] - pairs.codes[a]]
+
+
 def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
     n, t = block.points.mass.size, s.kin.tensor_size
     count, width = support(s.basis, s.kin), len(s.kin.Gradient._fields)
@@ -334,8 +339,7 @@ def add_stiffness(kin, seen, tangent, blocks, part):
             C = tuple([values[c, p - first] for c in range(t * t)])
             D = by_gradient(kin, gradient_at(kin, seen, p, k), C)
             for other in range(seen.count[p]):
-                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
-                at = pairs.first[a] + pairs.rank[a, pairs.middle + code]
+                at = row_of(pairs, a, seen.nodes[p, other])
                 made = by_displacement(kin, D, gradient_at(kin, seen, p, other))
                 for c, x in enumerate(made):
                     K[at, c] += x
@@ -351,10 +355,9 @@ def add_conductance(kin, seen, conductance, pairs, C):
             p, k = seen.entries[e] // seen.nodes.shape[1], seen.entries[e] % seen.nodes.shape[1]
             g = gradient_at(kin, seen, p, k).planar()
             for other in range(seen.count[p]):
-                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
                 h = gradient_at(kin, seen, p, other).planar()
                 along = total([x * y for x, y in zip(g, h, strict=True)])
-                C[pairs.first[a] + pairs.rank[a, pairs.middle + code]] += conductance[0, p] * along
+                C[row_of(pairs, a, seen.nodes[p, other])] += conductance[0, p] * along
 
 
 @kernel

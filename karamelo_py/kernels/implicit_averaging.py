@@ -25,7 +25,7 @@ from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.slopes import seeded, slopes_of, value_of
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels.arrays import Block
-from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of, strained_point
+from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of, row_of, strained_point
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.views import state_at
 from karamelo_py.points.frames import Updated, scaled_increment
@@ -176,8 +176,7 @@ def add_slopes(kin, seen, tensors, blocks, part):
             weight = seen.weights[p, k]
             T = load(tensors, p, zero(kin, weight))
             for other in range(seen.count[p]):
-                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
-                at = d * (pairs.first[a] + pairs.rank[a, pairs.middle + code])
+                at = d * row_of(pairs, a, seen.nodes[p, other])
                 made = vector(kin, T.dot(gradient_at(kin, seen, p, other)))
                 for j, x in enumerate(made):
                     out[at + j] += weight * x
@@ -193,6 +192,4 @@ def add_products(seen, values, blocks, part):
             p, k = seen.entries[e] // width, seen.entries[e] % width
             scale = seen.weights[p, k] * values[0, p]
             for other in range(seen.count[p]):
-                code = pairs.codes[seen.nodes[p, other]] - pairs.codes[a]
-                at = pairs.first[a] + pairs.rank[a, pairs.middle + code]
-                out[at] += scale * seen.weights[p, other]
+                out[row_of(pairs, a, seen.nodes[p, other])] += scale * seen.weights[p, other]

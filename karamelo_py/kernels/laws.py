@@ -39,16 +39,13 @@ def _table(column: Sequence, real: type) -> Any:
 def law_on(law: Any, h: float, T0: float | None) -> Any:
     """Set the fields ``cell_size`` and ``initial_temperature`` of a law and its parts."""
     values = {"cell_size": h, "initial_temperature": T0}
-    return type(law)(
-        *(
-            law_on(value, h, T0)
-            if isinstance(value, tuple)
-            else value
-            if values.get(name) is None
-            else values[name]
-            for name, value in zip(law._fields, law, strict=True)
-        )
-    )
+
+    def on(name: str, value: Any) -> Any:
+        if isinstance(value, tuple):
+            return law_on(value, h, T0)
+        return value if values.get(name) is None else values[name]
+
+    return type(law)(*map(on, law._fields, law))
 
 
 def elastic_law(law: Any) -> Any:

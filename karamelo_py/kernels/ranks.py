@@ -27,13 +27,13 @@ class Linked(NamedTuple):
 
 
 @kernel
-def _ask(address, request, a, b):
-    return _call(address, request, a, b)
+def _ask(address, request, a, b, due):
+    return _call(address, request, a, b) if due else 0
 
 
 @totals.collect.on(Linked)
 def _collect_linked(ranks, control, first, count):
-    _ask(ranks.address, TOTALS, first, count)
+    _ask(ranks.address, TOTALS, first, count, True)
 
 
 @totals.counts.on(Linked)
@@ -43,17 +43,23 @@ def _counts_linked(ranks, n):
 
 @totals.number_of_all.on(Linked)
 def _number_of_all_linked(ranks, control, number):
-    return _ask(ranks.address, NUMBER, number, 0)
+    return _ask(ranks.address, NUMBER, number, 0, True)
+
+
+def _largest(address, answer, numbers):
+    """Return the largest of each number among the processes."""
+    for k, number in enumerate(numbers):
+        answer[k] = number
+    _call(address, LARGEST, len(numbers), 0)
+    return tuple([answer[k] for k in range(len(numbers))])
 
 
 @kernel
 def _agree_on_reports(address, control):
-    clock, answer = control.clock[0], control.answer
-    answer[0], answer[1], answer[2] = clock.move, clock.new_move, clock.new_rate
-    answer[3] = clock.wrong
-    _call(address, LARGEST, 4, 0)
-    clock.move, clock.new_move, clock.new_rate = answer[0], answer[1], answer[2]
-    clock.wrong = int(answer[3])
+    clock = control.clock[0]
+    numbers = clock.move, clock.new_move, clock.new_rate, float(clock.wrong)
+    clock.move, clock.new_move, clock.new_rate, wrong = _largest(address, control.answer, numbers)
+    clock.wrong = int(wrong)
 
 
 @totals.agree_on_reports.on(Linked)
@@ -63,16 +69,12 @@ def _agree_on_reports_linked(ranks, control):
 
 @kernel
 def _agree_on_heat(address, control):
-    clock, answer = control.clock[0], control.answer
-    answer[0], answer[1] = -clock.T_low, -clock.coldest
-    answer[2], answer[3] = -clock.set_low, -clock.fall
-    answer[4], answer[5] = clock.T_high, clock.hottest
-    answer[6], answer[7], answer[8] = clock.set_high, clock.rise, clock.own_heat
-    _call(address, LARGEST, 9, 0)
-    clock.T_low, clock.coldest = -answer[0], -answer[1]
-    clock.set_low, clock.fall = -answer[2], -answer[3]
-    clock.T_high, clock.hottest = answer[4], answer[5]
-    clock.set_high, clock.rise, clock.own_heat = answer[6], answer[7], answer[8]
+    clock = control.clock[0]
+    lowest = clock.T_low, clock.coldest, clock.set_low, clock.fall
+    highest = clock.T_high, clock.hottest, clock.set_high, clock.rise, clock.own_heat
+    numbers = _largest(address, control.answer, (*[-x for x in lowest], *highest))
+    clock.T_low, clock.coldest, clock.set_low, clock.fall = [-x for x in numbers[:4]]
+    clock.T_high, clock.hottest, clock.set_high, clock.rise, clock.own_heat = numbers[4:]
 
 
 @totals.agree_on_heat.on(Linked)
@@ -80,15 +82,9 @@ def _agree_on_heat_linked(ranks, control):
     _agree_on_heat(ranks.address, control)
 
 
-@kernel
-def _ask_if(due, address, request, a, b):
-    if due:
-        _call(address, request, a, b)
-
-
 @totals.take_over.on(Linked)
 def _take_over_linked(ranks, due):
-    _ask_if(due, ranks.address, TAKE, 0, 0)
+    _ask(ranks.address, TAKE, 0, 0, due)
 
 
 def _sweep_tiles(s, mode, visit, context, of_border):
@@ -99,15 +95,15 @@ def _sweep_tiles(s, mode, visit, context, of_border):
         else:
             visit_shares(mode, block.tiling.count[1] - border, visit, context, block, border)
         if len(s.blocks) > 1:
-            _ask(s.control.ranks.address, NEXT, 0, 0)
+            _ask(s.control.ranks.address, NEXT, 0, 0, True)
 
 
 @sweep_blocks.on(Linked)
 def _sweep_blocks_linked(ranks, s, mode, visit, context):
     address = ranks.address
-    _ask(address, SWEEP, 0, 0)
+    _ask(address, SWEEP, 0, 0, True)
     _sweep_tiles(s, mode, visit, context, True)
     if len(visit.quantities):
         due = context.scatters & (s.buffers.count[1] == 0)
-        _ask_if(due, address, GIVE, s.buffers.number, arrays_given(visit.quantities, s.kin))
+        _ask(address, GIVE, s.buffers.number, arrays_given(visit.quantities, s.kin), due)
     _sweep_tiles(s, mode, visit, context, False)

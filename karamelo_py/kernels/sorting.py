@@ -116,11 +116,8 @@ def _order_parts(sorting, k):
 @shared_out
 def _order_in_all_tiles(at, by, sorting, k):
     """Sort a tile's points by first node, then id: cells filling groups of `width` first."""
-    (_, kin, grids, of, x), (tiles, around, ids), sorting = (
-        at_hand(at),
-        at_hand(by),
-        at_hand(sorting),
-    )
+    (_, kin, grids, of, x), sorting = at_hand(at), at_hand(sorting)
+    tiles, around, ids = at_hand(by)
     boxes, bins, cell, order = sorting.boxes, sorting.bins, sorting.room, sorting.order
     ends, cells = sorting.ends[sorting.ends.shape[0] - 1], bins.shape[2]
     d = kin.dimension

@@ -6,7 +6,7 @@ At once: moments along the arms of a stencil, affine sums, corners of domains.
 from karamelo_py.compiler import all_lanes, point_function, real
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import equations as eq
-from karamelo_py.kernels.arrays import Tag, of_force
+from karamelo_py.kernels.arrays import Tag, of_force, with_items
 from karamelo_py.kernels.equations.loss import EnergyLoss
 from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.lanes import OneByOne
@@ -127,13 +127,8 @@ def all_by_corners(parts, w):
     return not any(present[name] for names in unless for name in names)
 
 
-def _seeing(basis, w):
-    items = zip(w._fields, w, strict=True)
-    return type(w)(*[basis if name == "basis" else item for name, item in items])
-
-
 def in_block(w):
-    return _seeing(InBlock(w.basis), w)
+    return with_items(w, basis=InBlock(w.basis))
 
 
 def shows_corners(tasks, w):
@@ -141,14 +136,14 @@ def shows_corners(tasks, w):
 
 
 def gather_corners(tasks, w, stencil, totals):
-    at = _seeing(AtCorners(w.basis), w)
+    at = with_items(w, basis=AtCorners(w.basis))
     for c in range(support(at.basis, w.kin)):
         totals = eq.gathered_all(tasks, at, stencil, c, totals)
     return totals
 
 
 def scatter_corners(quantities, w, stencil, loads):
-    at = _seeing(AtCorners(w.basis), w)
+    at = with_items(w, basis=AtCorners(w.basis))
     for c in range(support(at.basis, w.kin)):
         eq.scattered_all(quantities, loads, node_of(at, stencil, c))
 

@@ -8,8 +8,9 @@ comparison without rounding: no position is counted twice or omitted. (Winding n
 triangles: Ericson 2005, section 5.1.5.)
 """
 
+from collections.abc import Callable
 from math import sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -143,7 +144,7 @@ def _nearer(kin, surface, k, x, best):
 
 
 @noinline
-def distance(kin, surface, x, reach):
+def distance(surface, kin, x, reach):
     """Return the distance to the nearest face, `reach` at most."""
     leaves = surface.low.shape[0] // 2
     best = reach * reach
@@ -289,45 +290,6 @@ def encloses(kin, surface, x):
     return hits & 1 != 0 if surface.odd else hits != 0
 
 
-def _place(kin, x, p):
-    return kin.Vector._make([x[p, c] for c in range(kin.dimension)])
-
-
-def _depths_of_some(shape, x, reach, out, n):
-    kin, surface = at_hand(shape)
-    for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
-        out[p] = _depth_in_surface(surface, kin, _place(kin, x, p), reach)
-
-
-_depths = by_threads(_depths_of_some)
-
-
-def depths(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
-    """Return depths (n,) of positions (n, d) in a surface: at most `reach`, < 0 outside."""
-    return _of(_depths, surface, x, float(reach))
-
-
-def _distances_of_some(shape, x, reach, out, n):
-    kin, surface = at_hand(shape)
-    for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
-        out[p] = distance(kin, surface, _place(kin, x, p), reach)
-
-
-_distances = by_threads(_distances_of_some)
-
-
-def distances(surface: Surface, x: np.ndarray, reach: float) -> np.ndarray:
-    """Return distances (n,) of positions (n, d) from the nearest face, at most `reach`."""
-    return _of(_distances, surface, x, float(reach))
-
-
-def _of(kernel: Any, surface: Surface, x: np.ndarray, *more: Any) -> np.ndarray:
-    d = surface.low.shape[1]
-    places, out = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
-    kernel(Serial(), -(-len(x) // CHUNK), (KINEMATICS[d](), surface), places, *more, out)
-    return out
-
-
 # --- shapes: what regions are for kernels -------------------------------------------------------
 
 
@@ -390,7 +352,7 @@ def _slopes_across(shape, kin, x, reach, step):
 
 @depth.on(Surface)
 def _depth_in_surface(shape, kin, x, reach):
-    away = distance(kin, shape, x, reach)
+    away = distance(shape, kin, x, reach)
     return away if encloses(kin, shape, x) else -away
 
 
@@ -429,3 +391,29 @@ def _depth_in_parts(shape, kin, x, reach):
 @depth.on(Outside)
 def _depth_outside(shape, kin, x, reach):
     return -depth(shape.part, kin, x, reach)
+
+
+# --- many positions -----------------------------------------------------------------------------
+
+
+def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], np.ndarray]:
+    @by_threads
+    def measure_some(shape, x, reach, out, n):
+        kin, surface = at_hand(shape)
+        for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
+            place = kin.Vector._make([x[p, c] for c in range(kin.dimension)])
+            out[p] = measure(surface, kin, place, reach)
+
+    def measure_all(surface, x, reach):
+        d = surface.low.shape[1]
+        places, out = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
+        shape = KINEMATICS[d](), surface
+        measure_some(Serial(), -(-len(x) // CHUNK), shape, places, float(reach), out)
+        return out
+
+    return measure_all
+
+
+# Of a surface, positions (n, d) and a reach: depths (n,), < 0 outside, and distances from the
+# nearest face, both at most the reach.
+depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)

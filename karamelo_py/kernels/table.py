@@ -7,7 +7,6 @@ the memory traffic of `karamelo-py bench`. F-bar, XPIC, heat and contact are row
 (`plain`).
 """
 
-import functools
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -171,121 +170,93 @@ def _kinds(tags: Any) -> Any:
 class _FusedStep:
     """The rows of a step with the fewest visits of the points."""
 
-    def __init__(self) -> None:
+    def __init__(self, rows: Iterable[Any]):
         self.rows: list[Any] = []
         self.visits: list[Visit] = []
         self.gathers: list[Gather] = []  # of the next visit
         self.next_sums: Scatter | None = None  # the first scatter, of the last visit
+        for row in rows:
+            _FUSED.get(type(row), _FusedStep.add)(self, row)
+        self.visit(self.next_sums, more=True)
 
     def visit(self, scatter: Scatter | None, more: bool = False) -> None:
-        weights = scatter or Scatter((), OldWeights())
-        visit = Visit(_tasks(self.gathers), weights.quantities, weights.weights)
-        share, of_last_step = self.gathers[0][1:] if self.gathers else (1.0, False)
-        gathers, scatters = bool(self.gathers), scatter is not None
-        # The next step's scatter reads new positions.
-        moves = gathers or more
-        self.rows.append(Sweep(visit, share, of_last_step, gathers, scatters, moves, more))
-        self.visits.append(visit)
+        gathers, (quantities, weights) = self.gathers, scatter or Scatter((), OldWeights())
+        self.visits.append(Visit(_tasks(gathers), quantities, weights))
+        share, of_last_step = gathers[0][1:] if gathers else (1.0, False)
+        flags = bool(gathers), scatter is not None, bool(gathers) or more, more
+        self.rows.append(Sweep(self.visits[-1], share, of_last_step, *flags))
         self.gathers = []
 
-    def end_gathers(self) -> None:
+    def add(self, row: Any) -> None:
         if self.gathers:
             self.visit(None)
+        self.rows.append(row)
+
+    def gather(self, row: Gather) -> None:
+        if any(row[1:] != other[1:] for other in self.gathers):
+            self.visit(None)
+        self.gathers.append(row)
+
+    def scatter(self, row: Scatter) -> None:
+        if self.next_sums is None:
+            self.next_sums = row
+        else:
+            self.visit(row)
+
+    def omit(self, row: Any) -> None: ...
 
 
-@functools.singledispatch
-def _fuse(row: Any, step: _FusedStep) -> None:
-    """Add a row to a fused step."""
-    step.end_gathers()
-    step.rows.append(row)
-
-
-@_fuse.register
-def _fuse_gather(row: Gather, step: _FusedStep) -> None:
-    if any(row[1:] != other[1:] for other in step.gathers):
-        step.end_gathers()
-    step.gathers.append(row)
-
-
-@_fuse.register
-def _fuse_scatter(row: Scatter, step: _FusedStep) -> None:
-    if step.next_sums is None:
-        step.next_sums = row
-    else:
-        step.visit(row)
-
-
-@_fuse.register(AtPoints)
-@_fuse.register(Check)
-def _omit(row: Any, step: _FusedStep) -> None: ...
-
-
-def _fused_step(rows: Iterable[Any]) -> _FusedStep:
-    step = _FusedStep()
-    for row in rows:
-        _fuse(row, step)
-    step.visit(step.next_sums, more=True)
-    return step
+_FUSED: dict[type, Any] = {
+    Gather: _FusedStep.gather, Scatter: _FusedStep.scatter,
+    AtPoints: _FusedStep.omit, Check: _FusedStep.omit,
+}  # fmt: skip
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
     """List the rows of a step with the fewest visits; sums are on the nodes before it."""
-    return _fused_step(rows).rows
+    return _FusedStep(rows).rows
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
     """List the rows one by one, as parts of the fused step's visits where possible."""
     rows = list(rows)
-    return one_by_one(rows, _fused_step(rows).visits)
+    return one_by_one(rows, _FusedStep(rows).visits)
 
 
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
     """List rows as separate visits, or as parts of `loops`."""
-    return [_alone(row, loops) for row in rows]
+
+    def loop_of(single: Visit, items: slice) -> Visit:
+        kinds = _kinds(single[items])
+        return next((visit for visit in loops if _kinds(visit[items]) == kinds), single)
+
+    def gather(row: Gather) -> Sweep:
+        visit = loop_of(Visit(_tasks([row]), (), OldWeights()), slice(0, 1))
+        return Sweep(visit, *row[1:], gathers=True, scatters=False)
+
+    def scatter(row: Scatter) -> Sweep:
+        return Sweep(loop_of(Visit((), *row), slice(1, 3)), gathers=False, moves=False)
+
+    alone: dict[type, Any] = {Gather: gather, Scatter: scatter}
+    return [alone.get(type(row), lambda row: row)(row) for row in rows]
 
 
-def _loop_of(single: Visit, loops: Iterable[Visit]) -> Visit:
-    items = slice(0, 1) if single.tasks else slice(1, 3)
-    return next((loop for loop in loops if _kinds(loop[items]) == _kinds(single[items])), single)
-
-
-@functools.singledispatch
-def _alone(row: Any, loops: Iterable[Visit]) -> Any:
-    return row
-
-
-@_alone.register
-def _gather_alone(row: Gather, loops: Iterable[Visit]) -> Sweep:
-    visit = _loop_of(Visit(_tasks([row]), (), OldWeights()), loops)
-    return Sweep(visit, *row[1:], gathers=True, scatters=False)
-
-
-@_alone.register
-def _scatter_alone(row: Scatter, loops: Iterable[Visit]) -> Sweep:
-    return Sweep(_loop_of(Visit((), *row), loops), gathers=False, moves=False)
-
-
-@functools.singledispatch
-def says(row: Any, setup: Any) -> str | None:
-    """Describe a row; None if it does nothing in this scene."""
-    return None
-
-
-@says.register
 def _says_sweep(row: Sweep, setup: Any) -> str:
     parts = [tag.says for tag in row.visit.tasks if row.gathers]
     parts += [tag.says for tag in row.visit.quantities if row.scatters]
     return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
 
 
-@says.register
-def _says_node_task(row: NodeTask, setup: Any) -> str | None:
-    return getattr(row.task, "says", None)
+_SAYS: dict[type, Any] = {
+    Sweep: _says_sweep,
+    NodeTask: lambda row, setup: getattr(row.task, "says", None),
+    SceneTask: lambda row, setup: row.says if len(row.rows(setup)) else None,
+}
 
 
-@says.register
-def _says_scene_task(row: SceneTask, setup: Any) -> str | None:
-    return row.says if len(row.rows(setup)) else None
+def says(row: Any, setup: Any) -> str | None:
+    """Describe a row; None if it does nothing in this scene."""
+    return _SAYS[type(row)](row, setup) if type(row) in _SAYS else None
 
 
 @point_function(otherwise=True)

@@ -359,8 +359,7 @@ def look(s, mode):
 
 def look_at_end(s, mode):
     """Check the energy after an implicit step: velocities and stresses are of one time."""
-    clock = s.control.clock[0]
-    if clock.watch_energy == 0:
+    if s.control.clock[0].watch_energy == 0:
         return True
     _sum_before(s, mode, int(s.control.values[TIMESTEP]))
     _sum_drift(s)

@@ -169,14 +169,8 @@ class Warming(eq.Task):
     not_at_corners = ("anything",)
     says = "temperature"
     reads = (
-        "x",
-        "state",
-        "material",
-        "temperature",
-        "capacity",
-        "conductance",
-        "temperature share",
-    )
+        "x", "state", "material", "temperature", "capacity", "conductance", "temperature share",
+    )  # fmt: skip
     writes = ("state",)
 
     def empty(task, w, x):
