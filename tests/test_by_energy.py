@@ -267,20 +267,20 @@ SCENE = """
     lam = 1e6*0.3/1.3/0.4
     method(tlmpm, FLIP, linear, 1)
     SCHEME
-    dimension(2, 0, 1, 0, 1, 0.25)
+    dimension(2, 0, 1, 0, 1, 0.5)
     THIN
     region(box, block, 0, 1, 0, 1)
     material(built, neo-hookean, 1000, 1e6, 0.3)
     material(formula, hyperelastic, 1000, G/2*(I1 - 3) - G*log(J) + lam/2*log(J)^2)
     material(stretches, hyperelastic, 1e3, G/2*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + lam/2*log(J)^2)
-    solid(s, region, box, 2, law, 0.25, 0)
+    solid(s, region, box, 2, law, 0.5, 0)
     region(left, block, INF, 0, INF, INF)
     group(left, nodes, region, left, all)
     fix(hold, velocity_nodes, left, 0, 0)
     fix(load, body_force, all, 100*y, -50)
     compute(Es, strain_energy, all)
     log_modify(custom, Es)
-    run(5)
+    run(3)
 """
 
 
@@ -353,21 +353,3 @@ def test_an_energy_that_loses_convexity_is_reported(run_interpreted):
     line = "material(m, saint-venant-kirchhoff, 1000, 2e7, 4e5)\nelement(e, m, p)\n"
     said = run_interpreted("load_path(p, 1, exx=0.01)\n" + line).err
     assert "loses its stiffness in swelling at a stretch of 0." in said
-
-
-def test_principal_stretches_in_single_precision(run_script):
-    """The strain out of the plane is a literal: it takes the precision of the run."""
-    script = """
-        precision(single)
-        method(tlmpm, FLIP, linear, 1)
-        dimension(2, 0, 1, 0, 1, 0.5)
-        region(box, block, 0, 1, 0, 1)
-        material(m, ogden, 1000, 2e6, 6.3e5, 1.3)
-        solid(s, region, box, 1, m, 0.5, 0)
-        group(s, particles, region, box, solid, s)
-        fix(v, initial_velocity_particles, s, x, 0)
-        compute(Es, strain_energy, s)
-        log_modify(custom, Es)
-        run(2)
-    """
-    assert run_script(script).log["Es"][-1] > 0

@@ -240,25 +240,14 @@ def test_friction_is_not_below_0(run_interpreted):
     assert "at least 0" in run_interpreted(block(2, *lines), status=1).err
 
 
-def test_a_point_too_deep_ends_a_compiled_run(run_script):
-    """Whichever thread finds it: one message, and nothing of the compiler."""
-    lines = "region(die, block, 0, 0.9, 0, 0.9)", "fix(F, contact/surface, all, die)"
-    text = block(2, *lines, "set_dt(1e-9)", "run(1)")
-    for threads in (1, 2):
-        said = run_script(text, "--threads", str(threads), status=1).err
-        assert "point 1 of solid 'body' is so deep in region 'die' of fix 'F'" in said
-        assert "fix(F, contact/surface" in said and "Error" not in said
+RUBBED = "fix(F, contact/surface, all, die, 0.3, 0.2*time, 0)"
 
 
 def test_a_region_that_kernels_do_not_know_pushes_with_the_same_force(run_script, monkeypatch):
     """As one of a plug-in, which has no outline: by depths that Python finds; with friction."""
-    lines = (
-        "fix(F, contact/surface, all, die, 0.3, 0.2*time, 0)",
-        "log_modify(custom, step, F_x, F_y)",
-    )
     text = block(
-        2, "region(die, cylinder, 0.4, -4, 4.31)", *lines, "set_dt(0.001)", "set_output(1)",
-        "run(5)",
+        2, "region(die, cylinder, 0.4, -4, 4.31)", RUBBED, "log_modify(custom, step, F_x, F_y)",
+        "set_dt(0.001)", "set_output(1)", "run(5)",
     )  # fmt: skip
     known = run_script(text, folder="known").log
     monkeypatch.setattr(Region, "outline", lambda region: None)
@@ -266,6 +255,15 @@ def test_a_region_that_kernels_do_not_know_pushes_with_the_same_force(run_script
     assert max(known["F_y"]) > 0 and max(known["F_x"]) > 0
     for name in ("F_x", "F_y"):
         assert told[name] == pytest.approx(known[name], rel=1e-9, abs=1e-9)
+
+
+def test_a_point_too_deep_ends_a_compiled_run(run_script):
+    """Whichever thread finds it: one message, and nothing of the compiler."""
+    text = block(2, "region(die, cylinder, 0.4, -4, 4.9)", RUBBED, "set_dt(1e-9)", "run(1)")
+    for threads in (1, 2):
+        said = run_script(text, "--threads", str(threads), status=1).err
+        assert "point 1 of solid 'body' is so deep in region 'die' of fix 'F'" in said
+        assert "fix(F, contact/surface" in said and "Error" not in said
 
 
 def test_check_counts_what_contact_with_faces_costs(run_interpreted, tmp_path):

@@ -1,11 +1,21 @@
 """Several points at once: each lane gives the bits of a point alone; nothing is beyond the last."""
 
 from math import log1p, sin
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
-from karamelo_py.compiler import CannotCompile, all_lanes, fma, kernel, real, shared, where
+from karamelo_py.compiler import (
+    CannotCompile,
+    all_lanes,
+    fma,
+    kernel,
+    point_function,
+    real,
+    shared,
+    where,
+)
 from karamelo_py.compiler.fields import field, load, load_vector, store
 from karamelo_py.compiler.lanes import EightLanes, FourLanes, beside, group, of_present
 from karamelo_py.compiler.powers import exponential, logarithm, logarithm_near_one, power
@@ -162,6 +172,36 @@ def test_whole_numbers_are_not_cut_off():
     """Cells times a real number would lose what is behind the point: that does not compile."""
     with pytest.raises(CannotCompile):
         _whole_times_half(np.ones(4), np.zeros((1, 4)))
+
+
+class Branching(NamedTuple):
+    """Its numbers are found for one lane after another."""
+
+    scalarised = ("_with_a_literal",)
+
+
+@point_function()
+def _with_a_literal(tag, x):
+    pass
+
+
+@_with_a_literal.on(Branching)
+def _with_a_literal_of_branching(tag, x):
+    return x * x, 0.5
+
+
+@kernel
+def _literal(tag, lanes, a, out):
+    p = group(lanes, 0, 8)
+    square, literal = _with_a_literal(tag, a[p])
+    out[0, p] = square * literal
+
+
+def test_literals_of_single_lanes_are_single():
+    """Found lane by lane, too, as the stretch across a plane is."""
+    a, out = np.arange(8, dtype=np.float32), np.zeros((1, 8), np.float32)
+    _literal(Branching(), EightLanes(), a, out)
+    assert (out[0] == a * a / 2).all()
 
 
 @shared
