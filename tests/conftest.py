@@ -225,8 +225,9 @@ def browser(request) -> Iterator[Any]:
         found.close()
 
 
-@pytest.fixture(scope="session")
-def _forking() -> Iterator[str]:
+@contextmanager
+def forking(**environment: str) -> Iterator[str]:
+    """A command that starts like Python, as a fork of a process that has the program at hand."""
     if os.name != "posix":
         yield sys.executable
         return
@@ -236,12 +237,17 @@ def _forking() -> Iterator[str]:
         start = " ".join([words[0], "-ISs", *words[1:]])
         python.write_text(f'#!/bin/sh\nexec {start} "$@"\n', encoding="utf-8")
         python.chmod(0o755)
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, env=environment)
+        process = subprocess.Popen(words, stdout=subprocess.PIPE, env=os.environ | environment)
         process.stdout.readline()
         yield str(python)
         process.kill()
         process.communicate()
+
+
+@pytest.fixture(scope="session")
+def _forking() -> Iterator[str]:
+    with forking(NUMBA_DISABLE_JIT="1") as python:
+        yield python
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from conftest import MAKING_ROOM
+from conftest import MAKING_ROOM, forking
 from listening import listening
 from numba import config
 
@@ -160,6 +160,13 @@ FILES = {
             print(one.message)
         """,
 }
+# A fork begins now: sources that are older than it are those that it has read.
+START = """
+import sys, time
+from karamelo_py.compiler.disk import cache
+sys.dont_write_bytecode, cache._began = True, time.time()
+exec(open("program.py").read())
+"""
 VALUES = [212.0, 206.0, 197.0]
 ALL = ["Disk", "Square", "Strip"]
 
@@ -167,8 +174,8 @@ ALL = ["Disk", "Square", "Strip"]
 class Shapes:
     """The package on disk, and runs of its program."""
 
-    def __init__(self, folder):
-        self.folder = folder
+    def __init__(self, python, folder):
+        self.python, self.folder = python, folder
         self.kernels = folder / "cache" / "kernels"
         for name, text in FILES.items():
             (folder / name).write_text(dedent(text))
@@ -181,32 +188,36 @@ class Shapes:
 
     def run(self):
         """Values of the three totals, the shapes they were compiled for, and what was told."""
+        path = os.pathsep.join([str(self.folder), os.environ["PYTHONPATH"]])
+        own = {"KARAMELO_PY_CACHE": str(self.folder / "cache"), "PYTHONPATH": path}
         done = subprocess.run(
-            [sys.executable, "-B", "program.py"],
-            cwd=self.folder,
-            env=os.environ | {"KARAMELO_PY_CACHE": str(self.folder / "cache")},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+            [self.python, "-c", START], cwd=self.folder, env=os.environ | own,
+            capture_output=True, text=True,
+        )  # fmt: skip
         assert done.returncode == 0, done.stderr
         values, compiled, *told = done.stdout.splitlines()
         return eval(values), eval(compiled), told
 
 
 @pytest.fixture(scope="module")
-def compiled(tmp_path_factory):
+def python():
+    with forking() as command:
+        yield command
+
+
+@pytest.fixture(scope="module")
+def compiled(python, tmp_path_factory):
     """The files of the kernels of the package as it is above."""
-    shapes = Shapes(tmp_path_factory.mktemp("shapes"))
+    shapes = Shapes(python, tmp_path_factory.mktemp("shapes"))
     assert shapes.run() == (VALUES, ALL, [])
     assert shapes.run() == (VALUES, [], [])
     return {path.name: path.read_bytes() for path in shapes.kernels.iterdir()}
 
 
 @pytest.fixture
-def shapes(tmp_path, compiled):
+def shapes(python, tmp_path, compiled):
     """The package in a folder of its own, with its kernels."""
-    shapes = Shapes(tmp_path)
+    shapes = Shapes(python, tmp_path)
     shapes.kernels.mkdir(parents=True)
     for name, content in compiled.items():
         (shapes.kernels / name).write_bytes(content)
