@@ -67,8 +67,9 @@ def test_a_smaller_step_leaves_bodies_at_rest(run_interpreted, kind):
 
     A tenth is what the block still moves by, whose period on the softest of them is 40 steps.
     """
-    log = run_interpreted(scene(kind, "set_dt(0.004)", "run(150)", "set_dt(0.002)", "run(150)")).log
-    after = log.Step >= 150
+    text = scene(kind, "set_dt(0.004)", "run(70)", "set_dt(0.002)", "run(70)")
+    log = run_interpreted(text.replace("time < 0.5", "time < 0.2")).log
+    after = log.Step >= 70
     assert log.w_y[after] == pytest.approx(WEIGHT, rel=0.1)
 
 
@@ -86,7 +87,7 @@ def test_friction_holds_what_it_can(run_interpreted, kind):
     Friction that only stops what a point has let it creep for ever, by 2 m/s^2 times the step and
     the rows of points above the contact: 0.03 m/s here, an eighth of the height from 0.4 on.
     """
-    log = run_interpreted(scene(kind, PULL, "run_time(0.8)", kinds=ROUGH)).log
+    log = run_interpreted(scene(kind, PULL, "run_time(0.65)", kinds=ROUGH)).log
     late = log.Time > 0.4
     assert log.c_x[late].max() - log.c_x[late].min() < 0.01 * 0.1
     assert log.w_x[late].mean() == pytest.approx(-0.2 * WEIGHT, rel=0.05)
