@@ -7,7 +7,10 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from karamelo_py.compiler.formula import (
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.output.console import Console
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.formula import (
     BLOCK,
     CONSTANT,
     KEEP,
@@ -19,10 +22,7 @@ from karamelo_py.compiler.formula import (
     Program,
     evaluate,
 )
-from karamelo_py.compiler.operations import OPERATIONS
-from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.output.console import Console
-from karamelo_py.scene.hub import Hub
+from karamelo_py.script.operations import OPERATIONS
 from karamelo_py.script.parser import parse_text
 
 

@@ -9,8 +9,6 @@ from tensors import every_kinematics, flat
 
 from comparisons.results import read_log
 from karamelo_py.compiler import kernel
-from karamelo_py.compiler.formula import CONSTANT, POINT
-from karamelo_py.compiler.operations import OPERATIONS
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.laws import law_in, law_on, law_table
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space
@@ -22,6 +20,8 @@ from karamelo_py.points.laws.strengths.curves import FlowStress, Tabulated
 from karamelo_py.points.laws.strengths.metals import ZerilliArmstrong
 from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.laws.temperatures import PlasticWork
+from karamelo_py.script.formula import CONSTANT, POINT
+from karamelo_py.script.operations import OPERATIONS
 
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)

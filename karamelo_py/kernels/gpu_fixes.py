@@ -11,7 +11,6 @@ import numpy as np
 
 from karamelo_py.compiler import index
 from karamelo_py.compiler.fields import field
-from karamelo_py.compiler.formula import ROWS, STACK
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
 from karamelo_py.kernels import arrays, hook_loop, totals, watch
@@ -22,6 +21,7 @@ from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
+from karamelo_py.script.formula import ROWS, STACK
 
 
 def _hooks_with_room(hooks):

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler import formula
-from karamelo_py.script import terms
+from karamelo_py.script import formula, terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.values import Values
 

@@ -1,5 +1,5 @@
 """Functions of the script language, for numbers; for many points see
-`karamelo_py.compiler.formula`.
+`karamelo_py.script.formula`.
 """
 
 import math
@@ -7,7 +7,7 @@ import operator
 import statistics
 from typing import NamedTuple
 
-from karamelo_py.compiler.operations import BINARY, UNARY, quietly
+from karamelo_py.script.operations import BINARY, UNARY, quietly
 
 # Pi, golden ratio, Euler's constant.
 CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.compiler import formula
-from karamelo_py.compiler.operations import OPERATIONS
+from karamelo_py.script import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import TAIL, compute_quietly
+from karamelo_py.script.operations import OPERATIONS
 
 # Largest number of operations, and of those shown in messages.
 _MAX_SIZE = 20000

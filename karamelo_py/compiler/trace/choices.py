@@ -20,7 +20,8 @@ INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
-ROOMS = ("compiler", "kernels", "points", "schemes", "styles")  # whose sources all keys have
+# Folders whose sources all keys have.
+ROOMS = "compiler", "script", "points", "kernels", "schemes", "styles"
 
 # Modules outside `ROOMS` of the functions that are being compiled, innermost last.
 _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("noted", default=())

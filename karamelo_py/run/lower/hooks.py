@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import INTERPRETED, address_of, address_of_python
-from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels import arrays, called
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup, Tag
@@ -24,6 +23,7 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
+from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 
 NO_PROGRAM = (-1, -1, -1, -1)
 

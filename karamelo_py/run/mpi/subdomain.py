@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler import address_of_python
-from karamelo_py.compiler.formula import GLOBAL, UNIFORM
 from karamelo_py.kernels import ranks
 from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, NoHooks, Setup
 from karamelo_py.kernels.contact import SeparateFields
@@ -19,6 +18,7 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, own_share, remember
 from karamelo_py.run.mpi import partition
 from karamelo_py.run.mpi.whole import Whole
 from karamelo_py.scene.comm import SerialComm
+from karamelo_py.script.formula import GLOBAL, UNIFORM
 
 LEARN_EVERY = 100  # steps between checks of the balance
 

@@ -6,8 +6,6 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import real
-from karamelo_py.compiler.formula import CONSTANT, POINT, SPREAD, UNIFORM
-from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import TableFile
@@ -17,6 +15,8 @@ from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_retu
 from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
+from karamelo_py.script.formula import CONSTANT, POINT, SPREAD, UNIFORM
+from karamelo_py.script.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.script.reading import read_text
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
-from karamelo_py.compiler.trace.kernels import caller_of, kernel, noinline
+from karamelo_py.compiler import caller_of, kernel, noinline
+from karamelo_py.script.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
 
 BLOCK = 128
 MAX_DEPTH = 32

@@ -5,9 +5,7 @@ import math
 import operator
 from collections.abc import Callable
 
-from karamelo_py.compiler.trace.choices import INTERPRETED
-from karamelo_py.compiler.trace.kernels import noinline
-from karamelo_py.compiler.trace.primitives import implements
+from karamelo_py.compiler import INTERPRETED, implements, noinline
 
 
 @noinline
