@@ -18,8 +18,6 @@ from karamelo_py.script.expressions import Expression
 
 
 class Body(NamedTuple):
-    """A solid with points."""
-
     motion: BodyMotion
     solid: Solid
 

@@ -24,8 +24,6 @@ SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
 
 class Noise(NamedTuple):
-    """The motion with the largest energy gain."""
-
     share: float  # of the tolerable amount
     speed: float  # of the body or its rim, over the wave speed
     cells: float  # path of the body, or of its rim
@@ -55,7 +53,7 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    """Return True if plastic flow dissipates an impact."""
+    """True if plastic flow dissipates an impact."""
     return not any(law_traits(kind).rebounds for kind in law_kind(law))
 
 
@@ -64,7 +62,7 @@ def vibrating(facts: BasicFacts) -> list[Body]:
 
 
 def drift_of(facts: BasicFacts) -> Noise | None:
-    """Estimate the energy gain by drift, also if tolerable."""
+    """The energy gain by drift, also if tolerable."""
     if not (facts.scheme.traits.keeping and facts.moves and facts.kept > 0.9) or _thrown(facts):
         return None
     limits = drift_limits(facts.basis)
@@ -88,7 +86,6 @@ def drift_of(facts: BasicFacts) -> Noise | None:
 
 
 def _thrown(facts: BasicFacts) -> bool:
-    """Return True if the only body moves without strain."""
     return (
         len(facts.motions) == 1
         and bool((facts.motions[0].fast == facts.motions[0].slow).all())
@@ -103,7 +100,6 @@ def _thrown(facts: BasicFacts) -> bool:
 
 
 def turn_of(facts: BasicFacts) -> Noise | None:
-    """Estimate the energy gain by rotation, also if tolerable."""
     turns = facts.moments or (facts.moves and facts.kept > 0.9)
     if not (facts.scheme.traits.keeping and turns and facts.d > 1) or facts.hub.domain.kin.hoops:
         return None
@@ -151,7 +147,7 @@ def sides(body: Body) -> np.ndarray:
 
 
 def fixed_directions(facts: BasicFacts, body: Body) -> np.ndarray:
-    """Return the directions (d,) in which fixes hold nodes at a body."""
+    """Directions (d,) in which fixes hold nodes at a body."""
     directions = np.zeros(facts.d, np.bool_)
     for fix, x in fixes_at(facts, body):
         if len(x):
@@ -207,7 +203,6 @@ def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
 
 
 def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
-    """Time until a body meets another or the domain's edge."""
     d, domain = facts.d, facts.hub.domain
     ways = zip(motion.velocity, motion.low, motion.high, domain.lo[:d], domain.hi[:d], strict=True)
     first = min(

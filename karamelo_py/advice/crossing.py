@@ -26,14 +26,11 @@ LOADED = 0.5  # of the energy: if loads supply more, they maintain the stress
 
 
 class Crossing(NamedTuple):
-    """Path of stressed material through the grid."""
-
     cells: float
     speed: float
 
     @property
     def lost(self) -> float:
-        """Lost fraction of the stress."""
         return 1 - exp(-PER_CELL * self.cells)
 
     @property
@@ -42,7 +39,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """Return True if stress is lost; gases and liquids have separate rules."""
+    """True if stress is lost; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -50,7 +47,7 @@ def loses(facts: BasicFacts) -> bool:
 
 
 def expected(facts: BasicFacts) -> Crossing:
-    """Estimate the remaining path under impact or initial stress."""
+    """Remaining path under impact or initial stress."""
     most = Crossing(0.0, 0.0)
     if not (facts.waves > 0 and loses(facts)):
         return most
@@ -60,7 +57,7 @@ def expected(facts: BasicFacts) -> Crossing:
 
 
 def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Yield speed and duration if there is initial stress."""
+    """Speed and duration if there is initial stress."""
     points = facts.simulation.points
     stored = points.total("stored")
     if facts.simulation.step or not stored > 0:
@@ -136,7 +133,7 @@ def measured(facts: BasicFacts) -> Crossing:
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
-    """Describe the lost stress after a run; warn once."""
+    """Warns once."""
     crossing, hub = measured(facts), facts.hub
     if crossing.lost <= TOLD:
         return {}

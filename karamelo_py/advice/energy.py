@@ -120,7 +120,7 @@ def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
 
 
 def taken_by(hub: Hub) -> list[str]:
-    """Name choices that dissipate energy without a record."""
+    """Choices that dissipate energy without a record."""
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
@@ -132,7 +132,7 @@ def taken_by(hub: Hub) -> list[str]:
 
 
 def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | None:
-    """Describe a loss above the fraction `within` unless chosen damping explains it."""
+    """A loss above the fraction `within`, unless chosen damping explains it."""
     clock = simulation.control.clock[0]
     if not clock.watch_energy or clock.looks <= LOOKS:
         return None
@@ -175,7 +175,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Return cause and fix of inelastic collisions, if contact is possible."""
+    """Cause and fix of inelastic collisions, if contact is possible."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
             "contact that removes penetrations within one step: the grid carries only the part of "
@@ -191,7 +191,6 @@ def collides(hub: Hub) -> tuple[str, str] | None:
 
 
 def words_of_change(hub: Hub, share: float) -> str:
-    """Describe an energy change of `share` %, and known dissipation."""
     takers, by = taken_by(hub), ""
     words = "the largest since the first step (kinetic + stored + dissipated - work)"
     if takers and share < -1:

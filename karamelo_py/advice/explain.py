@@ -126,7 +126,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _first_wrong(simulation: Simulation) -> tuple | None:
-    """Failed point with the smallest id: id, old and new position, velocity, grid."""
+    """Point with the smallest id: id, old and new position, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
@@ -141,7 +141,6 @@ def _first_wrong(simulation: Simulation) -> tuple | None:
 
 
 def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
-    """Explain the first failed point; `smaller` is a suggested step."""
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
         hint = "check fixes that act on heat: a formula that gives NaN, or heat without bounds"
@@ -219,7 +218,7 @@ def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> 
 
 
 def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
-    """Return True if the domain of a point is folded."""
+    """The domain of a point is folded."""
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False
@@ -227,7 +226,7 @@ def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
-    """Suggest a smaller step (`instead`, if given), after a check of doubtful units."""
+    """`instead`, if given, after a check of doubtful units."""
     if doubted := [name for name in hub.update.warned_of if code_of(name) in DOUBTED_UNITS]:
         units = f"check the {doubted[0]} (see the warning)"
         return f"{units}, then {instead}" if instead else units

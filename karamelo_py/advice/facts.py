@@ -88,7 +88,6 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def turn(self) -> float:
-        """Rotation in radians of the solid that rotates most."""
         if self.d == 1 or self.hub.domain.kin.hoops:
             return 0.0
         return max((motion.spin for motion in self.motions), default=0.0) * self.duration
@@ -192,7 +191,7 @@ class SceneFacts(BasicFacts):
 
 
 def script_text(hub: Hub) -> str:
-    """Return the script with its includes, without comments."""
+    """The script with its includes, without comments."""
     lines: list[str] = []
     for path in dict.fromkeys([*hub.interpreter.files, *hub.interpreter.files_ahead]):
         with suppress(ScriptError):  # the file may be gone

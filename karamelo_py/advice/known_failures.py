@@ -51,7 +51,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Return True if nothing can move; plug-ins may do anything."""
+    """Nothing can move; plug-ins may do anything."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -72,7 +72,6 @@ def _rests(hub: Hub, simulation: Simulation) -> bool:
 
 
 def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None:
-    """Warn of a run of more than `ENDLESS` steps."""
     span = end_time - simulation.time
     if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
         return
@@ -113,7 +112,7 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """Return the step requested now; `halves`: a run in trouble halves it."""
+    """The step requested now; `halves`: a run in trouble halves it."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
@@ -271,7 +270,7 @@ def _tell(hub: Hub, advice: Iterable[Advice]) -> None:
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """Sum the known durations of later runs of the same scene."""
+    """The known durations of later runs of the same scene."""
     present = step_of(hub, False).scene
     later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -318,7 +317,7 @@ def _warn_about_precision(s: SceneFacts) -> None:
 
 
 def _out_of_reach(hub: Hub, simulation: Simulation, fix: Fix) -> bool:
-    """Return True if no point is in reach of a fix's nodes, taken as a box."""
+    """No point is in reach of a fix's nodes, taken as a box."""
     x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
     method, setup = hub.update.method, simulation.setup
     reach = (method.basis.traits.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)

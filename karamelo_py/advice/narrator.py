@@ -29,8 +29,6 @@ from karamelo_py.script.errors import render_message
 
 
 class Narrator(Listener):
-    """Tells the user about a run."""
-
     def __init__(self, hub: Hub):
         self.hub = hub
 
@@ -56,7 +54,6 @@ class Narrator(Listener):
             known_failures.warn_about_length(hub, simulation, run.end_time)
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
-        """Start the record, and print the banner."""
         hub, why = self.hub, unknown_work(self.hub)
         # Of the first state: a failed one has no meaningful limit.
         if simulation.steps.too_large:
@@ -140,7 +137,6 @@ class Narrator(Listener):
         return explain.trouble(self.hub, simulation, status, self.smaller * too_large)
 
     def ended(self, run: RunLoop, simulation: Simulation, first_step: int, wall: float) -> None:
-        """Complete the record and print the closing table."""
         self._tell_of_loss(simulation, energy.LOSS)
         steps = simulation.step - first_step
         stages = [(name, float(passed)) for name, (passed, _) in run.timings.on.items()]

@@ -34,7 +34,7 @@ LOADED = 24 << 20  # bytes of compiled loops and imported modules, measured
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
-    """Print what a run to `end_time` needs: fields, stages, tiles, memory, first dt."""
+    """What a run to `end_time` needs: fields, stages, tiles, memory, first dt."""
     program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
@@ -139,7 +139,6 @@ def _size(count: float) -> str:
 
 
 def materials(hub: Hub, block: Any) -> list[Material]:
-    """List the used materials whose law is of a block's kind."""
     used = dict.fromkeys(solid.material for solid in hub.solids.values())
     kind = without_rate(law_kind(block.laws))
     return [material for material in used if law_kind(material.law) == kind]

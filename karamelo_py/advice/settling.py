@@ -20,8 +20,6 @@ CELLS = 0.25  # displacement at rest: below, hardly a point crosses a cell
 
 
 class Settling(NamedTuple):
-    """The body that settles through most cells."""
-
     name: str = ""
     strain: float = 0.0  # mean, at rest
     cells: float = 0.0  # displacement of the free end at rest, over the cell size
@@ -55,14 +53,14 @@ def expected(facts: BasicFacts) -> Settling:
 
 
 def _rests(other: BodyMotion, motion: BodyMotion, k: int, h: float, *, down: bool) -> bool:
-    """Return True if `other` lies within a cell of a body along k, on its pressed side."""
+    """`other` lies within a cell of a body along k, on its pressed side."""
     gap = other.low - motion.high if down else motion.low - other.high
     apart = np.maximum(other.low - motion.high, motion.low - other.high)
     return -h < gap[k] < h and bool((np.delete(apart, k) < 0).all())
 
 
 def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
-    """Return True if fixes hold a body along k at one end only."""
+    """Fixes hold a body along k at one end only."""
     h = lattice_at(facts, body).h
     ends = [x[:, k] for fix, x in fixes_at(facts, body) if fix.formulas[k] is not None]
     x = np.concatenate(ends) if ends else np.zeros(0)

@@ -12,7 +12,7 @@ NO_LIMITS = ("set_dt", "end")  # of stability
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
-    """Return the default step now: at rest, or as if points had moved."""
+    """The default step now: at rest, or as if points had moved."""
     clock, steps = simulation.control.clock[0], simulation.steps
     courant, share = own_step_of_waves(simulation.hub, still=still)
     weight = own_weight_of_drift(simulation.hub)
@@ -24,14 +24,12 @@ def own_step(simulation: Simulation, *, still: bool = False) -> float:
 
 
 def _stable_in_place(simulation: Simulation) -> float:
-    """Return the largest stable step at the present positions."""
     clock = simulation.control.clock[0]
     courant, _ = own_step_of_waves(simulation.hub, still=clock.path <= STILL)
     return courant * clock.spacing / clock.rate
 
 
 def blows_up(simulation: Simulation) -> bool:
-    """Return True if a run with this step will fail."""
     return simulation.dt > LOST * _stable_in_place(simulation)
 
 
@@ -49,7 +47,7 @@ def what_follows(simulation: Simulation, step: float) -> str:
 
 
 def own_step_instead_of(simulation: Simulation) -> float | None:
-    """Return the default step if the script overrides it."""
+    """The default step, if the script overrides it."""
     update = simulation.hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return None
@@ -72,7 +70,7 @@ def step_after_motion(simulation: Simulation) -> float:
 
 
 def stable_step(simulation: Simulation, limit: float) -> float:
-    """Return the larger of `limit` and the default's stable step."""
+    """The larger of `limit` and the default's stable step."""
     return max(limit, own_step(simulation) / USUAL)
 
 
@@ -86,12 +84,10 @@ def own_step_instead(simulation: Simulation, command: str = "") -> str:
 
 
 def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
-    """Name the script's step, as a key for messages."""
     return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
 
 
 def words_of_share(simulation: Simulation) -> str:
-    """Describe the fraction of the stable step."""
     hub, steps = simulation.hub, simulation.steps
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:

@@ -33,7 +33,7 @@ LONG = 10.0  # seconds of output worth a suggestion
 
 
 def seconds_of_step(hub: Hub, count: int) -> float:
-    """Estimate the least core seconds per step."""
+    """Estimate of the least core seconds per step."""
     return POINT * count + sum(fix.seconds() for fix in hub.fixes.values())
 
 
@@ -101,7 +101,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if a group has all or no points (nodes) of equal `key`."""
+    """A group has all or no points (nodes) of equal `key`."""
     group = fix.group
     if group is None or group.all:
         return group is not None
@@ -146,7 +146,7 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Return True if fixes neither act along k nor depend on it."""
+    """Fixes neither act along k nor depend on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         if len(formulas) <= len(rest) or not is_zero(formulas[k]):
@@ -165,7 +165,7 @@ def _acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def _layers(hub: Hub, k: int, rest: list[int]) -> int:
-    """Count equal layers across k between held faces; 0 if unequal."""
+    """Equal layers across k between held faces; 0 if unequal."""
     most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:
@@ -184,7 +184,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> int:
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Return True if nodes of the planes `low` and `high` (in cells) are fixed along k."""
+    """Nodes of the planes `low` and `high` (in cells) are fixed along k."""
     lattice = hub.lattices[0]
     fixed = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -201,7 +201,6 @@ def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
 
 
 def _round(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest axisymmetry for cylinders about one axis."""
     if hub.domain.dimension != 3:
         return
     regions = [solid.region for solid in hub.solids.values() if solid.region is not None]
@@ -237,7 +236,6 @@ def _round(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _mirrored(hub: Hub, simulation: Simulation) -> Words:
-    """Suggest half of a mirrored scene."""
     domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
     if len(hub.lattices) > 1 or not _acting(hub):
         return
@@ -269,7 +267,7 @@ def _mirrored(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Yield for each fix whether it neither acts along k nor depends on it."""
+    """For each fix, whether it neither acts along k nor depends on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         rest_formulas = [formulas[j] for j in rest if j < len(formulas)]
@@ -279,7 +277,7 @@ def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
 
 
 def _both_sides(solid: Solid, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if each point has a mirror image."""
+    """Each point has a mirror image."""
     cells = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
     return bool((np.unique(cells, axis=0, return_counts=True)[1] == 2).all())
 
@@ -301,7 +299,7 @@ def _precision(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _output(hub: Hub, simulation: Simulation) -> Words:
-    """Find output that takes seconds, and longer than the steps."""
+    """Output that takes seconds, and longer than the steps."""
     span = simulation.control.clock[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):

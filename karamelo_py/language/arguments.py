@@ -22,9 +22,7 @@ _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 class Argument:
-    """One unevaluated argument of a call: its `text` as written, without surrounding blanks, and
-    `place`.
-    """
+    """An unevaluated argument of a call: its `text` without surrounding blanks, and `place`."""
 
     def __init__(self, raw: Raw, interpreter: Any):
         code = raw.code
@@ -51,7 +49,7 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """Return it as a word: bare, quoted, or in a text variable; None for arithmetic.
+        """Bare, quoted, or in a text variable; None for arithmetic.
 
         ``neo-hookean`` or ``dump.*.gz`` are words, unless they contain the name of a value.
         """
@@ -68,7 +66,7 @@ class Argument:
         return None if meaningful else self.text
 
     def words(self, literals: Sequence[str] = ()) -> str:
-        """Return its text, even if it looks like arithmetic."""
+        """Its text, even if it looks like arithmetic."""
         if self.text in literals:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
@@ -138,12 +136,12 @@ class Argument:
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
-        """Return the last occurrence of `text` in it."""
+        """The last occurrence of `text` in it."""
         start = self._raw.source.text.rindex(text, self._raw.start, self._raw.end)
         return self._from(start, start + len(text))
 
     def keyword(self) -> tuple[str, Argument] | None:
-        """Return name and value of ``name = value``."""
+        """Name and value of ``name = value``."""
         match = _KEYWORD.match(self.text)
         if not match:
             return None
@@ -151,7 +149,7 @@ class Argument:
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """Return the first argument that may lack a comma."""
+    """The first argument that may lack a comma."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
@@ -168,7 +166,6 @@ class Named:
 
 
 def look_up(catalogue: Any, argument: Argument):
-    """Find the part of the scene that `argument` names."""
     word = argument.word()
     if word is None:
         article = "an" if catalogue.kind[0] in "aeiou" else "a"

@@ -1,7 +1,5 @@
-"""Argument lists that depend on the dimension, as in dimension() and block.
-
-A signature has the kinds of arguments; here are their names in 1D, 2D and 3D, for errors.
-"""
+"""Argument lists that depend on the dimension, as in dimension() and block: their names, for
+errors."""
 
 import math
 import re
@@ -14,8 +12,7 @@ from karamelo_py.language.unknown import size_of_cells, words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.expressions import Expression
 
-# Karamelo's infinity; scripts mean INF by it.
-_HUGE = 1e20
+_HUGE = 1e20  # Karamelo's infinity, for INF
 
 
 class Forms:
@@ -23,7 +20,7 @@ class Forms:
 
     `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are listed by
     supported dimension. Some arguments take one of a few `words`; INF and EDGE mean the `open_ends`
-    (-inf for a lower end, inf for an upper end).
+    (-inf, inf).
     """
 
     def __init__(
@@ -44,7 +41,6 @@ class Forms:
         return self.pattern.format(dimension=dimension, names=names)
 
     def read(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> dict[str, float | str]:
-        """Return values by name, for `dimension`."""
         if dimension not in self.names:
             dimensions = " or ".join(map(str, sorted(self.names)))
             expected = f"a domain with {dimensions} dimensions"
@@ -81,7 +77,6 @@ class Forms:
         )
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
-        """Format the call with the script's words, and names for missing ones."""
         names = self.names[dimension]
         words = [argument.text for argument in arguments][: len(names)]
         line = re.sub(r"\[.*?\]", "", self.pattern)
@@ -124,7 +119,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """Evaluate `argument` to a finite constant; in a rehearsal, NaN is a result of a run."""
+    """A finite constant; in a rehearsal, NaN is a result of a run."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)
@@ -137,7 +132,7 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
-    """Return `value`; refuse infinity, and NaN except in a rehearsal."""
+    """Refuse infinity, and NaN except in a rehearsal."""
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
     message = f"{name} must be a finite number, not {value}"

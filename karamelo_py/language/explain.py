@@ -18,7 +18,7 @@ def wrong_count(
     arguments: Sequence[Argument],
     keywords: Sequence[str],
 ) -> ScriptError:
-    """Make the error for too few or too many `arguments` of `name`, or missing `keywords`."""
+    """Error for too few or too many `arguments` of `name`, or missing `keywords`."""
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()
@@ -47,7 +47,7 @@ def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | No
 
 
 def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list[Parameter]:
-    """List omitted parameters, found by words that fit only further back."""
+    """Found by words that fit only further back."""
     missing, rest = [], list(arguments)
     for slot in slots:
         words = () if slot.shown == slot.name else slot.kind.words
@@ -59,7 +59,6 @@ def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
-    """Name the missing parameters, without an ID after another missing word."""
     words = {p.shown for p in slots if p.shown != p.name}
     return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
@@ -67,7 +66,6 @@ def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str
 def _filled(
     slots: Sequence[Parameter], arguments: Sequence[Argument], missing: Sequence[Parameter]
 ) -> tuple[Argument, str | None]:
-    """Find the argument at the first missing one's position; fill words into all arguments."""
     rest, before = iter(arguments), next(k for k, slot in enumerate(slots) if slot in missing)
     words = [p.kind.words[0] if p in missing and p.kind.words else p in missing for p in slots]
     if True in words:
@@ -94,8 +92,6 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
 def swapped(
     hub: Scene, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
 ) -> str | None:
-    """Write the hint for two arguments that fit in each other's position."""
-
     def fits(parameter: Parameter, argument: Argument) -> bool:
         kind = parameter.kind
         if argument.is_null:
@@ -143,7 +139,6 @@ def misfit(
 def guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
 ) -> Place | None:
-    """Find the place of the argument or word that an error names."""
     if isinstance(error.argument, int) and error.argument < len(arguments):
         plain = [argument for argument in arguments if argument.keyword() is None]
         return (arguments if error.argument >= 0 else plain)[error.argument].place

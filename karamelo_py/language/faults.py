@@ -34,7 +34,7 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
 
 
 def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:
-    """Make the error for a faulty style (``fix drag``), naming its package."""
+    """Error for a faulty style (``fix drag``), naming its package."""
     family, _, style = name.rpartition(" ")
     family = family or "command"
     origin = registry.origin(family, style) if registry.knows(family, style) else ""
@@ -48,7 +48,7 @@ def fault(name: str, message: str, place: Place | None, more: str = "") -> Scrip
 
 
 def cause_of(error: BaseException) -> str:
-    """Describe an exception in one line, with the user's line if it does not compile."""
+    """An exception in one line, with the user's line if it does not compile."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -59,13 +59,12 @@ def cause_of(error: BaseException) -> str:
 
 
 def _others() -> tuple[str, ...]:
-    """List folders of this program, the Python library and installed packages."""
     libraries = map(sysconfig.get_path, ("stdlib", "purelib", "platlib"))
     return (str(Path(__file__).parents[1]), *libraries)
 
 
 def steps_to(error: BaseException) -> list[str]:
-    """List the user's lines in a traceback: ``ropes.py:12 in pull: inner(points)``."""
+    """The user's lines in a traceback: ``ropes.py:12 in pull: inner(points)``."""
     others = _others()
     return [
         f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}: {frame.line}".rstrip(": ")
@@ -75,13 +74,13 @@ def steps_to(error: BaseException) -> list[str]:
 
 
 def place_of(function: Callable) -> str:
-    """Format the first line of a Python function: `` (spring.py:12)``."""
+    """First line of a Python function: `` (spring.py:12)``."""
     code = function.__code__
     return f" ({Path(code.co_filename).name}:{code.co_firstlineno})"
 
 
 def place_in(code: Any, error: BaseException) -> str:
-    """Format the last line in the file of `code` in the traceback: `` (spring.py:28)``."""
+    """Last line in the file of `code` in the traceback: `` (spring.py:28)``."""
     try:
         source = inspect.getsourcefile(code)
     except TypeError:

@@ -1,7 +1,7 @@
 """Find further, independent mistakes of a script after the first.
 
-What a wrong statement would have defined is recorded. Statements that use it are skipped, and their
-own definitions recorded in turn; their command and style names are still checked.
+Statements that use what a wrong statement would have defined are skipped, and their own definitions
+recorded in turn; command and style names are still checked.
 """
 
 import re
@@ -33,8 +33,6 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 
 
 class Dependents:
-    """Names and kinds that depend on failed statements."""
-
     def __init__(self) -> None:
         self.names: set[str] = set()
         # Kinds that an unknown name may have, and that were not deleted.
@@ -43,7 +41,7 @@ class Dependents:
         self.lacks_columns = False
 
     def note(self, statement: Statement) -> bool:
-        """Record what `statement` would define; return False if nothing else can be checked."""
+        """Record what `statement` would define; False if nothing else can be checked."""
         if isinstance(statement, Assignment):
             self.names.add(statement.name)
         if not isinstance(statement, CommandCall):
@@ -65,7 +63,7 @@ class Dependents:
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:
-        """Guess the intended command; else record what it may have defined."""
+        """Else record what it may have defined."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
@@ -78,7 +76,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Return True for use of a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
+        """True for use of a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -142,7 +140,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Find further mistakes in syntax and names; if too many, the last one counts the rest."""
+    """Mistakes in syntax and names; if too many, the last one counts the rest."""
     errors = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
     more = len(errors) - MOST_OF_TEXT
     besides = [ScriptError(f"and {plural(more, 'more mistake')} after these")] if more > 0 else []
@@ -152,7 +150,7 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 def misnamed(
     interpreter: Any, statements: Iterable[Statement], wanting: Iterable[str] = ()
 ) -> list[ScriptError]:
-    """Find wrong names of commands and styles in statements.
+    """Wrong names of commands and styles in statements.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
     are valid even if the definition of a `wanting` name failed.

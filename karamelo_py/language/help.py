@@ -25,7 +25,7 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Make the help from signature and docstring of a command or style, and of its bases."""
+    """Help from signature and docstring of a command or style, and of its bases."""
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     noun = name.removeprefix("delete_").replace("_", " ")
@@ -50,7 +50,6 @@ def describe(target: Callable, name: str) -> Help:
 
 
 def sections_of(doc: str) -> tuple[str, dict[str, str]]:
-    """Split a docstring into its head and sections by title."""
     pieces = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}$", inspect.cleandoc(doc), flags=re.MULTILINE)
     titles = [title.replace("Examples", "Example") for title in pieces[1::2]]
     texts = (text.strip("\n") for text in pieces[2::2])
@@ -58,7 +57,6 @@ def sections_of(doc: str) -> tuple[str, dict[str, str]]:
 
 
 def _descriptions(section: str) -> dict[str, str]:
-    """Read descriptions by name from a NumPy section."""
     descriptions: dict[str, str] = {}
     for block in re.split(r"\n(?=\S)", section):
         head, _, text = block.partition("\n")

@@ -26,7 +26,6 @@ class _Frame:
 
 
 def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
-    """Return the code of an error that has none, by what it marks."""
     code = "operand"
     if isinstance(statement, syntax.CommandCall):
         code = "not-possible"
@@ -45,18 +44,16 @@ class Interpreter:
         self.hub = hub
         self.variables: dict[str, Value] = {}
         hub.interpreter = self
-        self.files: list[Path] = []  # files read
-        self.files_ahead: list[Path] = []  # files read by a rehearsal
+        self.files: list[Path] = []  # read
+        self.files_ahead: list[Path] = []  # read by a rehearsal
         self.frames: list[_Frame] = []
         self.by_statement = False  # `next_statement` enters included scripts
         self.statement: syntax.Statement | None = None  # last one started
         self.record = Record()  # executed statements, for restart files
         # Until the script reaches the state of an earlier run.
         self.replay: Replay | None = None
-        # Variables of the command line; they override assignments.
+        # Command-line variables override assignments.
         self.presets = Presets(self, presets or {})
-
-    # -- execution --------------------------------------------------------------------------------
 
     def run_file(self, path: str | Path) -> None:
         path = Path(path)
@@ -71,7 +68,7 @@ class Interpreter:
         return bool(self.frames)
 
     def include(self, name: str) -> None:
-        """Execute another script here; `name` is relative to the present script."""
+        """`name` is relative to the present script."""
         path = self.included(name, self.folder)
         exists = path.exists()
         if any(exists and frame.path and frame.path.samefile(path) for frame in self.frames):
@@ -95,7 +92,6 @@ class Interpreter:
             self.frames.pop()
 
     def included(self, name: str, folder: Path) -> Path:
-        """Return the file of ``include(name)`` in a script in `folder`."""
         path = folder / name
         elsewhere = self.hub.folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
@@ -149,7 +145,6 @@ class Interpreter:
             raise
 
     def go_on(self) -> None:
-        """Execute the rest of all scripts in progress."""
         try:
             self._finish()
         except Pause:
@@ -186,7 +181,7 @@ class Interpreter:
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """Take the next statement, from any file; it counts as executed."""
+        """The next statement, from any file; it counts as executed."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -196,7 +191,6 @@ class Interpreter:
         return None
 
     def execute(self, statement: syntax.Statement) -> None:
-        """Execute one statement; errors get its place and the including scripts."""
         self.statement = statement
         self.hub.place = statement.place
         depth = len(self.frames)
@@ -261,8 +255,6 @@ class Interpreter:
             raise ScriptError(message, place=statement.place, hint=hint)
         self.evaluate(node, statement.raw)
 
-    # -- assignments ------------------------------------------------------------------------------
-
     def _assign(self, statement: syntax.Assignment) -> None:
         name = statement.name
         unknown.check_name(name)
@@ -291,8 +283,6 @@ class Interpreter:
             raise
         self.presets.follow(statement)
 
-    # -- calls ------------------------------------------------------------------------------------
-
     def _call(self, statement: syntax.CommandCall) -> None:
         name, raw = statement.name, statement.raw
         if self.hides(name) or not (name in FUNCTIONS or registry.knows("command", name)):
@@ -303,8 +293,6 @@ class Interpreter:
         else:
             # A function alone on a line has no effect, but its mistakes count.
             self.evaluate(parse_expression(raw), raw)
-
-    # -- expressions ------------------------------------------------------------------------------
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
         return evaluation.evaluate(node, raw, self)
@@ -329,7 +317,7 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """Return True if a name has any meaning, as a call or in later lines."""
+        """True if a name has any meaning, as a call or in later lines."""
         meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             meaningful

@@ -19,16 +19,12 @@ from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
 
-# Above, floats skip integers.
-_LARGEST_INTEGER = 2**53
+_LARGEST_INTEGER = 2**53  # above, floats skip integers
 
 
 def _rounding(value: float) -> float:
     """Tolerance for results such as 0.3/0.1 to count as integers."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
-
-
-# ---- constraints and files ----------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Require a number from `lo` to `hi`, without the ends named by `open` (True: both)."""
+    """A number from `lo` to `hi`, without the ends named by `open` (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -89,8 +85,6 @@ class InputFile:
 
 
 class TableFile(InputFile):
-    """Annotation: a file with numbers in columns."""
-
     endings = ("", ".csv", ".dat", ".tsv", ".txt", ".h5", ".pvd", ".vtu", ".gz", ".lammps", ".xyz")
 
 
@@ -131,9 +125,6 @@ def _file_name(argument: Argument) -> str:
             "a file name is missing", place=argument.place, expected="the name of a file"
         )
     return os.path.expanduser(name)
-
-
-# ---- conversion ---------------------------------------------------------------------------------
 
 
 class Unfit(Exception):
@@ -287,7 +278,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Return the kind for an annotation; TypeError if it is not supported."""
+    """The kind for an annotation; TypeError if it is not supported."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:
@@ -351,8 +342,6 @@ def _union(kinds: list[Kind]) -> Kind:
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a command or style, as scripts see it."""
-
     name: str
     kind: Kind
     variadic: bool = False

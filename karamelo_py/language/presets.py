@@ -17,7 +17,7 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Texts by name; assignments of these names in the script are skipped."""
+    """Command-line variables: texts by name. Assignments of these names are skipped."""
 
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
@@ -79,7 +79,6 @@ class Presets(dict[str, str]):
         return {name: None for word in words for name in self._made_of.get(word, ())}
 
     def blame(self, statement: Statement, error: ScriptError) -> None:
-        """Add a remark if a mistake may come from a preset."""
         place = error.place
         if place not in (None, statement.place) and not error.hint:
             marked = place.text[place.column - 1 : place.column - 1 + place.length]
@@ -110,7 +109,7 @@ class Presets(dict[str, str]):
     def _scripts(
         self, statements: list[Statement], folder: Path, outer: tuple[Path, ...] = ()
     ) -> Iterator[list[Statement] | None]:
-        """Yield the statements of a script and its includes; None for an unknown include."""
+        """Statements of a script and its includes; None for an unknown include."""
         yield statements
         for statement in statements:
             if not (isinstance(statement, CommandCall) and statement.name == "include"):

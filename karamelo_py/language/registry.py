@@ -2,11 +2,10 @@
 
 A package offers a style with a line in its pyproject.toml, for example::
 
-    [project.entry-points."karamelo_py.fix"]
-    gravity = "my_package:Gravity"
+    [project.entry-points."karamelo_py.fix"] gravity = "my_package:Gravity"
 
-A script names a class of a module next to it, or of an installed one, as ``module.Class``. Nothing
-is imported before use.
+A script names a class of a module, next to it or installed, as ``module.Class``. Nothing is
+imported before use.
 """
 
 import re
@@ -66,13 +65,12 @@ def names(family: str) -> list[str]:
 
 
 def knows(family: str, name: str) -> bool:
-    """Return True if `family` has a style of this name, perhaps a broken one."""
+    """True if `family` has a style of this name, perhaps a broken one."""
     return name in _families().get(family, {}) or _of_module(family, name) is not None
 
 
 @contextmanager
 def modules_of(*folders: Path) -> Iterator[None]:
-    """Import modules of these folders before all others within the context."""
     paths = [str(folder.absolute()) for folder in folders]
     sys.path[:0] = paths
     try:
@@ -103,7 +101,7 @@ def forget_other(module: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """Return the style name of a class (attribute ``style`` if it has several)."""
+    """The style name of a class (attribute ``style`` if it has several)."""
     target = f"{style.__module__}:{style.__qualname__}"
     for name, entries in _families().get(family, {}).items():
         if any(entry.value == target for entry in entries):
@@ -116,12 +114,9 @@ def origin(family: str, name: str) -> str:
 
 
 def find(family: str, name: str) -> Any:
-    """Return the class or function of a style, imported on first use.
+    """The class or function of a style, imported on first use.
 
-    Raises
-    ------
-    ScriptError
-        If there is no such style, it cannot be imported, or two packages offer it.
+    ScriptError if there is no such style, it cannot be imported, or two packages offer it.
     """
     key = family, name
     of_module = _of_module(family, name)

@@ -13,7 +13,7 @@ _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 
 
 def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
-    """Return a statement without blanks, comments, line ends and the keywords `without`."""
+    """A statement without blanks, comments, line ends and the keywords `without`."""
     text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
     for word in without:
         text = re.sub(rf",{word}=[^,()]*", "", text)
@@ -69,7 +69,6 @@ class Replay:
             raise error
 
     def _was_over(self, run: str, place: Place | None) -> ScriptError:
-        """Make the error for a changed length of a finished run."""
         behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
         return ScriptError(
             f"{self.file} was written when this run was over, by {run}",
@@ -79,7 +78,6 @@ class Replay:
         )
 
     def _longer_by(self, before: str, text: str) -> str | None:
-        """Give an unfinished run the length that one of its variables now gives."""
         run = self.record.statements[-1]
         name, assigns, value = text.partition("=")
         if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
@@ -92,7 +90,6 @@ class Replay:
         )
 
     def value(self) -> float:
-        """Return the recorded result of the next value(...)."""
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, place: Place | None = None) -> ScriptError:

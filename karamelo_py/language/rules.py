@@ -4,19 +4,16 @@ A part is a basis, transfer, scheme, method, field, law or part of a law, or a f
 declared next to it, also in plug-ins::
 
     known_failure(
-        PIC,
-        "angular momentum",
-        when=lambda pic, scene: scene.turns,
-        reason="PIC removes 1 % or more of the angular momentum of a rotating body",
-        cure="APIC or FLIP instead of PIC",
+        PIC, "angular momentum", when=lambda pic, scene: scene.turns, reason="PIC removes 1 % or
+        more of the angular momentum of a rotating body", cure="APIC or FLIP instead of PIC",
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
 returns whether the rule applies, or the numbers for its words by name, or a list of these, one per
-message. Braces in words take these numbers and attributes of ``part``, ``scene`` and ``owner``,
-such as ``{scene.turn:.2g}``; the owner of a law or its parts is the material. Two names are
-special: ``place``, the marked place in the script (default: of the fix, material or method), and
-``share``, the size of noise over the tolerable amount.
+message. Braces in words take these numbers and attributes of ``part``, ``scene`` and ``owner`` (of
+a law or its parts, the material), such as ``{scene.turn:.2g}``. Two names are special: ``place``,
+the marked place in the script (default: of the fix, material or method), and ``share``, the size of
+noise over the tolerable amount.
 """
 
 import re
@@ -43,7 +40,7 @@ class Advice(NamedTuple):
 
 
 def code_of(name: str) -> str:
-    """Convert a known failure to a code: ``shocks of material 'm'`` is shocks-of-material."""
+    """Code of a known failure: ``shocks of material 'm'`` is shocks-of-material."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)  # names of the script
     return "-".join(re.findall(r"\w+", words.lower()))
 
@@ -56,7 +53,7 @@ def known_failure(
 ) -> None:
     """Declare a known failure of a part by a name; it is reported once.
 
-    With a `cause`, it is noise: reported if its share exceeds 1, and as the cause of a gain.
+    With a `cause`, it is noise: reported if its ``share`` exceeds 1, and as the cause of a gain.
     """
     _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
     if cause:
@@ -64,7 +61,7 @@ def known_failure(
 
 
 def known_failures() -> Iterator[tuple[type, str, str, str]]:
-    """List the known failures of loaded parts: part, name, reason and fix."""
+    """The known failures of loaded parts: part, name, reason and fix."""
     for (kind, part), some in _rules.items():
         for _, *words in some if kind == "failure" else ():
             name, reason, cure = (re.sub(r"\{[^{}]+\}", "…", text) for text in words)
@@ -82,7 +79,7 @@ def gain(part: type, *, when: When, cause: str, cure: str) -> None:
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    """Yield what rules of one kind say of a part (or of a field, which is a class)."""
+    """Advice of one kind about a part (or a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
             result = when(part, scene)

@@ -48,9 +48,9 @@ __all__ = [
 
 @cache
 def parameters(target: Callable) -> list[Parameter]:
-    """List the parameters of a command or style, without the hub.
+    """Parameters of a command or style, without the hub.
 
-    Raises TypeError for an unsupported signature, a fault of its author.
+    TypeError for an unsupported signature, a fault of its author.
     """
     record = is_record(target)
     try:
@@ -68,7 +68,7 @@ def parameters(target: Callable) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """Return True if a style is a NamedTuple, a tag that needs no hub.
+    """True if a style is a NamedTuple, a tag that needs no hub.
 
     Its arguments are its fields, or the parameters of its classmethod ``given``. A method
     ``checked`` returns a replacement.
@@ -146,7 +146,6 @@ def style_of(
     *,
     values: dict | None = None,
 ) -> Any:
-    """Make the style `ID` of a family; store arguments in `values`."""
     with in_new_words(family, ID, style, arguments):
         target = registry.called(family, ID, style)
         return call(target, hub, arguments, f"{family} {style}", values)
@@ -217,7 +216,6 @@ def _bind(
     name: str,
     bound: dict[str, list[Argument]],
 ) -> None:
-    """Add the arguments of each parameter to `bound`, by position or name."""
     by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
@@ -257,7 +255,7 @@ def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | 
 
 
 def _joined(expected: list[Parameter]) -> str:
-    """Format ``a, b[, c[, d]][, e=...]``."""
+    """``a, b[, c[, d]][, e=...]``."""
     text, open_brackets = "", 0
     for parameter in expected:
         comma = ", " if text else ""
@@ -298,7 +296,7 @@ def syntax(target: Callable, name: str) -> str:
 
 
 def variants_of(style: Any) -> Mapping[str, Any]:
-    """Return the words that choose another class, or style by name."""
+    """Words that choose another class, or style by name."""
     return getattr(style, "variants", {})
 
 
@@ -307,7 +305,7 @@ def default_variant(style: Any) -> str | None:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """List parameters for help, with the word that selects a variant."""
+    """Parameters for help, with the word that selects a variant."""
     variants = variants_of(target)
     if not variants:
         return parameters(target)

@@ -98,7 +98,6 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
 
 
 def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None]:
-    """Guess the meaning of a name: a hint, and the known name if any."""
     statement, energies = script.statement, table()["energies"]
     if name.lower() in ("true", "false"):
         alone = isinstance(statement, Assignment) and statement.right.code.strip() == name
@@ -148,7 +147,7 @@ def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Yield later statements: what they define ("" for a variable), ID and line.
+    """Later statements: what they define ("" for a variable), ID and line.
 
     Starts with the innermost script, `back` statements before its next one.
     """
@@ -162,7 +161,6 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
 
 
 def line_below(script: Any, kind: str, ID: str) -> int | None:
-    """Find the later line that defines this kind and ID."""
     lines = (line for _, made, name, line in _ahead(script) if (made, name) == (kind, ID))
     return next(lines, None)
 
@@ -221,7 +219,6 @@ def check_name(name: str) -> None:
 
 
 def check_ID(kind: str, ID: str) -> None:
-    """Refuse an ID whose values formulas could not name."""
     if ID.isidentifier() and ID not in ("and", "or", "not"):
         return
     better = re.sub(r"\W", "_", ID)
@@ -235,8 +232,6 @@ def listed(names: Iterable[str]) -> str:
     text = ", ".join(names) or "none so far"
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
 
-
-# ---- older forms of Karamelo, translated with the words of the script ----------------------------
 
 # Shapes that scripts of 2020 name instead of the style region.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
@@ -254,7 +249,6 @@ def words_of(statement: Any) -> list[str]:
 
 
 def in_own_words(script: Any, name: str) -> str | None:
-    """Translate the call of a Karamelo command that does not exist here."""
     calls = [s for frame in script.frames for s in frame.statements if isinstance(s, CommandCall)]
     method = next((call for call in calls if call.name == "method"), None)
     asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
@@ -277,7 +271,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """Translate ``solid(ID, block, xlo, ..., ppc, material, h)`` to a region and a solid."""
+    """``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None
@@ -305,7 +299,7 @@ def longer(name: str, arguments: Sequence[Any]) -> str | None:
 
 
 def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | None:
-    """Translate a Karamelo line with a renamed style, or without arguments."""
+    """Also without arguments."""
     form = table()["renamed"].get(f"{family} {style}")
     try:
         return form and f"{family}({form.format(*words, ID=ID, all=', '.join(words))})"
@@ -314,7 +308,6 @@ def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | Non
 
 
 def size_of_cells(script: Any) -> tuple[str, int | None]:
-    """Find the cell size of a later solid, and the line that sets it."""
     solids = (words_of(s) for s, kind, *_ in _ahead(script) if kind == "solid")
     size = next((words[5 if len(words) == 7 else -1] for words in solids if len(words) > 4), "h")
     return size, line_below(script, "", size)

@@ -14,7 +14,7 @@ from typing import Any, TextIO
 # Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in 0.25 ms. Lines faster than QUICK (seconds) for more than
+# Rich redraws the bar after every line, in 0.25 ms: lines faster than QUICK (seconds) for more than
 # BURST lines are written in bundles every LINES seconds.
 QUICK = 0.02
 BURST = 8
@@ -54,14 +54,12 @@ class Console:
 
     @property
     def terminal(self) -> bool:
-        """Tell whether `out` is an interactive terminal."""
         if self._terminal is None:
             interactive = hasattr(self.out, "isatty") and self.out.isatty()
             self._terminal = interactive and os.environ.get("TERM") != "dumb"
         return self._terminal
 
     def say(self, text: str = "", style: str | None = None) -> None:
-        """Write lines; on a terminal in a Rich style."""
         if self.quiet or self._broken:
             return
         self._release()
@@ -74,7 +72,6 @@ class Console:
             self._write(text)
 
     def warn(self, text: str) -> None:
-        """Write a rendered warning or error."""
         with contextlib.suppress(OSError, ValueError):
             _print(self.err, text)
 
@@ -101,7 +98,6 @@ class Console:
         stages: Sequence[tuple[str, float]] = (),
         title: str = "Run finished",
     ) -> None:
-        """Write the closing table: facts, then stages in seconds."""
         total = sum(seconds for _, seconds in stages) or 1.0
         parts = {
             f"  {name}": f"{f'{seconds:.3g} s':>8}  {f'{100 * seconds / total:.0f} %':>8}"
@@ -204,7 +200,7 @@ def _print(stream: TextIO, text: str) -> None:
 
 
 def show(value: object) -> str:
-    """Format for a table: 1 234 567, 0.333333."""
+    """1 234 567, 0.333333."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -215,7 +211,7 @@ def show(value: object) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Format seconds: 42 s, 3 min 20 s, 2 h 5 min."""
+    """42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

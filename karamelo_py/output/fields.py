@@ -63,7 +63,6 @@ class Fields(PointTable):
 
     @property
     def setup(self) -> Setup:
-        """Arrays of kernels."""
         return self.simulation.setup
 
     @property
@@ -105,7 +104,6 @@ class Fields(PointTable):
         return rounded(self.comm.allreduce(limbs)[0])
 
     def rows_of(self, group: PointGroup | None) -> Iterator[tuple[Block, np.ndarray]]:
-        """Yield a group's local points in pieces: block and rows."""
         for block in self.setup.blocks:
             ids = block.points.id
             for first in range(0, len(ids), PIECE):
@@ -116,7 +114,7 @@ class Fields(PointTable):
                     yield block, rows
 
     def some(self, group: PointGroup | None) -> Iterator[PointTable]:
-        """Yield a group's local points in pieces, then an empty table."""
+        """A group's local points in pieces, then an empty table."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
         yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
@@ -159,13 +157,11 @@ class Fields(PointTable):
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
     def each(self, part: Grouped, name: str, *arguments: object) -> list:
-        """Collect the results of a part's method, one per piece of its group."""
         results = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
         local = [one for one in results if one is not None]
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def seen(self, say: Callable, *arguments: object) -> list:
-        """Collect a function's result of each process."""
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
@@ -184,7 +180,7 @@ class Fields(PointTable):
         return value, -number
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """Yield all points in pieces; `to_first`: to rank 0 only."""
+        """All points in pieces; `to_first`: to rank 0 only."""
         s = self.setup
         orders = [np.argsort(block.points.id) for block in s.blocks]
         ordered = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
@@ -221,7 +217,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """True if a dump or compute uses ``epdot``, which points then store."""
+        """A dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -238,7 +234,6 @@ class Fields(PointTable):
         return absent(node_columns.COLUMNS, present)
 
     def node_pieces(self, names: Sequence[str], *, to_first: bool = False) -> Iterator[NodeTable]:
-        """Yield all nodes in pieces, with the columns `names`; see `pieces`."""
         return self.simulation.nodes.pieces(names, to_first=to_first)
 
     @property
@@ -247,7 +242,6 @@ class Fields(PointTable):
 
     @property
     def occupied_nodes(self) -> tuple[int, int]:
-        """Number of nodes with mass, and the last of them."""
         return self.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
@@ -274,8 +268,6 @@ def _kinetic(s: Setup, block: Block) -> np.ndarray:
 
 
 def _of_law(density: Callable) -> Callable:
-    """Energy of each point from a density per volume."""
-
     def energies(s: Setup, block: Block) -> np.ndarray | None:
         if not can(block.laws, density):
             return None

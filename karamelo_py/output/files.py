@@ -31,7 +31,7 @@ def discarded() -> Iterator[None]:
 
 
 def folder_of_discarded() -> Path | None:
-    """Folder of discarded files; None if files are kept."""
+    """None if files are kept."""
     return _DISCARDED.get()
 
 
@@ -94,7 +94,6 @@ def picture_format(path: Path) -> str:
 
 
 def savefig(figure: Any, path: Path) -> None:
-    """Save a Matplotlib figure; equal figures give equal bytes."""
     import matplotlib
 
     ending = picture_format(path)

@@ -62,7 +62,6 @@ class _Closed(io.RawIOBase):
 
 
 def _closed(head: bytes, size: int) -> bytes:
-    """Return the header with cleared flags and the present end."""
     if len(head) < _HEAD.size + 4 or head[:8] != _SIGNATURE or head[8] not in _NEW:
         return head  # left to HDF5
     signature, version, offsets, lengths, flags, base, extension, end, root = _HEAD.unpack_from(

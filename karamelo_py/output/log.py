@@ -16,17 +16,15 @@ from karamelo_py.script.terms import number_of
 
 FILE = "log.mpm"
 STEP_WIDTH = 10
-# "-1.234567891e-05": sign, ten digits, point, exponent.
-NUMBER_WIDTH = 16
+NUMBER_WIDTH = 16  # as -1.234567891e-05
 
 
 class Log(Rhythmic):
-    r"""Table of logged quantities.
+    r"""Table of logged quantities: a header, then rows.
 
-    A header, then rows. Columns start at the margin, separated by blanks for
-    ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; by
-    commas in .csv. Later runs append; if the columns change, a comment line (``#``) names the new
-    ones.
+    Columns start at the margin, separated by blanks for ``numpy.loadtxt("log.mpm", skiprows=1)``
+    and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; by commas in .csv. Later runs append; if the
+    columns change, a comment line (``#``) names the new ones.
     """
 
     remembers = ("_header", "_end")
@@ -87,7 +85,6 @@ class Log(Rhythmic):
             self._file.truncate(self._end)
 
     def close(self) -> None:
-        """Close the file; `begin` starts a new one."""
         if self._file is not None:
             file, self._file, self._claims = self._file, None, []
             with reported(self.path, "the log file "):  # retries a failed line
@@ -148,7 +145,6 @@ class Log(Rhythmic):
 
 
 def _is_log(path: Path) -> bool:
-    """Return True for a log (names, then numbers) or a missing file."""
     try:
         with path.open(encoding="utf-8") as file:
             lines = [file.readline(1 << 16) for _ in range(4)]

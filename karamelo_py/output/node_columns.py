@@ -47,7 +47,6 @@ class NodeTable(NamedTuple):
 
 
 def by_lattice(hub: Scene, nodes: np.ndarray) -> Iterator[tuple[Any, slice]]:
-    """Yield each grid with its slice of ascending `nodes`."""
     for lattice in hub.lattices:
         ends = lattice.first, lattice.first + lattice.node_count
         yield lattice, slice(*np.searchsorted(nodes, ends))
@@ -71,7 +70,6 @@ def mask(nodes: NodeTable) -> np.ndarray:
 
 
 def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
-    """Indices of the nodes among ascending numbers."""
     first = nodes.ids[0]
     return members[slice(*np.searchsorted(members, (first, nodes.ids[-1] + 1)))] - first
 

@@ -20,13 +20,13 @@ Depth = Callable[[np.ndarray], np.ndarray]  # (n,) in a tool, at (n, d)
 
 
 class Tool(NamedTuple):
-    """A wall or tool: depth function, and faces (m, d, d) if any."""
+    """Depth function, and faces (m, d, d) if any."""
 
     depth: Depth
     faces: np.ndarray | None = None
 
     def lines(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield lines (m, d) on the surface between two corners (d,)."""
+        """Lines (m, d) on the surface between two corners (d,)."""
         plane = len(lo) == 2
         if self.faces is None:
             contours = (
@@ -45,7 +45,7 @@ class Tool(NamedTuple):
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) where points x (n, 2) fill half of the space.
 
-    Points are scattered to nodes of cells of their size, over three cells. A node at the surface
+    Points are scattered to nodes of cells of their size, over three cells: a node at the surface
     gets half as much as nodes inside.
     """
     cell = spacing(x, 4)
@@ -66,7 +66,7 @@ def _contours(x: np.ndarray, y: np.ndarray, z: np.ndarray, level: float) -> list
 
 
 def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield nodes (n,) around positions (n, d), and linear weights (n,)."""
+    """Nodes (n,) around positions (n, d), and linear weights (n,)."""
     first = at.astype(int)
     for corner in product((0, 1), repeat=len(shape)):
         node = first + corner
@@ -82,7 +82,6 @@ def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _largest(values: np.ndarray, reach: int) -> np.ndarray:
-    """Maximum over neighbours up to `reach` along each axis."""
     for axis in [*range(values.ndim)] * reach:
         neighbours = np.maximum(np.roll(values, 1, axis), np.roll(values, -1, axis))
         values = np.maximum(values, neighbours)
@@ -90,7 +89,6 @@ def _largest(values: np.ndarray, reach: int) -> np.ndarray:
 
 
 def smoothed(values: np.ndarray) -> np.ndarray:
-    """Average each node with its neighbours, twice along each axis."""
     for axis in range(values.ndim):
         for _ in range(2):
             neighbours = np.roll(values, 1, axis) + np.roll(values, -1, axis)
@@ -108,7 +106,7 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 
 
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) on a tool's surface between two corners (3,).
+    """Lines (m, 3) on a tool's surface between two corners (3,).
 
     Sections across each axis: at the ends, where faces meet, and between if the surface is curved.
     A box gets its edges, a ball circles.
@@ -170,7 +168,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) of sections that show the surface, but not a plane that cuts it off."""
+    """Lines (m, 3) of sections that show the surface, but not a plane that cuts it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(*ends, BETWEEN + 2)
@@ -222,7 +220,6 @@ def edges(faces: np.ndarray) -> np.ndarray:
 
 
 def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarray:
-    """Depth at (n, 2) in a plane across an axis."""
     return depth(np.insert(x, axis, height, axis=1))
 
 
@@ -261,7 +258,6 @@ class Front:
 
 
 def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bool]]:
-    """Yield hidden and visible pieces of a line."""
     turns = np.flatnonzero(np.diff(hidden)) + 1
     for first, end in pairwise([0, *turns, len(line)]):
         yield line[first : end + 1], bool(hidden[first])

@@ -65,7 +65,7 @@ class Options(NamedTuple):
     azimuth: float = -60.0  # degrees
     elevation: float = 30.0
     axes: bool = True
-    lengths: str = ""  # unit of lengths
+    lengths: str = ""  # unit
     mirror: bool = False  # draw points on both sides of x = 0
     window: Window = ()  # x, y, z; None: the domain
     log: bool = False  # logarithmic colours; values <= 0 get the lowest
@@ -153,7 +153,6 @@ class Picture:
         axis.set_label_text(name, fontsize=self.options.fontsize)
 
     def _lengths_as(self, name: str) -> tuple[float, str]:
-        """Return a factor of lengths and the label of the axis `name` for it."""
         size = max(map(abs, (*self.domain.lo, *self.domain.hi)), default=1.0)
         if self.options.lengths:
             factor, unit = suited(self.options.lengths, size, LENGTHS)
@@ -216,7 +215,6 @@ class Picture:
         """Draw lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
-        """Write the title above the axes, or across the picture if wider."""
         self.title.set_text(text)
         whole = self.figure.bbox.width - 2 * MARGIN
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
@@ -248,7 +246,6 @@ class Picture:
         return (lo, hi) if hi > lo else (min(lo, hi), min(lo, hi) + (abs(lo) or 1.0))
 
     def save_png(self, file: BinaryIO, compression: int) -> None:
-        """Draw the state over the stored background."""
         if self._background is None:
             self.title.set_animated(True)
             self.marks.set_animated(True)
@@ -283,7 +280,7 @@ class Picture:
         self._laid_out = True
 
     def _make_room_at_left(self) -> None:
-        """Move axes with equal units right if the label of y would lie outside."""
+        """If the label of y would lie outside."""
         label = self.axes.yaxis.label
         out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
         if out <= MARGIN or not self.axes.axison or not label.get_text():
@@ -343,7 +340,6 @@ def _zoomed(domain: Any, window: Window, *, mirror: bool) -> Any:
 
 
 def make(domain: Any, size: tuple[float, float], dpi: int, options: Options) -> Picture:
-    """Make the picture for the domain's dimension."""
     kind = {1: LinePicture, 2: PlanePicture, 3: SpacePicture}[domain.dimension]
     return kind(domain, size, dpi, options)
 
@@ -373,8 +369,6 @@ def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
 
 
 class PlanePicture(Picture):
-    """2D."""
-
     def _prepare(self) -> Any:
         lo, hi = self.domain.lo, self.domain.hi
         self.axes.set_xlim(lo[0], hi[0])
@@ -438,8 +432,6 @@ class PlanePicture(Picture):
 
 
 class SpacePicture(PlanePicture):
-    """3D: points, farthest first, with the edges of the domain."""
-
     cuts = True
 
     def _prepare(self) -> Any:
@@ -464,7 +456,7 @@ class SpacePicture(PlanePicture):
         return (x - self.middle) @ self.view.T
 
     def _draw_edges(self, axis: int, reach: float) -> None:
-        """Draw four edges; ticks at the lowest one, for z at the leftmost."""
+        """Four edges; ticks at the lowest one, for z at the leftmost."""
         others = [k for k in range(3) if k != axis]
         edges = []
         for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):
@@ -574,8 +566,6 @@ class SpacePicture(PlanePicture):
 
 
 class LinePicture(Picture):
-    """1D."""
-
     def _prepare(self) -> Any:
         self.axes.set_xlim(self.domain.lo[0], self.domain.hi[0])
         self._name_lengths(self.axes.xaxis, "x")

@@ -61,7 +61,6 @@ class Plots(dict[str, PlottedCurve]):
 
 
 def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] = str) -> None:
-    """Draw non-empty curves; `labelled` adds units to names."""
     by_x: dict[str, list[PlottedCurve]] = {}
     for curve in curves:
         by_x.setdefault(curve.x.name, []).append(curve)
@@ -101,7 +100,6 @@ def _over_one_axis(
 
 
 def blank_figure(width: float, height: float) -> Any:
-    """Empty Matplotlib figure (inches) that needs no display."""
     # 0.3 s, only for scenes with plots.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -112,7 +110,7 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def in_mathtext(lead: str, exponent: int) -> str:
-    """Number times a power of ten; `lead` is omitted if 1."""
+    """`lead` is omitted if 1."""
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
@@ -123,7 +121,6 @@ def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[
 
 
 def _parts(a: float) -> tuple[str, int]:
-    """Mantissa (empty for 1) and decimal exponent."""
     exponent = floor(log10(abs(a)) + 1e-9)
     lead = a / 10**exponent
     return "" if abs(lead - 1) < 1e-9 else f"{lead:g}", exponent
@@ -149,7 +146,7 @@ def real_ticks(axis: Any) -> None:
 
 
 def tidy(axes: Any) -> None:
-    """Draw a light grid, no frame at the far sides, full numbers at the ticks."""
+    """A light grid, no frame at the far sides, full numbers at the ticks."""
     real_ticks(axes.xaxis)
     real_ticks(axes.yaxis)
     axes.grid(True, color="0.9", linewidth=0.7)

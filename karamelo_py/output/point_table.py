@@ -45,7 +45,6 @@ class Part(NamedTuple):
     places: np.ndarray | slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
-        """Select these points from an array (..., k) over the block."""
         whole = self.rows is None or len(self.rows) == array.shape[-1]
         return array if whole else fields.some_points(array, self.rows)
 
@@ -55,8 +54,6 @@ class Part(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Points of a table, as the scene stores them."""
-
     s: Setup
     parts: list[Part]
     ids: np.ndarray
@@ -64,7 +61,6 @@ class Rows(NamedTuple):
     comm: Any = None  # of the processes with parts of the table, or None
 
     def of_all(self, local: list[tuple]) -> Iterator[tuple]:
-        """Yield places and numbers of all processes, given local ones."""
         if self.comm is None:
             yield from local
         else:
@@ -238,7 +234,6 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
-    """Columns declared by fields in `attribute`: field and component."""
     columns: dict[str, tuple[type, int]] = {}
     for kind in fields.declared(owners_of_fields(hub), attribute):
         for k, column in enumerate(fields.columns_of(kind)):
@@ -302,7 +297,6 @@ def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
 
 
 def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.ndarray:
-    """Gather ``of(solid, numbers)``."""
     gathered, order = np.empty((len(ids), *columns)), np.argsort(ids)
     for solid in hub.solids.values():
         ends = solid.first_id, solid.first_id + solid.count
@@ -313,7 +307,6 @@ def from_solids(hub: Scene, ids: np.ndarray, of: Callable, *columns: int) -> np.
 
 
 def _column_of_laws(name: str, laws: NamedTuple) -> Callable | None:
-    """Kernel that exports a column of laws; None if no law declares it."""
     number = columns_of(laws).get(name)
     return None if number is None else partial(export.export, number, False)
 

@@ -62,7 +62,6 @@ class Quantity:
 
     @staticmethod
     def names(hub: Scene) -> list[str]:
-        """Names that can be logged now."""
         return [*KEYWORDS, *_variables(hub), *hub.values.names()]
 
     @property
@@ -71,7 +70,7 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """Return the number or word; the first NaN is reported."""
+        """The number or word; the first NaN is reported."""
         if self.is_word:
             return self.hub.simulation.steps.ruling_limit
         source = self._source()
@@ -89,7 +88,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """Read each time: the script may redefine a variable between runs."""
+        """The script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula
@@ -124,7 +123,6 @@ class Caption:
 
     @property
     def names(self) -> set[str]:
-        """Names that its numbers depend on."""
         names: set[str] = set()
         for quantity in self.quantities.values():
             source = quantity._source()

@@ -26,7 +26,6 @@ Json = dict[str, Any]
 
 
 def surroundings() -> Json:
-    """Date, machine and versions of measurements."""
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {

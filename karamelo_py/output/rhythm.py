@@ -36,7 +36,6 @@ class Rhythmic:
     place: Place | None = None
 
     def write(self) -> None:
-        """Write the present state."""
         raise NotImplementedError
 
     def take_part(self) -> None:

@@ -42,7 +42,6 @@ class Output:
         return self.writes or not self.hub.settings.comm.leads
 
     def check_file(self, file: Path) -> None:
-        """Refuse to write to the log, a script or an unwritable file."""
         path = self.hub.folder / file
         scripts = self.hub.interpreter.files if self.hub.interpreter else ()
         if _may_be(path, self.log.path):
@@ -172,7 +171,7 @@ def _located(error: ScriptError, place: Place | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Return True if `path`, whose first ``*`` becomes a number, can name the file `other`."""
+    """`path`, whose first ``*`` becomes a number, can name the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -27,7 +27,7 @@ class Snapshot(NamedTuple):
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Yield snapshots from the `first` on; ScriptError if the file is no dump."""
+    """Snapshots from the `first` on; ScriptError if the file is no dump."""
     reader = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}.get(path.suffix, _lammps)
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"

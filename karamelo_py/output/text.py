@@ -32,7 +32,6 @@ FIRST = -280  # of the powers in POWERS
 
 
 def _power(k: int) -> tuple[float, float]:
-    """Return 10^k as a sum of two doubles."""
     exact = Fraction(10) ** k
     high = float(exact)
     return high, float(exact - Fraction(high))
@@ -46,10 +45,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Yield the rows of a table as text, block by block.
-
-    Integers are written as such, the rest with nine significant digits.
-    """
+    """Rows of a table as text, block by block: integers, the rest with nine significant digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))
@@ -117,7 +113,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Write a number with nine significant digits; return where it ends, or `at` if in doubt."""
+    """Write nine significant digits; return where they end, or `at` if in doubt."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)
@@ -161,7 +157,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Return nine digits of x > 0 as an integer (0 if in doubt), and the first one's power of ten.
+    """Nine digits of x > 0 as an integer (0 if in doubt), and the first one's power of ten.
 
     `binary` is the power of two of x.
     """
@@ -181,7 +177,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """Return the eight digits of n < 10^8 as text: halves, quarters, eighths."""
+    """The eight digits of n < 10^8 as text: halves, quarters, eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100
@@ -191,7 +187,6 @@ def _eight(n):
 
 
 def _without_zeros(word):
-    """Count eight digits without trailing zeros."""
     kept = 8
     while kept > 0 and word >> 8 * (kept - 1) & 255 == ZERO:
         kept -= 1

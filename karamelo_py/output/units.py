@@ -14,8 +14,6 @@ PREFIXES = {-12: "p", -9: "n", -6: "u", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 
 
 
 class Powers(NamedTuple):
-    """Powers of length, mass, time and temperature."""
-
     length: int = 0
     mass: int = 0
     time: int = 0
@@ -91,12 +89,10 @@ class Units(NamedTuple):
         return f"{above or 1}/{f'({below})' if ' ' in below else below}"
 
     def of_column(self, name: str) -> str:
-        """Unit of a dump column, or ""."""
         powers = (powers for names, powers in COLUMNS.items() if re.fullmatch(names, name))
         return self.name(next(powers, Powers()))
 
     def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
-        """Unit of a log column, perhaps a value of one of `parts`."""
         for ID, part in parts.items():
             if name in (ID, *(f"{ID}_{end}" for end in part.published)):
                 return self.name(STYLES.get(part.style, Powers()))
@@ -104,13 +100,13 @@ class Units(NamedTuple):
 
 
 def time_text(time: float, unit: str) -> str:
-    """Write a time with its unit, such as 80 µs."""
+    """A time with its unit, such as 80 µs."""
     factor, unit = suited(unit, time, TIMES)
     return f"{time * factor:.6g} {unit}".rstrip()
 
 
 def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
-    """Return a factor and the metric unit in which `size`, in `unit`, has few digits.
+    """Factor and metric unit in which `size`, in `unit`, has few digits.
 
     The unit is the largest in which the size is at least 0.1; a size of 0 stays.
     """
@@ -124,5 +120,4 @@ def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, s
 
 
 def labelled(name: str, unit: str) -> str:
-    """``name (unit)``, or name."""
     return f"{name} ({unit})" if unit else name

@@ -40,7 +40,6 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
             group.create_virtual_dataset(name, layout, fillvalue=0)
 
         def numbers(group: h5py.Group, name: str, of: str, shift: int = 0) -> None:
-            """Add integers of the points, after `shift` zeros."""
             layout = h5py.VirtualLayout((shift + count,), np.int64)
             layout.dcpl.set_obj_track_times(False)
             layout[shift:] = h5py.VirtualSource(path.name, of, (count,), np.int64)

@@ -16,9 +16,9 @@ import numpy as np
 
 KINDS = {"vertex": 1, "line": 3, "quad": 9, "hexahedron": 12}
 TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
-BLOCK = 1 << 15  # bytes compressed together
+BLOCK = 1 << 15  # compressed together
 COMPRESSION = 4  # a third of the time of level 6, slightly larger files
-IN_MEMORY = 1 << 16  # bytes of an array in memory
+IN_MEMORY = 1 << 16  # bytes of an array
 PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in between
 
 
@@ -45,8 +45,6 @@ def arrays_of(names: Sequence[str], dimension: int) -> dict[str, list[str]]:
 
 
 class Column:
-    """Rows of one array, added in pieces."""
-
     def __init__(self, name: str, folder: Path):
         self.name = name
         self._kind = ""
@@ -72,7 +70,6 @@ class Column:
         self._file.write(packed)
 
     def write(self, out: BinaryIO) -> None:
-        """Write the array and free it."""
         if self._rest:
             self._pack(self._rest)
         head = [len(self._sizes), BLOCK, self._last % BLOCK, *self._sizes]

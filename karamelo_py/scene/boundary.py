@@ -12,7 +12,6 @@ from karamelo_py.script.errors import Place, ScriptError
 
 
 def check(hub: Scene) -> None:
-    """Refuse unsupported combinations."""
     update = hub.update
     if update.boundary == "error":
         return

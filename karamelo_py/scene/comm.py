@@ -27,12 +27,10 @@ class SerialComm:
 
     @property
     def share_here(self) -> float:
-        """Fraction of the scene."""
         return self.on_machine / self.size
 
     @contextmanager
     def joint(self) -> Iterator[None]:
-        """Record an error in a collective operation."""
         try:
             yield
         except BaseException:

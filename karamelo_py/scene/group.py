@@ -202,7 +202,6 @@ class NodeGroup(AnyGroup):
                 )
 
     def _find(self, region: Region, solids: Sequence[Solid] | None) -> np.ndarray:
-        """Nodes in `region`; with separate grids, only on those of `solids`."""
         if region.unknown:
             return np.empty(0, dtype=np.int64)
         require_grid(self.hub)

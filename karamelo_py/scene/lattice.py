@@ -103,7 +103,6 @@ class Lattice:
         return np.array([self.first + np.ravel_multi_index(tuple(p.T), shape) for p in places])
 
     def numbers(self, real: type) -> Grid:
-        """Grid of kernels, in the precision `real`."""
         size = (self.hi - self.lo) / self.h
         reach = float(np.abs([self.lo, self.hi]).max()) / self.h
         _, ny, nz = self.shape
@@ -121,7 +120,6 @@ class Lattice:
 
 
 def table(lattices: Sequence[Lattice], real: type) -> Grid:
-    """Grid of arrays, for kernels."""
     rows = [lattice.numbers(real) for lattice in lattices]
     columns: Any = (np.array(column) for column in zip(*rows, strict=True))
     return Grid(*columns)

@@ -94,14 +94,12 @@ def _number(path: Path) -> float | None:
 
 
 def taken() -> int:
-    """Bytes used by this process."""
     import psutil
 
     return psutil.Process().memory_info().rss
 
 
 def age() -> float:
-    """Seconds since this process started."""
     import psutil
 
     return time.time() - psutil.Process().create_time()

@@ -216,7 +216,6 @@ def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
 
 
 def check_fields(hub: Scene, name: str, owner: object, place: Place | None) -> None:
-    """Refuse wrong declarations, and columns with another meaning."""
     for attribute in ("point_fields", "node_fields"):
         kinds = getattr(owner, attribute, ())
         if not isinstance(kinds, tuple):
@@ -235,7 +234,6 @@ def check_fields(hub: Scene, name: str, owner: object, place: Place | None) -> N
 
 
 def check_law(hub: Scene, name: str, law: NamedTuple) -> None:
-    """Refuse wrong traits, and columns with another meaning."""
     if is_foreign(type(law)) and (error := _wrong_traits(type(law), law_traits(law), LawTraits)):
         raise faults.fault(name, error, hub.place)
     for column in laws.columns_of(law):

@@ -171,7 +171,6 @@ class Solid(Named):
         return positions
 
     def pieces(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Yield the first number and reference positions of each piece."""
         for first in range(0, self.count, CHUNK):
             yield first, self.places[first : first + CHUNK]
 
@@ -199,7 +198,6 @@ def own_grids(hub: Scene) -> bool:
 
 
 def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
-    """The first solid may set the domain's."""
     if domain.h is None:
         domain.set_cell_size(h)
     if own_grids(hub):
@@ -226,7 +224,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Return True if points of two solids coincide; large solids are sampled."""
+    """Large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():

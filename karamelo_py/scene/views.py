@@ -40,8 +40,6 @@ from karamelo_py.script.errors import NoItem, Place, ScriptError, nearest
 
 
 class Shown:
-    """A field of a view; read-only without `write`."""
-
     def __init__(self, read: Callable, write: Callable | None = None, doc: str | None = None):
         self.read, self.write = read, write
         self.__doc__ = doc or read.__doc__

@@ -46,7 +46,6 @@ OF_ONE = {
 
 
 def derivative(root: Term, name: str) -> Term:
-    """Differentiate a formula with respect to a name."""
     slopes: dict[int, Term] = {}
     for term in in_order(root):
         slopes[id(term)] = _derivative(term, name, [slopes[id(x)] for x in term.operands])

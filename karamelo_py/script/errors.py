@@ -92,7 +92,6 @@ class ScriptError(Exception):
         return f"{self.command}: {self.message}" if self.command else self.message
 
     def render(self) -> str:
-        """Format the message and further mistakes."""
         physics = {"code": self.code, "cause": self.cause, "resume": self.resume}
         text = render_message(
             "error", self.sentence, self.place, self.expected, self.hint, **physics
@@ -196,7 +195,7 @@ def unknown(
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
-    """Return up to three similar names, most similar first."""
+    """Up to three similar names, most similar first."""
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
@@ -239,7 +238,7 @@ def codes() -> dict[str, dict[str, Any]]:
 
 
 def of_karamelo(name: str) -> bool:
-    """Return True for a Karamelo command, whose name no variable can have."""
+    """A Karamelo command, whose name no variable can have."""
     return name in table()["karamelo"].split()
 
 

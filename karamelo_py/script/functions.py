@@ -20,8 +20,6 @@ TAIL = 1e-10
 
 
 class Signature(NamedTuple):
-    """The number of operands of a function."""
-
     least: int
     most: int
 

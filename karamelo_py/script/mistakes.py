@@ -54,7 +54,7 @@ def check_characters(text: str) -> None:
 
 
 def in_script(text: str) -> Mistake:
-    """Return the mistake in quotes or parentheses."""
+    """The mistake in quotes or parentheses."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
         word, start = match[0], match.start()
@@ -153,7 +153,7 @@ def _stop(parser: Any, code: str) -> _Stop:
 
 
 def in_expression(parser: Any, code: str) -> Mistake:
-    """Return the mistake in `code`, which Lark's `parser` refuses."""
+    """The mistake in `code`, which Lark's `parser` refuses."""
     at = _stop(parser, code)
     if at.here is None:
         return _at_end(at)
@@ -292,7 +292,7 @@ NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:
-    """Format the correct line for ``name word word``."""
+    """The correct line for ``name word word``."""
     if name in table()["blocks"]:
         return NO_BLOCKS
     if name in _NAMED and words and re.fullmatch(r"\d\w*", words[0]):

@@ -85,7 +85,7 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
 
 @lru_cache(maxsize=4096)
 def _tree(code: str) -> syntax.Node:
-    """Parse `code`; offsets count from its start."""
+    """Offsets count from the start of `code`."""
     word = code.strip()
     # Fast path: most arguments and right-hand sides are one name or integer.
     start = code.index(word)

@@ -23,7 +23,7 @@ class Source:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
     def place(self, start: int, end: int) -> Place:
-        """Return the place of the characters from `start` to before `end`."""
+        """Place of the characters from `start` to before `end`."""
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
@@ -33,7 +33,7 @@ class Source:
         return Place(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """Return the characters `start` to before `end`, with comments and line ends blanked."""
+        """The characters `start` to before `end`, with comments and line ends blanked."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(
@@ -60,8 +60,6 @@ class Mistake(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """One node of an expression tree."""
-
     start: int
     end: int
     depth: int = field(compare=False)
@@ -69,8 +67,6 @@ class Node:
 
 @dataclass(frozen=True, slots=True)
 class NumberLiteral(Node):
-    """A literal number."""
-
     value: float
 
 
@@ -83,8 +79,6 @@ class TextLiteral(Node):
 
 @dataclass(frozen=True, slots=True)
 class Name(Node):
-    """A variable, seed or published value."""
-
     name: str
 
 

@@ -93,7 +93,7 @@ class Term:
 
 
 def in_order(root: Term) -> list[Term]:
-    """List `root` and the terms below it once each, operands first."""
+    """`root` and the terms below it once each, operands first."""
     ordered: dict[int, Term] = {}
     open_terms = [(root, False)]
     while open_terms:
@@ -109,7 +109,6 @@ def in_order(root: Term) -> list[Term]:
 
 
 def evaluated(root: Term, value_of: Callable[[str], float]) -> float:
-    """Compute a formula from the values of its names."""
     results: dict[int, float] = {}
     for term in in_order(root):
         if term.operation == "number":

@@ -12,7 +12,7 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Return True if values with these suffixes have consecutive slots."""
+    """Values with these suffixes have consecutive slots."""
     places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not places or places == list(range(places[0], places[0] + len(suffixes)))
 

@@ -100,7 +100,7 @@ def _wrong(keyword: _Keyword, error: str, expected: str | None = None) -> Script
 
 
 def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
-    """Yield keywords with data lines, also of included files."""
+    """Keywords with data lines, also of included files."""
     lines = [line.lstrip() for line in path.read_text("utf-8", errors="replace").splitlines()]
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
@@ -363,7 +363,6 @@ class _Deck:
             self.scope.surfaces.setdefault(name, []).append((of, face))
 
     def _numbers(self, sets: dict, name: str) -> np.ndarray:
-        """(n,) in a set, or the number that `name` is."""
         if name.lstrip("-").isdigit():
             return np.array([int(name)])
         return np.unique(np.concatenate([np.empty(0, np.int64), *self._resolved(sets, name, ())]))
@@ -424,7 +423,6 @@ class _Numbering(NamedTuple):
         return np.where(self.deck[at] == numbers, self.mesh[at], -1)
 
     def listed(self, numbers: np.ndarray) -> np.ndarray:
-        """Leave out unknown numbers."""
         of_mesh = self.of(numbers)
         return of_mesh[of_mesh >= 0]
 

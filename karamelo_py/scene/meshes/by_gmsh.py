@@ -25,7 +25,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[ModuleType]:
-    """Open a file in Gmsh; other models of the process stay open."""
+    """Other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -70,7 +70,6 @@ def _reason(error: BaseException, path: Path) -> str:
 
 
 def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh:
-    """Mesh a geometry up to `dimension`, with edges up to `size`."""
     try:
         with _model(path) as gmsh:
             if size:

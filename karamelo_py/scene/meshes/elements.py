@@ -143,7 +143,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates of the nodes used; only corners if others are unknown."""
+    """Only corners if natural coordinates of other nodes are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -165,7 +165,6 @@ def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
 
 @lru_cache
 def _exponents(name: str, count: int) -> tuple[tuple[int, ...], ...] | None:
-    """Monomials (count, d) that span the shape functions; None if unknown."""
     d = SHAPES[name].dimension
     for p in range(1, 11):
         every = tuple(itertools.product(range(p + 1), repeat=d))

@@ -65,7 +65,6 @@ def read_exodus(path: Path) -> Mesh:
         return [np.asarray(arrays[f"{begin}{k + 1}"], np.int64) for k in range(count)]
 
     def names(kind: str, count: int) -> list[list[str]]:
-        """Return names and numbers of blocks, side sets or node sets."""
         rows: Any = arrays.get(f"{kind}_names", np.zeros((count, 0), "S1"))
         words = [b"".join(row).split(b"\0")[0].decode().strip() for row in rows]
         numbers = arrays.get(f"{kind}_prop1", np.arange(1, count + 1))

@@ -83,7 +83,6 @@ def _refuse(token: _Token, reason: str, *, trusted: bool = False) -> None:
 
 
 def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None:
-    """Read a file in Gmsh's language and its includes."""
     # Gmsh also reads the options next to a file.
     for file in (path, path.with_name(f"{path.name}.opt")):
         if file in files or not file.is_file():

@@ -187,7 +187,6 @@ def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Edges (3 m,) of triangles: lower and higher vertex, and direction (1 or -1)."""
     a, b = triangles.T.ravel(), np.roll(triangles, -1, axis=1).T.ravel()
     return np.minimum(a, b), np.maximum(a, b), np.where(a < b, 1, -1)
 
