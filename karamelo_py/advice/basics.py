@@ -38,8 +38,7 @@ class BasicFacts:
         self.moments = self.moves and affine  # points store moments or gradients of velocity
         # D of affine transfers vanishes at some positions in a cell.
         self.vanishing = self.moves and not self.basis.traits.steady_moment
-        # FLIP coefficient; 0 for affine transfers.
-        self.kept = 0.0 if affine else flip_coefficient(self.transfer)
+        self.kept = 0.0 if affine else flip_coefficient(self.transfer)  # 0 if affine
         traits = self.basis.traits
         self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
         self.hats = self.linear or bool(traits.shape)  # linear on nodes or on domains of points

@@ -16,9 +16,9 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.expressions import POINT_SEEDS
 
-SLOW = 0.01  # of the wave speed: below, no energy gain was seen for any duration
+SLOW = 0.01  # of the wave speed: slower drift gained no energy for any duration
 TORN = 9.0, 14.0  # tolerable rotation (radians) with one point per cell: FLIP, affine transfers
-# Squared distance of a point from its nodes over h^2, weighted mean per direction: linear basis
+# Mean squared distance of a point from its nodes over h^2, by weight, per direction: linear basis
 # with two points per cell; second-order bases.
 SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
@@ -27,8 +27,8 @@ class Noise(NamedTuple):
     share: float  # of the tolerable amount
     speed: float  # of the body or its rim, over the wave speed
     cells: float  # path of the body, or of its rim
-    angle: float = 0.0  # rotation in radians
-    noisy: bool = True  # noise grows
+    angle: float = 0.0  # radians
+    noisy: bool = True
     torn: bool = False  # the rim separates
 
 
@@ -44,7 +44,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """Return True if a body of this law vibrates, unlike fluids and flowing materials."""
+    """A body of this law vibrates, unlike fluids and flowing materials."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -53,7 +53,7 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    """True if plastic flow dissipates an impact."""
+    """Plastic flow dissipates an impact."""
     return not any(law_traits(kind).rebounds for kind in law_kind(law))
 
 
@@ -121,7 +121,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 
 
 def lag_of(facts: BasicFacts) -> Lag:
-    """Estimate the lag of a free rotation in the total frame.
+    """Lag of a free rotation in the total frame.
 
     The grid lacks sum m tr D, the part within stencils, of the angular momentum sum m r^2.
     """
@@ -142,7 +142,7 @@ def lag_of(facts: BasicFacts) -> Lag:
 
 
 def sides(body: Body) -> np.ndarray:
-    """Return the lengths (d,) of a body; outer points lie half a point inside."""
+    """Lengths (d,) of a body; outer points lie half a point inside."""
     return body.motion.high - body.motion.low + 2 * body.solid.half_size.max(axis=0)
 
 
@@ -164,7 +164,7 @@ def lattice_at(facts: BasicFacts, body: Body) -> Lattice:
 
 
 def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
-    """Yield fixes that prescribe velocities, and positions (n, d) of their nodes at a body."""
+    """Fixes that prescribe velocities, and positions (n, d) of their nodes at a body."""
     lattice, low, high = lattice_at(facts, body), body.motion.low, body.motion.high
     for fix in facts.hub.fixes.values():
         if not fix.prescribes_velocity:
@@ -176,7 +176,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Return True if smooth plates hold all sides of a box but one, so that it deforms evenly.
+    """Smooth plates hold all sides of a box but one, so that it deforms evenly.
 
     A plate is a fix that holds all nodes of one side in its normal direction.
     """

@@ -1,8 +1,7 @@
 """Stress that a linear basis loses when stressed material moves through the grid.
 
-The basis gradient jumps at cell faces, so points that cross them change strain rates and their
-volumes drift: in the updated frame, pressure falls by 10 to 35 % per cell of motion, at any speed
-and strain. GIMP and splines lose 0 to 0.3 %.
+Points that cross cell faces change strain rates, and their volumes drift: in the updated frame
+pressure falls by 10 to 35 % per cell, at any speed and strain. GIMP and splines lose 0 to 0.3 %.
 """
 
 from collections.abc import Iterator, Sequence
@@ -69,7 +68,7 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Yield the longest path, as speed and duration, of each solid that meets others.
+    """Longest path, as speed and duration, of each solid that meets others.
 
     With impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
     returned through the thinner solid.
@@ -108,7 +107,7 @@ def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
 
 
 def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
-    """Return when a body meets each box ahead of it, (n, d); inf if never."""
+    """Time until a body meets each box ahead of it, (n, d); inf if never."""
     faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
     ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)
@@ -125,7 +124,7 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 
 def measured(facts: BasicFacts) -> Crossing:
-    """Return the path so far, as a mean over stressed material; 0 if loads maintain the stress."""
+    """Path so far, as a mean over stressed material; 0 if loads maintain the stress."""
     clock = facts.simulation.control.clock[0]
     matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(facts)
     loaded = clock.supplied > LOADED * clock.largest_energy

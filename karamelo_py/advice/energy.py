@@ -23,7 +23,7 @@ def not_watched(why: str) -> str:
 
 
 def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    """Return the likely cause of an energy gain ("" if unknown) and its fix."""
+    """Likely cause of an energy gain ("" if unknown) and its fix."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
@@ -100,7 +100,6 @@ def _step_of(hub: Hub, simulation: Simulation, share: float) -> str:
 
 
 def swelling(points: PointTable) -> np.ndarray:
-    """Return volumes (n,) over initial ones."""
     return points.particle("volume") / points.reference_volume
 
 
@@ -124,7 +123,7 @@ def taken_by(hub: Hub) -> list[str]:
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    # Nodal velocities lack what the grid does not resolve.
+    # Nodal velocities lack unresolved motion.
     if flip_coefficient(transfer) < 1:
         share = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")

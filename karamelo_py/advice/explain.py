@@ -18,14 +18,14 @@ from karamelo_py.scene.solid import named, solid_with
 
 DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings
 ABSURD = 10.0  # cells in one step: a smaller step would not help
-LOOSE = 1.5  # cells between points of an unstrained solid, at most
+LOOSE = 1.5  # largest spacing of an unstrained solid's points, in cells
 APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
     """Explain the `status` of a failed step.
 
-    `smaller` is the step to suggest if it was too large from the start of the run.
+    `smaller` is the step to suggest if it was too large from the start.
     """
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)

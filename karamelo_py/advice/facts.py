@@ -31,8 +31,6 @@ SEQ = methodcaller("particle", "seq")
 
 
 class Vibration(NamedTuple):
-    """Strain amplitude and number of periods of a vibrating solid."""
-
     strain: float
     periods: float
 
@@ -41,7 +39,7 @@ class SceneFacts(BasicFacts):
     """Facts of a scene before a run of `duration`, computed on demand."""
 
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Yield each part once, with its material if it is part of a law."""
+        """Each part once, with its material if it is part of a law."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
         parts += [
@@ -56,7 +54,7 @@ class SceneFacts(BasicFacts):
         yield from ((kind, None) for kind in dict.fromkeys(kinds))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
-        """Yield the advice of one kind; with `of_laws`, only of laws and initial states."""
+        """Advice of one kind; with `of_laws`, only of laws and initial states."""
         foreign = {piece.kind: piece for piece in foreign_parts(self.hub)}
         for piece, owner in self.parts():
             if of_laws and owner is None and not (isinstance(piece, Fix) and piece.first_step_only):

@@ -1,7 +1,7 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-Parts declare their own as rules (`karamelo_py.language.rules`); here are those that involve several
-parts. Each is reported once, by `check` or before the first step.
+Parts declare their rules (`karamelo_py.language.rules`); those that involve several parts are here.
+Each is reported once, by `check` or before the first step.
 """
 
 from collections.abc import Iterable, Iterator
@@ -200,7 +200,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Warn once of what will fail in a run of `duration` and later ones."""
+    """Warn once of likely failures in a run of `duration` and later ones."""
     _warn_about_groups(hub, simulation)
     refuse_endless_speeds(simulation)
     scene = SceneFacts(hub, simulation, duration)

@@ -1,4 +1,4 @@
-"""Slender bodies and neighbouring bodies, as rules judge them before a run."""
+"""Slender and neighbouring bodies, for rules before a run."""
 
 from typing import Any, NamedTuple
 
@@ -29,7 +29,6 @@ class Uneven(NamedTuple):
 
     @property
     def of_step(self) -> float:
-        """Stable fraction of the present step."""
         return HOLDS / self.courant
 
 
@@ -56,7 +55,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Find bodies on one grid that start within a cell of each other and separate."""
+    """Bodies on one grid that start within a cell of each other and separate."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None
@@ -82,7 +81,7 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def uneven(facts: BasicFacts) -> Uneven:
-    """Find the pair of elastic bodies in present or future contact with the worst step.
+    """The pair of elastic bodies in present or future contact with the worst step.
 
     At a node of mostly light mass, the stiffness of a heavy point makes the step too long by
     sqrt(rho_heavy / rho_light).

@@ -30,11 +30,11 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.solid import words_of_volumes
 
-LOADED = 24 << 20  # bytes of compiled loops and imported modules, measured
+LOADED = 24 << 20  # bytes of compiled loops and imported modules
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
-    """What a run to `end_time` needs: fields, stages, tiles, memory, first dt."""
+    """Needs of a run to `end_time`: fields, stages, tiles, memory, first dt."""
     program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
@@ -145,7 +145,7 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print the largest number of unknowns of an implicit step, and the memory of its matrix.
+    """The largest number of unknowns of an implicit step, and the memory of its matrix.
 
     Nodes couple if a point sees both.
     """

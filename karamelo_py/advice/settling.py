@@ -22,11 +22,11 @@ CELLS = 0.25  # displacement at rest: below, hardly a point crosses a cell
 class Settling(NamedTuple):
     name: str = ""
     strain: float = 0.0  # mean, at rest
-    cells: float = 0.0  # displacement of the free end at rest, over the cell size
+    cells: float = 0.0  # of the free end at rest, over the cell size
 
 
 def expected(facts: BasicFacts) -> Settling:
-    """Estimate how far bodies at rest settle on their supports.
+    """Displacement of bodies at rest that settle on their supports.
 
     The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
     + m_1/m), with the speed c of longitudinal waves.

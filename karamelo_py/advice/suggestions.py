@@ -20,7 +20,7 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import plural
 
-Words = Iterator[tuple[str, str]]  # cost; what to write instead
+Words = Iterator[tuple[str, str]]  # cost; replacement
 
 AXES = "xyz"
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio above which a linear basis locks
@@ -80,15 +80,12 @@ def _averaging(hub: Hub, simulation: Simulation) -> Words:
     )
 
 
-# --- dimensions ----------------------------------------------------------------------------------
-
-
 def _acting(hub: Hub) -> list[Fix]:
     return [fix for fix in hub.fixes.values() if fix.hooks() or fix.for_method]
 
 
 def _given(fix: Fix) -> tuple:
-    """Formulas of a fix; NaN if it has none: it may do anything."""
+    """NaN without formulas: it may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 

@@ -64,7 +64,7 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
 
 
 def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, float]:
-    """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
+    """Delete points (ids, ascending); mass and energy, negative work in the balance."""
     simulation = hub.simulation
     if len(ids) == np.count_nonzero(simulation.present):
         raise ScriptError(

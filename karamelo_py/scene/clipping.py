@@ -1,7 +1,7 @@
 """Clip the boxes of points at the edge of a region: volumes and centroids.
 
-The surface in a box is a plane, fitted to `Region.depth` at corners and centre; boxes with other
-surfaces are halved, up to `HALVED` times.
+The surface in a box is a plane, fitted to `Region.depth` at corners and centre; other boxes are
+halved, up to `HALVED` times.
 """
 
 import itertools
@@ -14,8 +14,8 @@ from karamelo_py.scene.region import Region
 
 HALVED = 5  # per direction
 PLANE = 0.01  # deviation of a surface from a plane, relative to the box
-EDGE = 0.05  # same for a part of a box, whose edge would otherwise be sharp
-SHEET = 0.01  # same if the surface may belong to a thin sheet
+EDGE = 0.05  # for a part of a box, whose edge would otherwise be sharp
+SHEET = 0.01  # for a surface that may belong to a thin sheet
 LEAST = 0.1  # of a box: smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off, relative to the box
 # Fraction of a box in the smallest parts that are not plane: 1/3 of it at a corner in 2D or an edge
@@ -27,12 +27,10 @@ SLOPE = 1e-3  # smaller slopes, relative to the largest, are zero: sums would lo
 
 
 class Pieces(NamedTuple):
-    """Boxes that the surface crosses."""
-
-    number: np.ndarray  # (n,) box numbers, ascending
+    number: np.ndarray  # (n,) of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     share: np.ndarray  # (n,) volume fractions of the box
-    # (m,) fraction of each box in smallest parts that are not plane.
+    # (m,) fraction of each box in smallest parts that are not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
@@ -44,7 +42,7 @@ class Pieces(NamedTuple):
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
     """Boxes of edge `size` around `x` (n, d) in a region: mask, and pieces at its edge.
 
-    Boxes end at the domain and at the region's bounding box, so faces along the axes are exact.
+    Boxes end at the domain and at the region's bounding box: faces along the axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -162,7 +160,7 @@ def _measure(
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
 
-    The vector is the difference of covered areas of opposite faces: its sum over boxes is exact.
+    A difference of covered areas of opposite faces: its sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
@@ -199,11 +197,8 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return `_plane` for slopes -`m` < 0 (d, n).
-
-    A simplex at the lowest corner, minus (plus, minus ...) those at the other corners, outside the
-    cube.
-    """
+    """`_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, minus (plus, minus ...)
+    those at the other corners, outside the cube."""
     d = len(m)
     top = mean + m.sum(axis=0) / 2
     share, moment = np.zeros(len(mean)), np.zeros(m.shape)

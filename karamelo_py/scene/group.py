@@ -73,7 +73,7 @@ class ParticleGroup(AnyGroup):
 
     kind = "particles"
     script_kind = "a group of points, or all"
-    # One bit per point from the lowest of a byte on, and 64 spare bits.
+    # From the lowest bit of a byte on, and 64 spare bits.
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
@@ -172,7 +172,7 @@ class NodeGroup(AnyGroup):
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
             pieces = [numbers for part in self.parts if len(numbers := self._find(*part))]
-            # Each is ascending; sorting millions would be a waste.
+            # Each is ascending: no sort of millions.
             members = [np.unique(np.concatenate(pieces))] if len(pieces) > 1 else pieces
             self._found = lattices, (members or [np.empty(0, np.int64)])[0]
         return self._found[1]

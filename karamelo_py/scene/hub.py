@@ -74,7 +74,7 @@ class Catalogue(dict):
 
 
 class Parts(dict):
-    """Catalogues of parts of laws by kind; kinds of plug-ins are made on request."""
+    """Catalogues of parts of laws by kind, also of plug-ins."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -100,8 +100,6 @@ class Settings:
 
 
 class Update:
-    """Method, scheme, time step and clock."""
-
     remembers = ("warned_of_bounces", "warned_of")
 
     def __init__(self, values: Values):
@@ -124,7 +122,6 @@ class Update:
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and its start
 
     def first_time(self, name: str) -> bool:
-        """Return False if the warning `name` was given before."""
         first = name not in self.warned_of
         self.warned_of += [name] * first
         return first
@@ -140,7 +137,7 @@ class Update:
 
     @property
     def words_of_state(self) -> str:
-        """`words` without the scheme: any scheme can continue such a state."""
+        """Without the scheme: any scheme can continue such a state."""
         method = registry.name_of("method", type(self.method))
         transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
         return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
@@ -158,7 +155,6 @@ class Update:
         return self.values.get("dt")
 
     def transfer_tag(self, real: type) -> Any:
-        """In the run's precision."""
         return type(self.transfer)(*(real(x) if isinstance(x, float) else x for x in self.transfer))
 
 
@@ -223,7 +219,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """True if a run has changed the state (in a rehearsal: will have)."""
+        """In a rehearsal: will have."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -283,7 +279,7 @@ class Hub:
         code: str = "",
         cause: str = "",
     ) -> None:
-        """Warn the user, except in a rehearsal."""
+        """Except in a rehearsal."""
         if not self.rehearsing:
             self.record.warn(message, hint, place or self.place, code, cause)
             text = render_message(

@@ -12,8 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 # Points this far past a face (in cells) are on it.
 RELATIVE_TOLERANCE = 1e-9
-# Kernels pack node numbers into 32 bits.
-MAX_NODES = 2**31 - 1
+MAX_NODES = 2**31 - 1  # 32 bits in kernels
 # Points or nodes per batch: large for NumPy, small for caches and memory.
 CHUNK = 1 << 18
 
@@ -24,7 +23,7 @@ class Lattice:
     It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
     cell centres; nodes added for `least_nodes` per direction have no mass. Nodes are numbered from
     `first`, cells from `first_cell`; `shape` and `cells` (3,) count them, 1 in unused directions.
-    Raises ScriptError for more than `MAX_NODES` nodes.
+    ScriptError for more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -74,7 +73,7 @@ class Lattice:
         return self.lo + self.places(numbers) * self.spacing
 
     def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Yield numbers (m,) and positions (m, d) of the nodes in a box, ascending, in chunks."""
+        """Numbers (m,) and positions (m, d) of the nodes in a box, ascending, in chunks."""
         used = slice(self.dimension)
         corner, shape = self.lo[used], self.shape[used]
         below = (lo[used] - corner) / self.spacing - 1e-6
@@ -139,7 +138,7 @@ def numbered(lattices: Sequence[Lattice]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Yield indices (m, d) from `first` to `last`, last axis fastest, m about CHUNK / `weight`."""
+    """Indices (m, d) from `first` to `last`, last axis fastest, m about CHUNK / `weight`."""
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 

@@ -30,7 +30,7 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes with swap; `free` lacks what the system does not report (ZFS caches)."""
+    """Bytes with swap; `free` lacks memory that the system does not report (ZFS caches)."""
 
     free: float
     whole: float

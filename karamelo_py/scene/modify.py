@@ -89,7 +89,7 @@ class Fix(Publisher):
 
     group: Any = None
     formulas: tuple = ()  # of compiled hooks: one or None per component
-    first_step_only = False  # only in the first step after its definition
+    first_step_only = False  # in the first step after its definition
     # Python hooks treat each point or node separately and move none. They get the local points, in
     # any order, before the first step in several calls. Sums need ``total``.
     point_by_point = False
@@ -120,8 +120,8 @@ class Fix(Publisher):
     # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not
     # monitored.
     conserves = False
-    # Calls ``between_steps()`` after multiples of this step number (0: never); it returns whether
-    # points were deleted.
+    # Calls ``between_steps()`` after multiples of this step number (0: never); True if points were
+    # deleted.
     every = 0
     friction: float | None = None  # between its two `solids`, on the grid
     solids: tuple = ()  # if it has no group
@@ -133,7 +133,7 @@ class Fix(Publisher):
 
     @property
     def all_formulas(self) -> list[Expression]:
-        """All formulas among its attributes, also in tuples and lists."""
+        """Formulas among its attributes, also in tuples and lists."""
         return list(_formulas_in(tuple(vars(self).values())))
 
     @property

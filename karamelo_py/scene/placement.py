@@ -29,7 +29,7 @@ class Placement(NamedTuple):
     x0: Any  # (n, d) positions: array or Filled
     volume: float | np.ndarray  # (n,) per unit thickness (2D) or area (1D); without the radius
     half_size: np.ndarray  # (n, d) half edges of initial domains
-    lo: np.ndarray  # (d,) bounding box of the solid
+    lo: np.ndarray  # (d,) of the solid
     hi: np.ndarray
     outside: float = 0  # points outside the domain; inf: unknown
     shape: str = "box"  # or a meshio cell type
@@ -48,7 +48,6 @@ class Filled:
         self._kept: list[np.ndarray | None] = []
         self._ends = [0]
         self._moved = np.empty(0, np.int64), np.empty((0, len(corner)))
-        # Positions per cell, and their indices.
         self._counts = tuple(b - a + 1 for a, b in zip(first, last, strict=True))
         self._ppc = round(len(places) ** (1 / len(corner)))
         self._subs = np.rint((places / h + 0.5) * self._ppc - 0.5).astype(np.int64)
@@ -164,10 +163,8 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill `region` in chunks of cells, x outermost.
-
-    ScriptError for more points than numbers or `room`.
-    """
+    """Fill `region` in chunks of cells, x outermost; ScriptError for more points than numbers or
+    `room`."""
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
     placed = Placement(
@@ -219,7 +216,7 @@ def fill(
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
-    numbers: list[np.ndarray] = []  # indices in the pattern
+    numbers: list[np.ndarray] = []  # in the pattern
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
     for begin, end in x0.chunks:

@@ -49,7 +49,7 @@ ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelli
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:
-    """Raise ScriptError, naming package and place, for wrong hooks or fields."""
+    """ScriptError, naming package and place, for wrong hooks or fields."""
     name = f"fix {fix.style}"
     for error in _wrong_hooks(fix):
         raise faults.fault(name, error, fix.place)
@@ -174,7 +174,7 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
 
 
 def misfit(function: Callable, count: int) -> str:
-    """Say why a function cannot be called with `count` arguments, or ""."""
+    """Reason why a function cannot be called with `count` arguments, or ""."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
     except TypeError as error:

@@ -67,12 +67,12 @@ class Region(Named):
 
     @property
     def aligned(self) -> bool:
-        """True if all faces are known to be parallel to the axes."""
+        """All faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
     def flat(self) -> bool:
-        """True if some part is a line or surface without an inside."""
+        """Some part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -97,7 +97,7 @@ class Region(Named):
         """Depth (n,) of `x` (n, >= d) in the shape, negative outside; ignores `exterior`.
 
         A lower bound of the distance to the surface, up to `reach`; linear near plane parts of it.
-        The default tests `contains` along the axes, and misses what is thinner than `reach`.
+        The default tests `contains` along the axes, and misses shapes thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)

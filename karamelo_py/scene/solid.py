@@ -30,11 +30,11 @@ class Solid(Named):
     material
         Material of the points.
     h
-        Cell size. With a grid common to all solids (ulmpm) it must be the domain's.
+        Cell size; the domain's if solids have a common grid (ulmpm).
     T0
         Initial temperature; default: the material's.
     GlueToSolid
-        Earlier solid whose velocity field this one uses, in methods with a field per solid.
+        Earlier solid whose velocity field it uses, in methods with a field per solid.
     """
 
     catalogue = "solids"
@@ -42,7 +42,7 @@ class Solid(Named):
     # Volumes of points and of the shape from a file that they fill; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
     elements = ""  # of a mesh: counts
-    region: Region | None = None  # that it fills
+    region: Region | None = None
     ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
     warm = False  # points have individual temperatures
 
@@ -239,7 +239,7 @@ def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:
-    """Hash positions (n,), ignoring round-off."""
+    """Hashes (n,) of positions, ignoring round-off."""
     places = np.rint(x * (1e4 / h)).astype(np.int64)
     # Primes separate positions; overflow only mixes the bits.
     return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]

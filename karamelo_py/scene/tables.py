@@ -66,7 +66,7 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 
 
 def read_xyz(path: Path) -> dict[str, np.ndarray]:
-    """Read the last frame of an .xyz file: positions, velocities and masses.
+    """Last frame of an .xyz file: positions, velocities and masses.
 
     Rows are an element, x, y, z, unless the second line has the Properties of extended XYZ.
     """
@@ -99,7 +99,7 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Read columns separated by commas, semicolons or blanks; # begins a comment line.
+    """Columns separated by commas, semicolons or blanks; # begins a comment line.
 
     The first row names them, else "1", "2", ...
     """

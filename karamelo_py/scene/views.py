@@ -73,8 +73,6 @@ _VECTORS = VECTORS | {f"{of}{axis}": ("force", k) for of in "fb" for k, axis in 
 
 
 class View:
-    """A view, whose fields are its only attributes."""
-
     _fields: tuple[str, ...] = ()
     _read_only: tuple[str, ...] = ()
     _shown: frozenset[str]
@@ -122,7 +120,7 @@ class View:
         raise self._unknown(name)
 
     def __getitem__(self, kind: type) -> np.ndarray:
-        """Return a declared field, (n, components)."""
+        """Declared field, (n, components)."""
         if not isinstance(kind, type):
             raise self._no_column(kind)
         return self._handed(kind, lambda: self._get(kind))
@@ -404,8 +402,8 @@ class PointsView(View):
         """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
         ``gradient(moves, step)``, called if there are any, returns derivatives (n, d) of a velocity
-        `component` in coordinates of the grid (reference positions if not `moves`); `step` is a
-        length much smaller than a cell.
+        `component` in coordinates of the grid (reference positions if not `moves`); `step` is much
+        smaller than a cell.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension

@@ -12,25 +12,24 @@ def is_number(term: Term, value: float) -> bool:
 
 
 def plus(a: Term, b: Term) -> Term:
-    """Add formulas; 0 is left out."""
     return b if is_number(a, 0) else a if is_number(b, 0) else applied("+", a, b)
 
 
 def times(a: Term, b: Term) -> Term:
-    """Multiply formulas, omitting 0 and 1."""
+    """Omits 0 and 1."""
     if is_number(a, 0) or is_number(b, 0):
         return ZERO
     return b if is_number(a, 1) else a if is_number(b, 1) else applied("*", a, b)
 
 
 def to_power(base: Term, exponent: float) -> Term:
-    """Raise a formula to a constant power, omitting 0 and 1."""
+    """Omits 0 and 1."""
     if exponent in (0, 1):
         return base if exponent else ONE
     return applied("^", base, constant(exponent))
 
 
-# Functions of one number: their slope at x, from x and the value f.
+# Slopes of functions of one number, from x and the value f.
 OF_ONE = {
     "neg": lambda x, f: constant(-1),
     "sqrt": lambda x, f: applied("/", constant(0.5), f),

@@ -14,7 +14,7 @@ _WIDEST_LINE = 160
 
 
 class Place(NamedTuple):
-    """A place in a script: `line` and `column` count from 1; `text` is the source line."""
+    """`line` and `column` count from 1; `text` is the source line."""
 
     file: str
     line: int
@@ -34,7 +34,7 @@ class Quit(Exception):
     """The statement quit: the script ends normally."""
 
 
-# Exceptions of foreign code, including exit(), which would end the program silently.
+# Also of exit(), which would end the program silently.
 FAILURES = (Exception, SystemExit)
 
 
@@ -65,7 +65,7 @@ class ScriptError(Exception):
     argument: str | int | None = None
     expected: str | None = None
     hint: str | None = None
-    # Command or style that raises it, prepended to the message.
+    # Prepended to the message.
     command: str | None = None
     # Includes of the script, nearest first.
     included: list[Place] = field(default_factory=list)
@@ -73,7 +73,7 @@ class ScriptError(Exception):
     others: "list[ScriptError]" = field(default_factory=list)
     # Of syntax errors: the correct statements.
     statements: list = field(default_factory=list)
-    # Kind of message (codes.toml), wrong word, what it should name, similar known name.
+    # Kind of message (codes.toml), wrong word, kind of its target, similar known name.
     code: str = ""
     name: str | None = None
     kind: str = ""
@@ -112,7 +112,7 @@ def render_message(
     cause: str = "",
     resume: str = "",
 ) -> str:
-    """Format an error or a warning (`kind`) for the user.
+    """An error or a warning (`kind`) for the user.
 
     With the `code` of a run: likely cause, fix, and the command that resumes.
     """
@@ -157,14 +157,14 @@ def _width(character: str) -> int:
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """Format ``did you mean '...'?`` with the most similar names, if any."""
+    """``did you mean '...'?`` with the most similar names, if any."""
     ratios = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
     close = [f"'{n}'" for n, ratio in ratios if ratio == ratios[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """Format ``one of a, b, c``; of many, the nearest and where to find all."""
+    """``one of a, b, c``; of many, the nearest and where to find all."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
@@ -181,7 +181,7 @@ def plural(count: float, noun: str) -> str:
 def unknown(
     message: str, name: str, names: Iterable[str], hint: str | None = None, **where: Any
 ) -> ScriptError:
-    """Make the error for a `name` that is not among `names`; `where` gives the place."""
+    """Error for a `name` that is not among `names`; `where` gives the place."""
     names = list(names)
     few = nearest_few(name, names)
     return ScriptError(
@@ -204,7 +204,7 @@ def nearest_few(name: str, names: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """Return the most similar name, or None if none is similar."""
+    """Most similar name, or None if none is similar."""
     names = list(names)
     lowered = name.lower()
     for candidate in names:
@@ -222,7 +222,7 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     return by_lower.get(next(parts, ""))
 
 
-# ---- words of other programs, mainly LAMMPS -----------------------------------------------------
+# Words of other programs, mainly LAMMPS
 
 
 @cache

@@ -69,7 +69,7 @@ class Expression:
 
     @property
     def text(self) -> str:
-        """The formula in script syntax down to its seeds, unless too long."""
+        """In script syntax down to its seeds, unless too long."""
         if not terms.is_short(self._term):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
         return terms.text_of(self._term)
@@ -78,11 +78,11 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Return True if it is visibly the same number everywhere."""
+        """Visibly the same number everywhere."""
         return terms.alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
-        """Return its present number; ValueError for a formula of positions."""
+        """Present number; ScriptError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
@@ -91,7 +91,7 @@ class Expression:
         return _evaluate(self._term, values)
 
     def program(self, values: Values) -> formula.Program:
-        """Return the present number; ScriptError for a formula of positions."""
+        """Program for present values."""
 
         def place(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
@@ -150,7 +150,6 @@ Value = float | str | Expression
 
 
 def shown(value: Value) -> str:
-    """Format a value in script syntax."""
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, Expression):

@@ -59,7 +59,7 @@ FUNCTIONS: dict[str, Signature] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """Apply a function or operator to numbers; NaN propagates, errors as in `math`."""
+    """NaN propagates, errors as in `math`."""
     if any(map(math.isnan, numbers)):
         return math.nan
     result = _COMPUTED[name](*numbers)
@@ -69,7 +69,7 @@ def compute(name: str, *numbers: float) -> float:
 
 
 def compute_quietly(name: str, *numbers: float) -> float:
-    """Apply an operation as floating-point hardware does: inf or NaN for invalid operands."""
+    """As floating-point hardware does: inf or NaN for invalid operands."""
     if name == "if":
         return numbers[1] if numbers[0] != 0 else numbers[2]
     return math.nan if any(map(math.isnan, numbers)) else quietly(name, *numbers)

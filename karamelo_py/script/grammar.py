@@ -28,7 +28,7 @@ def refused() -> type[Exception]:
 
 @functools.cache
 def parser_of(start: str) -> Any:
-    """Make the parser of statements or of expressions.
+    """Parser of statements or of expressions.
 
     Lark takes 0.06 s for each, 0.01 s from tables cached on disk. Cache errors are ignored.
     """
@@ -63,7 +63,7 @@ def literal(word: str, start: int) -> float:
 
 
 def span(part: Any) -> tuple[int, int]:
-    """Start and end of a token, or of what was built from tokens."""
+    """Start and end of a token, or of its result."""
     return part if isinstance(part, tuple) else (part.start_pos, part.end_pos)
 
 

@@ -1,6 +1,6 @@
 """Syntax errors in the user's terms: characters, quotes and parentheses, then expressions.
 
-Lark's parser, fed token by token, shows where it stopped, what it had read and what was open.
+Lark's parser, fed token by token, shows where it stopped and with which stack.
 """
 
 import re

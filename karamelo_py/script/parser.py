@@ -43,7 +43,7 @@ def read_script(path: Path) -> str:
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """Parse the statements of a script; arguments of calls stay unparsed.
+    """Statements of a script; arguments of calls stay unparsed.
 
     The first syntax error has further ones in `others`, and correct statements in `statements`.
     """
@@ -78,7 +78,7 @@ def parse_expression(raw: syntax.Raw) -> syntax.Node:
 
 
 def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node]:
-    """Parse an expression from outside a script, such as the command line."""
+    """An expression from outside a script, such as the command line."""
     raw = syntax.Raw(syntax.Source(text, file), 0, len(text))
     return raw, parse_expression(raw)
 

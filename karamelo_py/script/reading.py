@@ -17,7 +17,7 @@ _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
     """Read a regular file of at most `largest` bytes (None: any size).
 
-    Raises OSError if it is not regular or cannot be read.
+    OSError if it is not regular or cannot be read.
     """
     piped = _PIPED.fullmatch(str(path)) is not None
     # Opening a pipe without a writer would block.
@@ -36,7 +36,7 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """Read a text file; OSError as in `read_bytes`, ValueError if it is not text."""
+    """OSError as in `read_bytes`, ValueError if it is not text."""
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):

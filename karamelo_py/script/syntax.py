@@ -125,7 +125,7 @@ class Raw:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """One statement; `place` marks its first word."""
+    """`place` marks its first word."""
 
     place: Place
     raw: Raw

@@ -71,7 +71,7 @@ _PRECEDENCE = {
 
 
 class Term:
-    """A node of a formula: a number, a seed's name, or an operation on terms."""
+    """A number, a seed's name, or an operation on terms."""
 
     __slots__ = ("names", "operands", "operation", "size", "value")
 
@@ -152,7 +152,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Return True for equal terms, up to the operand order of + and *."""
+    """Equal terms, up to the operand order of + and *."""
     numbers: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -163,16 +163,11 @@ def alike(one: Term, other: Term) -> bool:
     return kinds[id(one)] == kinds[id(other)]
 
 
-# ---- as text -------------------------------------------------------------------------------------
-
-
 def number_text(value: float) -> str:
-    """Format a number exactly in script syntax."""
     return repr(float(value)).removesuffix(".0")
 
 
 def number_of(text: str) -> float | None:
-    """Convert a text to a number, or to None."""
     try:
         return float(text)
     except ValueError:
@@ -180,7 +175,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Return True if a term can be written out with shared parts repeated."""
+    """A term can be written out with its common parts repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -215,8 +210,6 @@ def _bracketed(term: Term, level: int) -> str:
     return text_of(term) if precedence >= level else f"({text_of(term)})"
 
 
-# ---- as programs ---------------------------------------------------------------------------------
-#
 # Terms with several users are computed once, each into a row, and so are operands that would not
 # fit on the stack. The rest are trees.
 
@@ -275,7 +268,7 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """Choose the terms to store: with several users, or too deep for the stack."""
+        """With several users, or too deep for the stack."""
         kept = set()
         if not self.bare:
             kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}

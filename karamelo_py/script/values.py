@@ -12,7 +12,7 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Values with these suffixes have consecutive slots."""
+    """Their slots are consecutive."""
     places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not places or places == list(range(places[0], places[0] + len(suffixes)))
 
@@ -34,7 +34,7 @@ class Values:
             self.publish(name)
 
     def publish(self, name: str, value: float = 0.0) -> int:
-        """Publish `name` with this value and return its slot; a known name retains its slot."""
+        """A known name retains its slot."""
         if name not in self._slots:
             self._slots[name] = self._reserve(1)
         slot = self._slots[name]

@@ -416,7 +416,7 @@ class _Numbering(NamedTuple):
     mesh: np.ndarray  # (n,)
 
     def of(self, numbers: np.ndarray) -> np.ndarray:
-        """Numbers in the mesh (m,) of numbers in the deck, or -1."""
+        """Numbers in the mesh (m,), or -1."""
         if not len(self.deck):
             return np.full(len(numbers), -1)
         at = np.minimum(np.searchsorted(self.deck, numbers), len(self.deck) - 1)
@@ -537,5 +537,5 @@ class _Merged:
 
 
 def read_deck(path: Path) -> Mesh:
-    """Raise ScriptError naming the line that cannot be read."""
+    """ScriptError names the line that cannot be read."""
     return _Deck(path).mesh()

@@ -20,7 +20,7 @@ _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra",
 
 
 class NoGmsh(Exception):
-    """Gmsh, or one of its libraries, is missing."""
+    pass
 
 
 @contextlib.contextmanager
@@ -45,7 +45,7 @@ def _model(path: Path) -> Iterator[ModuleType]:
 
 
 def begin(gmsh: ModuleType) -> None:
-    """Initialize Gmsh, which resets SIGPIPE: a closed pipe or live page would end the program."""
+    """Gmsh resets SIGPIPE: a closed pipe or live page would end the program."""
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
@@ -55,7 +55,7 @@ def begin(gmsh: ModuleType) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[Path]:
-    """Yield a link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may act."""
+    """Link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may act."""
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / path.name
         try:
@@ -105,7 +105,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
-    """Read a mesh; Gmsh's errors become ValueError."""
+    """Gmsh's errors become ValueError."""
     with alone(path) as link:
         try:
             with _model(link) as gmsh:

@@ -16,7 +16,7 @@ DIMENSIONS = {
 class CellBlock(NamedTuple):
     type: str  # meshio's, such as tetra10
     nodes: np.ndarray  # (n, c) numbers from 0, corners first
-    # (c, d) natural coordinates of the nodes; None: VTK's order.
+    # (c, d) natural coordinates of the nodes; None: VTK's order
     reference: np.ndarray | None = None
     label: str = ""  # name in the file, if different
 
@@ -38,8 +38,7 @@ class Mesh(NamedTuple):
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
         """Cells of an element set, outer faces of a node set, or all; ScriptError if unknown or
-        empty.
-        """
+        empty."""
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
         else:
@@ -77,7 +76,7 @@ class Mesh(NamedTuple):
         return name
 
 
-# Corners of faces, counter-clockwise from outside; in 2D the interior is on the left.
+# Counter-clockwise from outside; in 2D the interior is on the left.
 FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "triangle": ((0, 1), (1, 2), (2, 0)),

@@ -10,12 +10,11 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
-# Relative to size^dimension; less is round-off.
+# relative to size^dimension; less is round-off
 _FLAT = 1e-12
-# Distance from the plane of a 2D mesh, relative to the size of the mesh, within which nodes lie in
-# it.
+# Distance from the plane of a 2D mesh, relative to its size, within which nodes lie in it.
 _PLANE = 1e-9
-_CHUNK = 4096  # elements integrated at once
+_CHUNK = 4096  # integrated at once
 
 
 class Shape(NamedTuple):
@@ -49,7 +48,7 @@ SHAPES = {
     )
 }
 
-# Corners whose mean is a further node of second-order elements, in order: edges, then faces.
+# Corners whose mean is a further node of second-order elements: edges, then faces.
 _MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -89,8 +88,8 @@ def elements_of(
 ) -> list[MeshElements]:
     """Elements of `dimension` in a mesh or its `group`, one item per type.
 
-    `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError if there are
-    none, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
+    `lower` accepts groups of lower dimension, such as a boundary. ScriptError if there are none,
+    for unsupported types, and off z = 0 in 2D or the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -195,7 +194,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements: older formats repeat those in two physical groups."""
+    """Older formats repeat elements of two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -218,8 +217,8 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
     """Elements with positive orientation, volumes (n,) and centroids (n, d).
 
-    Exact integrals of det J and x det J, with curved edges and warped faces. Raises ScriptError for
-    a flat or twisted element.
+    Exact integrals of det J and x det J, with curved edges and warped faces. ScriptError for a flat
+    or twisted element.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes

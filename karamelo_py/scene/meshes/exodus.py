@@ -15,7 +15,6 @@ FAMILIES = {
     "SPH": "vertex", "CIR": "vertex",
 }  # fmt: skip
 MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # variables; not results
-# Corners of the sides in their order.
 SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -34,7 +33,7 @@ ORDER = {
 
 
 def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
-    """Return arrays and types of elements by name, of netCDF-4 (which is HDF5) or netCDF-3."""
+    """Arrays and types of elements by name, of netCDF-4 (which is HDF5) or netCDF-3."""
     with path.open("rb") as file:
         is_hdf5 = file.read(4) == b"\x89HDF"
     if is_hdf5:
@@ -56,7 +55,7 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Read blocks, side sets and node sets; KeyError or OSError for other files."""
+    """Blocks, side sets and node sets; KeyError or OSError for other files."""
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 

@@ -110,7 +110,7 @@ def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> No
 
 
 def _is_data(path: Path) -> bool:
-    """Gmsh merges the file with a reader without commands."""
+    """A reader without commands merges the file."""
     with path.open("rb") as file:
         return path.suffix in _DATA or (path.suffix in _KINDS and file.read(12).startswith(_MESH))
 

@@ -38,7 +38,7 @@ class Skin:
         return np.maximum.reduce([depths(surface, x, reach) for surface in self.surfaces])
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Test which positions (n, >= d) are in the body or on its faces: (n,) bool."""
+        """Mask (n,) of positions (n, >= d) in the body or on its faces."""
         return self.depth(np.asarray(x), 2 * self.tolerance) >= -self.tolerance
 
 
@@ -121,7 +121,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
     """Skin of closed shells of `points` (n, 3), `triangles` (m, 3).
 
     Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
-    Raises ScriptError for an edge with an odd number of triangles.
+    ScriptError for an edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
     for sided in (True, False):  # oriented as in the file; else reoriented
@@ -219,8 +219,8 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
     one, other = order[pairs], order[pairs + 1]
     flipped = m * (way[one] == way[other])
-    # Node k is triangle k as in the file, node m + k the same reversed: linked nodes fit together.
-    # In each component the triangle of the lowest number stays as it is.
+    # Node k is triangle k as in the file, node m + k its reverse: linked nodes fit together. In
+    # each component the triangle of the lowest number stays as it is.
     one, other = one % m, other % m
     label = _components(np.r_[one, one + m], np.r_[other + flipped, other + m - flipped], 2 * m)
     return np.where((label[:m] > label[m:])[:, None], triangles[:, ::-1], triangles)

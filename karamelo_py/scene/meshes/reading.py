@@ -93,7 +93,7 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
 
 
 def _refuse_what_is_no_cad(path: Path) -> None:
-    """Check first bytes: on a mismatch with its ending, the library would print."""
+    """On a mismatch of first bytes and ending, the library would print."""
     with path.open("rb") as file:
         begin = file.read(1024)
     right = {
@@ -193,7 +193,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
-    """Return the sets of SU2's markers by name: meshio counts those whose names are words."""
+    """Sets of SU2's markers by name: meshio counts those whose names are words."""
     number, named = 0, {}
     for name in re.findall(r"^MARKER_TAG *= *(\S+)", path.read_text("latin-1"), re.M):
         number = int(name) if name.isdigit() else number + 1
@@ -202,7 +202,7 @@ def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np
 
 
 def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Yield named sets, and integer tags as ``name`` and ``name:number``."""
+    """Named sets, and integer tags as ``name`` and ``name:number``."""
     for name, elements in mesh.cell_sets.items():
         if not name.startswith("gmsh:"):
             yield (
