@@ -430,7 +430,8 @@ def test_examples_of_styles_fit_their_signatures(family, name, tmp_path, monkeyp
         for dimension in STAGES:
             try:
                 # Some lines speak of what is defined above them.
-                speaks = line.startswith(("log", "material")) or "c_y" in line or "v_x" in line
+                starts = line.startswith(("log", "material", "eos"))
+                speaks = starts or "c_y" in line or "v_x" in line
                 above = lines[:k] if speaks else []
                 _tried([*above, line], dimension, tmp_path)
                 break

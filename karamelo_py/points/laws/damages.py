@@ -26,6 +26,7 @@ class FlowStep(NamedTuple):
     triaxiality: Any  # mean stress over von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any
+    stress: Any  # Cauchy stress of intact material
 
 
 @point_function()
@@ -129,7 +130,7 @@ def _initiation_johnson_cook_damage(damage, memory):
 
 @damage_after.on(JohnsonCookDamage)
 def _damage_after_johnson_cook_damage(damage, memory, step):
-    strain, triaxiality, heat, dt = step
+    strain, triaxiality, heat, dt, _ = step
     grows = (strain > 0) & (triaxiality > _CLOSED)
     if not any_lane(grows):
         return memory

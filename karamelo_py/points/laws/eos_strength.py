@@ -14,10 +14,21 @@ from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import known_failure, suggestion
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import I, det, dev, nothing, sym, symmetric_tensor, tr, von_mises
+from karamelo_py.points.kinematics import (
+    I,
+    Space,
+    det,
+    dev,
+    nothing,
+    sym,
+    symmetric_tensor,
+    tr,
+    von_mises,
+)
 from karamelo_py.points.laws import Absent, can, column, eos, law_traits, parameter, strengths
 from karamelo_py.points.laws.damages import (
     FlowStep,
+    JohnsonCookDamage,
     damage_after,
     initial_damage,
     initiation,
@@ -157,7 +168,7 @@ column(EosStrength, "dissipated", laws.dissipated_energy)
 
 def _idle_damage(law, scene):
     yields = strengths.equivalent_plastic_strain.defined(type(law.strength))
-    return not isinstance(law.damage, Absent) and not yields
+    return isinstance(law.damage, JohnsonCookDamage) and not yields
 
 
 def _idle_heat(law, scene):
@@ -174,7 +185,7 @@ def _idle_heat(law, scene):
 def _strained(law, heat):
     strength, damage, results = law.strength, law.damage, []
     if damage_after.defined(type(damage)):
-        step = FlowStep(0.1, 1.0, heat, 1.0)
+        step = FlowStep(0.1, 1.0, heat, 1.0, nothing(Space()))
         results.append(damage_after(damage, initial_damage(damage, 1.0), step))
     if flow_stress.defined(type(strength)):
         before = before_flow(strength, strengths.initial_memory(strength, 1.0), heat)
@@ -288,7 +299,8 @@ def _initial_state_eos_strength(law, kin, like):
         viscous,
         initial_damage(law.damage, like),
         initial_heat(law.temperature, like),
-        strengths.initial_loss(law.strength, like) or viscous,  # (0,) where a part dissipates
+        # (0,) where a part dissipates
+        strengths.initial_loss(law.strength, like) or viscous or eos.initial_loss(law.eos, like),
         strengths.initial_memory(law.strength, like),
         initial_further(law.further, like),
     )
@@ -313,13 +325,14 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     viscous_work = sum(viscous) * (before - J)
     volumes = eos.VolumeStep(before, J, dt)
     energy = eos.compressed(law.eos, m.energy, volumes, work + viscous_work)
+    crushed = eos.crush_work(law.eos, m.energy, energy, volumes)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
     now = m._replace(energy=energy, viscous=viscous, strength=memory)
     intact = State(J, s, now)
     damage = damage_after_flow(law, intact, flow, dt)
-    heat = heated(law.temperature, m.heat, work * laws.specific_volume(law.eos))
-    gone = work + viscous_work + released(law, kin, intact, damage)
+    heat = heated(law.temperature, m.heat, (work + crushed) * laws.specific_volume(law.eos))
+    gone = work + crushed + viscous_work + released(law, kin, intact, damage)
     loss = tuple([lost + gone for lost in m.loss])
     further = further_after(law.further, m.further, law, step._replace(s=s), now)
     return State(J, s, now._replace(damage=damage, heat=heat, loss=loss, further=further))
@@ -339,6 +352,7 @@ def rotated_with_point(law, kin, s, dl):
 def intact_pressure(law, j, m):
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     p = eos.pressure(law.eos, elastic, m.energy, m.heat)
+    p += strengths.added_pressure(law.strength, m.strength)
     p += sum(thermal_pressure(law.temperature, m.heat))
     return further_pressure(law.further, m.further, p)
 
@@ -347,6 +361,7 @@ def volume_energy(law, j, m):
     """Energy of the volume change of the intact material, at its temperature."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     energy = eos.compression_energy(law.eos, elastic, m.energy)
+    energy += strengths.added_energy(law.strength, law, elastic, m)
     energy -= eos.stored_heat(law.eos, sum(m.loss))
     warm = sum(thermal_pressure(law.temperature, m.heat))
     if len(m.heat):  # thermal pressure of the equation of state
@@ -404,7 +419,8 @@ def damage_after_flow(law, state, strain, dt):
     bound = von_mises(s) + 1e-3 * abs(p)
     stressed = bound > 0
     triaxiality = where(stressed, -p / where(stressed, bound, 1), 0)
-    return damage_after(law.damage, m.damage, FlowStep(strain, triaxiality, m.heat, dt))
+    step = FlowStep(strain, triaxiality, m.heat, dt, s - p * I)
+    return damage_after(law.damage, m.damage, step)
 
 
 def released(law, kin, state, damage):

@@ -29,6 +29,18 @@ def compressed(eos, memory, step, heating):
 
 
 @point_function(otherwise=True)
+def initial_loss(eos, like):
+    """(0,) for an eos that dissipates energy itself, or ()."""
+    return ()
+
+
+@point_function(otherwise=True)
+def crush_work(eos, before, after, step):
+    """Energy dissipated by crushed pores in a `VolumeStep`, from the memories at its ends."""
+    return 0
+
+
+@point_function(otherwise=True)
 def ignited(eos, memory, since):
     """(memory,) of an explosive lit `since` this time; () of other materials."""
     return ()

@@ -113,6 +113,18 @@ def elastic_ratio(strength, memory, j):
 
 
 @point_function(otherwise=True)
+def added_pressure(strength, memory):
+    """Pressure beyond the equation of state's."""
+    return 0
+
+
+@point_function(otherwise=True)
+def added_energy(strength, law, elastic, memories):
+    """Energy of the added pressure, at the elastic volume ratio."""
+    return 0
+
+
+@point_function(otherwise=True)
 def shear_modulus(strength):
     """Stiffness against further shear, for the wave speed."""
     return strength.G

@@ -1,0 +1,168 @@
+"""Strength johnson-holmquist-2: brittle materials under impact."""
+
+from math import inf, sqrt
+from typing import NamedTuple
+
+from karamelo_py.compiler import real, where
+from karamelo_py.compiler.powers import logarithm, power
+from karamelo_py.points.kinematics import dev, inner, von_mises
+from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
+from karamelo_py.points.laws.parameters import AboveZero, FromZero, reference_rate
+from karamelo_py.points.laws.strengths import (
+    added_energy,
+    added_pressure,
+    elastic_ratio,
+    remembers,
+    respond,
+)
+from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yield_surface
+from karamelo_py.script.errors import ScriptError
+
+LEAST_STRAIN = 1e-9  # failure strain
+
+
+class JohnsonHolmquist2(NamedTuple):
+    """Strength of ceramics and glass under impact: intact, breaking, and crushed.
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    A, N
+        Intact strength: A (P* + T*)^N.
+    B, M
+        Strength when broken: B P*^M.
+    C
+        Rate coefficient; 0 for none.
+    epsdot0
+        Reference strain rate; may be 0 if C is.
+    T
+        Largest tension, as a pressure.
+    HEL
+        Hugoniot elastic limit: axial stress at which a plane wave yields.
+    PHEL
+        Pressure there.
+    D1, D2
+        Failure strain: D1 (P* + T*)^D2.
+    beta
+        Fraction of the lost shear energy that becomes pressure (bulking), 0 to 1.
+    sfmax
+        Bound of the strength when broken, over the strength at the elastic limit.
+
+    Example
+    -------
+    eos(alumina, linear, 3700, 131e9)
+    strength(a, johnson-holmquist-2, 9e10, 0.93, 0.6, 0.31, 0.6, 0, 1, 2e8, 2.8e9, 1.5e9, 0.005, 1)
+    material(alumina, eos-strength, alumina, a)
+
+    Notes
+    -----
+    The von Mises stress is at most sHEL (si - D (si - sf)), where the intact and broken strengths
+    si and sf rise by 1 + C ln(rate/epsdot0), P* = P/PHEL, T* = T/PHEL and sHEL = 3/2 (HEL - PHEL)
+    (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D grows to 1 with the
+    plastic strain over the failure strain, at once where that is 0. Broken material sustains a
+    tension of T (1 - D); beyond, it opens. In compression, a step that lowers the strength turns
+    the fraction beta of the lost shear energy into pressure. Dump columns: ep, damage, bulking (the
+    added pressure), opened (the volume ratio of gaps). The rate is that of the strain.
+
+    See Also
+    --------
+    eos linear, eos shock, damage tuler-butcher, mohr-coulomb
+    """
+
+    in_lanes = True
+
+    G: AboveZero
+    A: AboveZero
+    N: FromZero
+    B: FromZero
+    M: FromZero
+    C: FromZero
+    epsdot0: FromZero
+    T: FromZero
+    HEL: AboveZero
+    PHEL: AboveZero
+    D1: FromZero
+    D2: FromZero
+    beta: FromZero = 1.0
+    sfmax: AboveZero = inf
+
+    def checked(self):
+        if not self.HEL > self.PHEL:
+            raise ScriptError(
+                f"the elastic limit {self.HEL:g} is not above its pressure {self.PHEL:g}",
+                argument="HEL",
+                expected="the axial stress, PHEL plus two thirds of the strength",
+            )
+        if self.beta > 1:
+            raise ScriptError(
+                f"a fraction of {self.beta:g} is not possible", argument="beta", expected="0 to 1"
+            )
+        return self._replace(epsdot0=reference_rate(self.epsdot0, self.C, "C"))
+
+
+remembers(JohnsonHolmquist2, ep=0.0, damage=0.0, bulking=0.0, opened=1.0)
+
+
+@elastic_ratio.on(JohnsonHolmquist2)
+def _elastic_ratio_johnson_holmquist(strength, memory, j):
+    return j / memory.opened
+
+
+@added_pressure.on(JohnsonHolmquist2)
+def _added_pressure_johnson_holmquist(strength, memory):
+    return memory.bulking
+
+
+@added_energy.on(JohnsonHolmquist2)
+def _added_energy_johnson_holmquist(strength, law, elastic, memories):
+    # (p + dP)^2/(2 K) less p^2/(2 K)
+    p = pressure(law.eos, elastic, memories.energy, memories.heat)
+    added = memories.strength.bulking
+    return 0.5 * added * (2 * p + added) / stiffness_at_rest(law, memories)
+
+
+def stiffness_at_rest(law, memories):
+    return bulk_modulus(law.eos, real(1, memories.strength.ep), memories.energy, memories.heat)
+
+
+def rate_factor(strength, step):
+    d = dev(step.strain)
+    rate = sqrt(2 / 3 * inner(d, d)) / (step.dt * strength.epsdot0)
+    return 1 + strength.C * logarithm(max(rate, 1))
+
+
+def limits(strength, p, factor):
+    """Strength of intact and of broken material, at the pressure p."""
+    above = max(p + strength.T, 0) / strength.PHEL
+    intact = strength.A * power(above, strength.N) * factor
+    broken = strength.B * power(max(p, 0) / strength.PHEL, strength.M) * factor
+    scale = 1.5 * (strength.HEL - strength.PHEL)
+    return scale * intact, scale * min(min(broken, strength.sfmax), intact), above
+
+
+@respond.on(JohnsonHolmquist2)
+def _respond_johnson_holmquist(strength, law, kin, step, memories):
+    memory, heat = memories.strength, memories.heat
+    trial = elastic_trial(strength.G, step.s, step.strain)
+    # A gap closes before the point sustains pressure.
+    lowest = -strength.T * (1 - memory.damage)
+    whole = ratio_at_pressure(law.eos, lowest - memory.bulking, heat)
+    opened = max(step.j / whole, 1)
+    p_eos = pressure(law.eos, step.j / opened, memories.energy, heat)
+    p = p_eos + memory.bulking
+    intact, broken, above = limits(strength, p, rate_factor(strength, step))
+    q, flow = von_mises(trial), intact - memory.damage * (intact - broken)
+    x = max(q - flow, 0) / (3 * strength.G)
+    failure = max(strength.D1 * power(above, strength.D2), LEAST_STRAIN)
+    damage = min(memory.damage + x / failure, 1)
+    weaker = intact - damage * (intact - broken)
+    # Shear energy q^2/(6 G) that is released beyond the plastic work.
+    released = where(x > 0, (flow * flow - weaker * weaker) / (6 * strength.G), 0)
+    K = stiffness_at_rest(law, memories)
+    gained = where(p > 0, strength.beta * released, 0)
+    bulking = where(gained > 0, sqrt(p * p + 2 * K * gained) - p_eos, memory.bulking)
+    work = flow * x + released - gained - min(p, 0) * logarithm(opened / memory.opened)
+    s = onto_yield_surface(trial, q, weaker, x)
+    after = memory._replace(ep=memory.ep + x, damage=damage, bulking=bulking, opened=opened)
+    return s, after, work
