@@ -61,8 +61,8 @@ class JohnsonHolmquist2(NamedTuple):
     si and sf rise by 1 + C ln(rate/epsdot0), P* = P/PHEL, T* = T/PHEL and sHEL = 3/2 (HEL - PHEL)
     (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D grows to 1 with the
     plastic strain over the failure strain, at once where that is 0. Broken material sustains a
-    tension of T (1 - D); beyond, it opens. In compression, a step that lowers the strength turns
-    the fraction beta of the lost shear energy into pressure. Dump columns: ep, damage, bulking (the
+    tension of T (1 - D); beyond, it opens. In compression, a step that lowers the strength converts
+    the fraction beta of the lost shear energy to pressure. Dump columns: ep, damage, bulking (the
     added pressure), opened (the volume ratio of gaps). The rate is that of the strain.
 
     See Also
