@@ -73,8 +73,7 @@ def method(
     before = hub.update.method
     if before is not None:
         hub.warn(
-            f"this method replaces the one in line {before.place.line}",
-            hint="one line method(...)",
+            f"this method replaces the one in line {before.place.line}", hint="one line method(...)"
         )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]

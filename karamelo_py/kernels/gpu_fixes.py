@@ -87,13 +87,13 @@ def whole_nodes(target: int, stage: int) -> Callable:
     return lambda s, tag: hook_loop.whole_nodes(s, tag, stage, target)
 
 
-def work_of_loads(i, fate, s, about):
+def work_of_loads(i, fate, s, about, target):
     """Sum the work of loads on a node, and clear them."""
     if s.nodes.sums[i, arrays.MASS] > 0:
         hooks = _hooks_with_room(about.hooks)
         hooks.chosen[0] = i
         call = hook_loop.Call(hooks, _CONTROL(s, about.copies, i), float(kick(s)), 0, 1.0)
-        hook_loop.act(hook_loop.hooked_nodes(s, hook_loop.LOADS, 0.0), hook_loop.ACT, call, 1)
+        hook_loop.act(hook_loop.hooked_nodes(s, target, 0.0), hook_loop.ACT, call, 1)
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:

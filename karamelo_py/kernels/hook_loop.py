@@ -34,7 +34,7 @@ VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
 END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # task for the members of a hook
-LOADS = 3  # a target: all nodes
+LOADS, LOADS_AGAIN = 3, 4  # targets: all nodes, with v* or with the velocity mapped again
 DONE = -1  # instead of a stage
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
@@ -55,7 +55,7 @@ class Call(NamedTuple):
 class HookedNodes(NamedTuple):
     """Nodes for node functions, also nodes of heat."""
 
-    target: int  # `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`, or `LOADS`
+    target: int  # `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`, `LOADS`, `LOADS_AGAIN`
     kin: NamedTuple
     grids: np.ndarray
     nodes: NamedTuple
@@ -267,7 +267,7 @@ def publish_total(hooks, h, control):
 def _choose_nodes(members, call, row, end, member):
     """Choose up to a block of members with mass, in use; return number, where to continue."""
     hooks, h, ranges, sums = call.hooks, call.h, members.ranges, members.nodes.sums
-    of_all = members.target == LOADS or hooks.table[h].begin < 0
+    of_all = members.target >= LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
     member = max(member, NONE if of_all else hooks.table[h].begin)
     count = 0
@@ -303,7 +303,7 @@ def _act_at_nodes(members, task, call, count):
         for q in range(count):
             number += totals.counts(call.control.ranks, hooks.chosen[q])
         return number
-    if members.target == LOADS:
+    if members.target >= LOADS:
         _work_at_nodes(members, call, count)
         return 0
     if hooks.table[call.h].uses_place:
@@ -479,9 +479,11 @@ def _work_at_nodes(members, call, count):
     """Sum the work of loads on the chosen nodes, and clear them.
 
     Force times the mean of the velocities before and after the step, with its stress, constraints
-    and contact: else the error would be of first order.
+    and contact. After the step it is what points took: mapped again, for FLIP the work on points is
+    exact. v* is off by first order in dt, much at nodes with little mass.
     """
     update, change = members.nodes.update, arrays.of_change(members.kin)
+    velocity, again = members.nodes.velocity, members.target == LOADS_AGAIN
     hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[VALUE]
     for c in range(members.kin.dimension):
         for q in range(count):
@@ -490,7 +492,9 @@ def _work_at_nodes(members, call, count):
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n)
             counts = counts and not _is_of_rigid(hooks, n)
-            terms[q] = dt * load * (update[n, c] - 0.5 * update[n, change + c]) if counts else 0.0
+            later = velocity[n, c] if again else update[n, c]
+            moved = update[n, c] - update[n, change + c] + later
+            terms[q] = 0.5 * dt * load * moved if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 
 
@@ -545,7 +549,7 @@ def whole_nodes(s, tag, stage, target):
 
 
 def node_hooks(stage, members, hooks, s, dt):
-    """Call the node functions of `stage` on `hooked_nodes`; for `LOADS`, sum the work."""
+    """Call the node functions of `stage` on `hooked_nodes`; for loads, sum the work."""
     tags = [tag for tag in hooks.whole if tag.of_nodes]
     whole = tuple([whole_nodes(s, tag, stage, members.target) for tag in tags])
     _node_hooks(stage, members, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))
@@ -554,7 +558,7 @@ def node_hooks(stage, members, hooks, s, dt):
 @kernel
 def _node_hooks(stage, members, whole, call):
     members, hooks, control, dt = hold(members), call.hooks, call.control, call.dt
-    if members.target == LOADS:
+    if members.target >= LOADS:
         if hooks.loads.size > 0:
             _act_on_all(members, ACT, call)
             totals.carry(control.totals[totals.WORK])
@@ -602,13 +606,13 @@ def _at_nodes_hooks(hooks, stage, target, s):
 
 
 @point_function(otherwise=True)
-def add_work(hooks, s):
+def add_work(hooks, s, again):
     """Sum the work of loads on nodes."""
 
 
 @add_work.on(arrays.Hooks)
-def _add_work_hooks(hooks, s):
-    node_hooks(NONE, hooked_nodes(s, LOADS, 0.0), hooks, s, kick(s))
+def _add_work_hooks(hooks, s, again):
+    node_hooks(NONE, hooked_nodes(s, LOADS_AGAIN if again else LOADS, 0.0), hooks, s, kick(s))
 
 
 # --- points -----------------------------------------------------------------------------------

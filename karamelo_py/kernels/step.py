@@ -74,7 +74,7 @@ def _at_nodes(row, s, step):
 
 @take.on(table.WorkOfLoads, Processor)
 def _work_of_loads(row, s, step):
-    add_work(step.hooks, s)
+    add_work(step.hooks, s, row.again)
 
 
 @take.on(table.NodeTask, Processor)

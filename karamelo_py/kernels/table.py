@@ -98,7 +98,9 @@ class Once(NamedTuple):
 
 
 class WorkOfLoads(NamedTuple):
-    """Sum the work of the loads on nodes."""
+    """Sum the work of the loads on nodes; `again`: the moved points' velocity is mapped again."""
+
+    again: bool = False
 
 
 class Repeated(NamedTuple):
@@ -333,7 +335,7 @@ def sum_series(s: Setup) -> tuple:
         return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     terms = Repeated(lambda s: s.transfer.order - 1, _next_term)
-    return NodeTask(xpic.StartSeries()), terms, *hold_axis(s)
+    return WORK_OF_LOADS, NodeTask(xpic.StartSeries()), terms, *hold_axis(s)
 
 
 def _next_term(k: int) -> tuple:
@@ -409,7 +411,7 @@ VELOCITY_BEFORE = (
 )
 FORCE = Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m, with loads, prescribed velocities, contact; heat flow.
-ACCELERATE = (
+UPDATE = (
     FRICTION,
     LOSS,
     AVERAGED,
@@ -419,8 +421,8 @@ ACCELERATE = (
     NodeTask(nodes.NodalUpdate()),
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
-    WORK_OF_LOADS,
 )
+ACCELERATE = (*UPDATE, WORK_OF_LOADS)
 MOVE = (
     Gather(Move()),
     AtPoints(arrays.POST_GRID_TO_POINT, 1),
@@ -434,4 +436,5 @@ MOMENTUM_AGAIN = (
     AXIS,
     AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),
     CONTACT_AFTER,
+    WorkOfLoads(again=True),
 )

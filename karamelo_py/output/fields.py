@@ -9,15 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import rows_of_points
-from karamelo_py.kernels.arrays import (
-    Block,
-    Points,
-    Setup,
-    arrays_of,
-    made_of,
-    matter_of,
-    some_of,
-)
+from karamelo_py.kernels.arrays import Block, Points, Setup, arrays_of, made_of, matter_of, some_of
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded

@@ -17,7 +17,7 @@ from karamelo_py.kernels import arrays, gpu, heat, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
-from karamelo_py.kernels.hook_loop import ACT, RUB, moving_points
+from karamelo_py.kernels.hook_loop import ACT, LOADS, LOADS_AGAIN, RUB, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.table import take
@@ -304,11 +304,11 @@ class StepsOnCard:
         for h in own:
             yield from self._publish_at_once(h)
 
-    def work_of_loads(self) -> Iterator[KernelLaunch]:
+    def work_of_loads(self, target: int) -> Iterator[KernelLaunch]:
         if len(self.table) and self.hooks.loads.size:
             about = fixes.Act(self.hooks, 0, self.heavy, self.copies)
             called = self._called(0)
-            yield self.launch(fixes.work_of_loads, self.nodes, self.s, about, called=called)
+            yield self.launch(fixes.work_of_loads, self.nodes, self.s, about, target, called=called)
 
     # --- totals, and the energy monitor
 
@@ -530,4 +530,4 @@ def _at_heated_points(row, steps):
 
 @take.on(table.WorkOfLoads, Card)
 def _work_of_loads(row, steps):
-    return steps.work_of_loads()
+    return steps.work_of_loads(LOADS_AGAIN if row.again else LOADS)

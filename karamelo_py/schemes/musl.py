@@ -25,7 +25,7 @@ class MUSL(NamedTuple):
     rows = (
         table.BEGIN,
         table.SUMS,
-        *table.ACCELERATE,
+        *table.UPDATE,
         table.SERIES,
         *table.MOVE,
         *table.MOMENTUM_AGAIN,

@@ -28,7 +28,7 @@ class USAVG(NamedTuple):
         *table.VELOCITY_BEFORE,
         table.Gather(Strain(), 0.5, of_last_step=True),
         table.FORCE,
-        *table.ACCELERATE,
+        *table.UPDATE,
         table.SERIES,
         *table.MOVE,
         *table.MOMENTUM_AGAIN,

@@ -262,8 +262,8 @@ def _at_nodes_acting_fixes(hooks, stage, target, s):
 
 
 @add_work.on(ActingFixes)
-def _add_work_acting_fixes(hooks, s):
-    add_work(hooks.compiled, s)
+def _add_work_acting_fixes(hooks, s, again):
+    add_work(hooks.compiled, s, again)
 
 
 @at_points.on(ActingFixes)

@@ -89,8 +89,7 @@ class TLMPM(Method):
             if hub.update.scheme.traits.implicit:
                 hint = "method(ulmpm/contacts, ...) where they may meet"
             hub.warn(
-                f"solids on separate grids pass through each other: {', '.join(alone)}",
-                hint=hint,
+                f"solids on separate grids pass through each other: {', '.join(alone)}", hint=hint
             )
 
     def lattices(self, hub: Hub) -> list[Lattice]:

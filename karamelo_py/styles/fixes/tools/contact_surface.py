@@ -6,15 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from karamelo_py.compiler import address_of_python
-from karamelo_py.kernels.touching import (
-    ASIDE,
-    CALL,
-    LEVEL,
-    SOFT,
-    Touch,
-    touch_hook,
-    touch_kind,
-)
+from karamelo_py.kernels.touching import ASIDE, CALL, LEVEL, SOFT, Touch, touch_hook, touch_kind
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.output.point_table import PointTable
