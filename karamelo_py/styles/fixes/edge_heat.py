@@ -23,12 +23,12 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Find the faces from the surface of the region; for meshes from the boxes of points."""
+        """Faces on the surface of the region; for meshes from the boxes of points."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """Heat per time (n,) into the points, from the values of formulas at the faces (m,)."""
+        """Heat per time (n,) into the points, from values of formulas at the faces (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
@@ -43,7 +43,7 @@ class EdgeHeat(OnEdge, HeatFix):
 
 
 def on_points(points: PointsView, faces: Faces, of_faces: np.ndarray) -> np.ndarray:
-    """Sum face values (m,) over the faces of each point (n,)."""
+    """Sums (n,) of face values (m,) over the faces of each point."""
     return np.bincount(faces.point, of_faces, len(points.ids))
 
 
@@ -62,10 +62,10 @@ class EdgeHeatFlux(EdgeHeat):
 
     Notes
     -----
-    Each point gets the heat through the part of the region's surface next to it: the initial area
-    of the smooth surface (for a mesh, of the faces of its points). To load a part of an edge,
-    restrict the group, or set q to 0 elsewhere. If the region ends at the edge of the domain or at
-    a symmetry plane, extend it beyond: then it has no surface there.
+    Each point gets the heat through the region's surface next to it, by the initial area of the
+    smooth surface (for a mesh, of its points' faces). To load part of an edge, restrict the group,
+    or set q to 0 elsewhere. A region that extends beyond the domain or a symmetry plane has no
+    surface there.
 
     Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in axisymmetry
     per radian).
@@ -99,9 +99,9 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    Areas are as in edge_heat_flux. T is the temperature of the points next to the surface after the
-    step, so no coefficient cools them below the fluid. Publishes the heat per time into all points
-    as ID_s, and the area as ID_area.
+    Areas are as in edge_heat_flux. T is the temperature next to the surface after the step, so no
+    coefficient cools points below the fluid. Publishes the heat per time into all points as ID_s,
+    and the area as ID_area.
 
     See Also
     --------

@@ -27,7 +27,7 @@ class Faces(NamedTuple):
 
     point: np.ndarray  # (m,) numbers of the points, or their rows in a view
     axis: np.ndarray  # (m,) normal to the face
-    sign: np.ndarray  # (m,) -1 or 1: outward direction
+    sign: np.ndarray  # (m,) outward: -1 or 1
     area: np.ndarray  # (m,) per radian in axisymmetry
     middle: np.ndarray  # (m, d)
 
@@ -36,10 +36,10 @@ class Faces(NamedTuple):
 
 
 def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
-    """Return the outer faces, at the edge of a region, of the points `ids` inside it.
+    """Outer faces, at the edge of a region, of the points `ids` inside it.
 
     Points are boxes; a face counts if the centre of the adjacent box of the same size is outside.
-    For boxes that a region has cut see `faces_cut`.
+    Boxes cut by a region: `faces_cut`.
     """
     d = hub.domain.dimension
     if not len(ids):
@@ -64,7 +64,7 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
 class EdgePieces(NamedTuple):
     """Pieces of the surface of a region, and their points."""
 
-    point: np.ndarray  # (m,) numbers of the points
+    point: np.ndarray  # (m,)
     area: np.ndarray  # (m, d) times the outward normal
     length: np.ndarray  # (m,) area of a piece, with both sides of an edge
     middle: np.ndarray  # (m, d)
@@ -78,7 +78,7 @@ def joined(tables: Sequence[Columns]) -> Columns:
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
-    """Measure the surface of a region at the points `ids` of a solid that fills it.
+    """The surface of a region at the points `ids` of a solid that fills it.
 
     The surface in a part of a box belongs to the nearest inside point in this box or an adjacent
     one.
@@ -119,14 +119,14 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
-    """Return the centres (n PARTS^d, d) of the parts of boxes of edge length `size` around `x`."""
+    """Centres (n PARTS^d, d) of the parts of boxes of edge length `size` around `x`."""
     d = x.shape[1]
     places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
     return (x[:, None, :] + size * places).reshape(-1, d)
 
 
 def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
-    """Measure the area (n,) of the surface in boxes around `x`: by parts at an edge."""
+    """Area (n,) of the surface in boxes around `x`: by parts at an edge."""
     lengths, d = np.linalg.norm(area, axis=1), x.shape[1]
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
     depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
@@ -142,10 +142,10 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Find the faces at the points `ids` of a solid whose boxes were cut: see `surface_at`.
+    """Faces at the points `ids` of a solid whose boxes were cut: see `surface_at`.
 
-    The faces are projections of the surface across the axes. At an edge within a part of a box,
-    opposite projections cancel, and only the difference remains.
+    Projections of the surface across the axes. At an edge within a part of a box, opposite
+    projections cancel, and only the difference remains.
     """
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
     pieces = surface_at(solid, region, ids)
@@ -161,7 +161,7 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Find the surface of a region at the points `ids` of a solid, in every orientation."""
+    """The surface of a region at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     none = np.zeros(len(pieces.point), np.int64)
     area = pieces.length * solid.domain.depth(pieces.middle)
@@ -174,7 +174,7 @@ class OnEdge(Fix):
     Parameters
     ----------
     region
-        ID of a region: the region of a solid, or one that ends where the solid ends.
+        ID of a solid's region, or of one that ends where the solid ends.
     """
 
     group: ParticleGroup
@@ -192,14 +192,14 @@ class OnEdge(Fix):
                 )
 
     def faces_at(self, ids: np.ndarray) -> Faces:
-        """Return the faces of the points in a view, by their rows there; cached."""
+        """Faces of the points in a view, by their rows there; cached."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # Sum forces on a point in this order, whenever its faces were found.
+            # Forces on a point are summed in this order, whenever its faces were found.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]
@@ -207,7 +207,7 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Find faces from the surface of the region; None to find them from the boxes."""
+        """Faces from the surface of the region; None to find them from the boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
@@ -259,8 +259,7 @@ class EdgeTraction(EdgeFix):
     Parameters
     ----------
     side
-        The loaded side, by its outward direction: xlo and xhi for left and right, ylo and yhi, zlo
-        and zhi.
+        The loaded side, by its outward direction: xlo (left), xhi (right), ylo, yhi, zlo, zhi.
     traction
         tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z (initial
         position of the edge), time and published values. NULL leaves a component unchanged.
@@ -273,12 +272,11 @@ class EdgeTraction(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
 
-    The points of the group are boxes that fill the region. Boxes with an outer face in the
-    direction of `side` take the traction on the initial area of this face. The load has constant
-    magnitude and direction (a dead load) and acts half a box inside the edge. The sum over a plane
-    side is exactly traction times area. Faces of a hole in this direction are loaded too: for a
-    plate with a hole, name the region without the hole. In axisymmetry, area and force are per
-    radian.
+    Points are boxes that fill the region; those with an outer face in the direction of `side` take
+    the traction on its initial area. It is a dead load (constant magnitude and direction), half a
+    box inside the edge, and sums exactly to traction times area on a plane side. Faces of a hole in
+    this direction are loaded too: for a plate with a hole, use the region without it. In
+    axisymmetry, area and force are per radian.
 
     See Also
     --------
@@ -321,10 +319,10 @@ class EdgePressure(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
 
-    Points are boxes. The pressure acts inwards on each outer face, on its initial area, with
+    The pressure acts inwards on each outer face of the points' boxes, on its initial area, with
     constant magnitude and direction. A curved edge is stair-stepped, but the force along each axis
-    is that on the projected area, as on the smooth edge. With points=cut the forces are those on
-    the smooth edge itself. In axisymmetry, forces are per radian.
+    is correct: that on the projected area. With points=cut, forces are those on the smooth edge. In
+    axisymmetry, forces are per radian.
 
     For a part of an edge, define a separate region; the group may have to exclude other sides of a
     region such as ``region(top, block, 0, 1, 0.9, 1)``.

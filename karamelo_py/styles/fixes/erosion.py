@@ -20,8 +20,8 @@ class Erosion(Fix):
     ----------
     condition
         A formula of columns of dump particle (damage, volume, x, ep, T, ...), names of groups and
-        solids, time and published values; points for which it is not 0 are deleted. A column name
-        means the column even if the script has a variable of that name.
+        solids, time and published values; points for which it is not 0 are deleted. Column names
+        take precedence over variables.
     every
         Checks follow steps whose number is a multiple of this.
 
@@ -32,9 +32,9 @@ class Erosion(Fix):
 
     Notes
     -----
-    Publishes sums since the start: ID_points, ID_mass, and ID_energy, the kinetic, stored and
-    dissipated energy of the deleted points, which the energy balance counts as work of the fix. Log
-    and dumps at this step omit the points.
+    Publishes sums since the start: ID_points, ID_mass, and ID_energy (kinetic, stored and
+    dissipated), which the energy balance counts as work of the fix. Log and dumps at this step omit
+    the points.
 
     See Also
     --------
@@ -59,7 +59,7 @@ class Erosion(Fix):
             hub.warn(f"{', '.join(empty)} will be 0: points have no such field")
 
     def between_steps(self) -> bool:
-        """Delete the points that meet the condition; return whether there were any."""
+        """True if points met the condition."""
         tables = self.hub.fields.each(self, "meeting")
         ids = np.sort(np.concatenate([np.empty(0, np.int64), *tables]))
         if not len(ids):

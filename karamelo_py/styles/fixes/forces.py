@@ -33,7 +33,6 @@ TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium: unique to th
 
 
 def accelerate(mass, v, v_star, force, value, before, dt, share):
-    """Add mass times value to the force and to the total."""
     return v, v_star, force + mass * value, mass * value
 
 
@@ -149,7 +148,6 @@ class PointForces(Fix):
             raise ScriptError(message, argument="group", expected=expected)
 
     def forces(self, points: PointsView) -> np.ndarray:
-        """Return the forces (n, d) on the points."""
         raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
@@ -173,9 +171,9 @@ class ForceParticles(PointForces):
 
     Notes
     -----
-    A point of mass m gets m/M of the force at its position, where M is the mass of the group.
-    Unlike fix force_nodes, the load moves with the points. In axisymmetry, forces are per radian.
-    Publishes the sum as ID_x, ID_y, ID_z.
+    A point of mass m gets m/M of the force at its position, M the mass of the group. Unlike with
+    force_nodes, the load moves with the points. In axisymmetry, forces are per radian. Publishes
+    the sum as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -228,17 +226,14 @@ class LocalDamping(Fix):
 
     Notes
     -----
-    The force f of a node becomes f - alpha |f| sign(v), component by component (Cundall 1987).
-    Balanced forces cause no damping: the state of rest is the same as without it, for any
-    stiffness, and steady motion is not damped. With 0.8 a scene comes to rest within about ten
-    periods of its slowest vibration.
+    The force f of a node becomes f - alpha |f| sign(v), by component (Cundall 1987). Balanced
+    forces cause no damping: the state of rest is unchanged, and steady motion is not damped. With
+    0.8 a scene comes to rest within about ten periods of its slowest vibration.
 
-    It acts after all other fixes, wherever it is in the script. Nodes that are held or move at a
-    prescribed constant velocity are not damped; their reactions are correct. Publishes the sum of
-    the damping forces as ID_x, ID_y, ID_z.
-
-    In method ulmpm/contacts it acts after contact, on the net force: touching bodies come to rest
-    with correct contact forces.
+    It acts after all other fixes, in ulmpm/contacts after contact, on the net force: touching
+    bodies come to rest with correct contact forces. Nodes that are held or move at a prescribed
+    constant velocity are not damped; their reactions are correct. Publishes the sum of the damping
+    forces as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -275,7 +270,7 @@ class InitialStress(Fix):
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
-    set. Tension that a material cannot sustain gives a warning, such as in soil without cohesion.
+    set. Tension that a material cannot sustain, as in soil without cohesion, gives a warning.
     """
 
     published = ()
@@ -354,7 +349,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
-    """Find the bodies with a tension that they cannot sustain, in 10 % of their points."""
+    """Bodies with a tension that they cannot sustain, in 10 % of their points."""
     cases = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():

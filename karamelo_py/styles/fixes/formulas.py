@@ -11,12 +11,11 @@ from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import FIRST
 
 AXES = "xyz"
-# Rubber on dry concrete has 1, clean metals that weld 1.5.
-USUAL_FRICTION = 2.0
+USUAL_FRICTION = 2.0  # rubber on dry concrete has 1, clean metals that weld 1.5
 
 
 def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = False) -> tuple:
-    """Check that there is one formula (or NULL, unless `all_given`) per direction of the domain.
+    """Require one formula (or NULL, unless `all_given`) per direction of the domain.
 
     Further components may be NULL or zero, as in published inputs.
     """
@@ -43,7 +42,7 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
-    """Return the values (n, d) of a formula per direction, 0 if missing.
+    """Values (n, d) of a formula per direction, 0 if missing.
 
     `first()` gives the reference positions for formulas that need them.
     """
@@ -62,7 +61,6 @@ def unlike(one: Any, other: Any) -> list[int]:
 
 
 def judge_friction(hub: Hub, mu: float) -> None:
-    """Warn of a coefficient that no pair of materials has."""
     if mu > USUAL_FRICTION:
         hub.warn(
             f"the coefficient of friction is {mu:g}; measured ones are below 1.5",

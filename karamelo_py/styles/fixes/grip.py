@@ -20,7 +20,7 @@ class GripOfTool(Grip):
 
 
 def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
-    """Return a grip class that no other fix of the scene uses: a point may touch several."""
+    """A grip class that no other fix of the scene uses: a point may touch several."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
     k = 1
     while globals().get(f"{kind.__name__}{k}") in taken:
@@ -30,8 +30,6 @@ def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
 
 
 class Gripping(Fix):
-    """Mix-in of fixes with friction that has a memory."""
-
     remembers = ("has_touched",)
     has_touched = False  # until then, the grips of a restart file belong to an earlier fix
     kind_of_grip: type[Grip] = Grip

@@ -16,8 +16,6 @@ from karamelo_py.styles.fixes.velocity_nodes import prescribe_mapped
 
 
 class HeatFix(Fix):
-    """A fix that requires heat flow."""
-
     published = ("s",)
 
     def __init__(self, hub: Hub, group: Any, *formulas: Any):
@@ -62,7 +60,7 @@ MANY = 1_000_000  # points of a solid above which the check is skipped
 
 
 def hold_node(capacity, T, T_star, flow, value, before, dt, share):
-    """Set T* to the value; the total is the heat per time needed."""
+    """The total is the heat per time needed."""
     return T, value, flow, capacity * (value - T_star) / dt
 
 
@@ -81,8 +79,8 @@ class TemperatureNodes(HeatFix):
 
     Notes
     -----
-    Publishes the heat per time that this needs as ID_s. Of several such fixes on a node, the last
-    decides and gets its heat.
+    Publishes the heat per time needed as ID_s. Of several such fixes on a node, the last decides
+    and gets its heat.
 
     See Also
     --------
@@ -103,7 +101,7 @@ class TemperatureNodes(HeatFix):
 
 
 def hold_point(capacity, T, face, supply, value, other, dt):
-    """Set the temperature of the point to the value, whatever the heat flow."""
+    """Whatever the heat flow."""
     return 0.0, supply, value
 
 
@@ -137,13 +135,11 @@ class TemperatureParticles(HeatFix):
 
 
 def heat(capacity, T, face, supply, value, other, dt):
-    """Apply the flux through one face of the point."""
+    """Through one face of the point."""
     return 1.0, supply + face * value, T
 
 
 class FacesOfPoints(HeatFix):
-    """Base of fixes that act through one face of each point."""
-
     by_sizes = True
 
     def defined(self) -> None:
@@ -173,7 +169,7 @@ class HeatFluxParticles(FacesOfPoints):
     group
         Group of points: a single layer along the surface.
     q
-        Heat per area and time, negative if it leaves the body. A number or a formula of x, y, z,
+        Heat per area and time, negative if it leaves the body: a number or a formula of x, y, z,
         x0, y0, z0, time and published values.
 
     Example
@@ -184,10 +180,9 @@ class HeatFluxParticles(FacesOfPoints):
     -----
     A point has one outer face, the side of a cube of its volume; in 1D, the whole section. A point
     at an edge of the body has two and needs two fixes. In axisymmetry the face is at the radius of
-    the point, slightly inside the surface. The program prints the area that the group covers: on
-    curved surfaces it depends on the layer in the group (0.66 to 1.44 of the surface);
-    edge_heat_flux uses the area of the surface. Publishes the heat per time (in 2D per thickness,
-    in axisymmetry per radian) as ID_s.
+    the point, slightly inside the surface. The printed area of the group depends on its layer on
+    curved surfaces (0.66 to 1.44 of the surface); edge_heat_flux uses the area of the surface.
+    Publishes the heat per time (in 2D per thickness, in axisymmetry per radian) as ID_s.
 
     See Also
     --------
@@ -204,7 +199,7 @@ class HeatFluxParticles(FacesOfPoints):
 def exchange(capacity, T, face, supply, value, other, dt):
     """Newton's law of cooling through one face of the point, at its temperature after the step.
 
-    With the temperature before the step, a large coefficient would cool the point below the fluid.
+    With the temperature before, a large coefficient would cool the point below the fluid.
     """
     if not capacity > 0:
         return 1.0, supply, T
@@ -223,7 +218,7 @@ class ConvectionParticles(FacesOfPoints):
         Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z,
         x0, y0, z0, time and published values.
     T_inf
-        Temperature of the surrounding fluid; a number or a formula likewise.
+        Temperature of the surrounding fluid, likewise.
 
     Example
     -------
@@ -231,8 +226,7 @@ class ConvectionParticles(FacesOfPoints):
 
     Notes
     -----
-    The faces of points are defined as in heat_flux_particles. Publishes the heat per time into all
-    points as ID_s.
+    Faces are as in heat_flux_particles. Publishes the heat per time into all points as ID_s.
 
     See Also
     --------

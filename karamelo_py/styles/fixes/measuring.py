@@ -15,7 +15,7 @@ def force_of_nodes(mass, v, v_star, force, value, before, dt, share):
 
 
 def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
-    """The total is the momentum divided by the time that forces act."""
+    """Momentum over the time that forces act."""
     return v, x, mass * v / kick
 
 
@@ -65,9 +65,9 @@ class CheckSolution(Fix):
 
     Notes
     -----
-    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the present error; ID_x = sum dt sum V0
-    |u - u_exact|^2 and ID_y = sum dt sum V0 |u_exact|^2 over the outputs so far; ID_z = sqrt(ID_x /
-    ID_y), the relative error of the history.
+    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the present error; over the outputs so
+    far ID_x = sum dt sum V0 |u - u_exact|^2, ID_y = sum dt sum V0 |u_exact|^2, and the relative
+    error ID_z = sqrt(ID_x / ID_y).
     """
 
     syntax = "group, ux[, uy[, uz]]"

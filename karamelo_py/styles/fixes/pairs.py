@@ -24,7 +24,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.grip import Gripping
 
-SENT = 350  # bytes per point, sent to the process that searches for pairs
+SENT = 350  # bytes per point, to the process that searches for pairs
 
 
 def check_pair(solid1: Solid, solid2: Solid) -> None:
@@ -34,10 +34,7 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 
 
 class PairContact(Gripping):
-    """Base of fixes for contact between the points of two solids.
-
-    With several processes, the first one searches for pairs among all points that may touch.
-    """
+    """Contact between the points of two solids; rank 0 searches for pairs."""
 
     by_sizes = True
 
@@ -66,7 +63,7 @@ class PairContact(Gripping):
         self._reach = max(solid.h for solid in self.solids)
 
     def law(self) -> NamedTuple:
-        """Return the tag of :mod:`karamelo_py.points.bodies` for the force between two points.
+        """Tag of :mod:`karamelo_py.points.bodies` for the force between two points.
 
         Requested in each step: constants of materials may change between runs.
         """
@@ -97,7 +94,7 @@ class PairContact(Gripping):
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
-        """Count the points that may touch others now: one process searches all of them."""
+        """Number of points that may touch others now: one process searches all of them."""
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
@@ -177,24 +174,24 @@ class ContactMinimizePenetration(PairContact):
     -----
     Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite.
 
-    Points are spheres (in 2D disks). Their radius R is half the side of a cube (in 2D a square) of
+    Points are spheres (in 2D disks) with a radius R of half the side of a cube (in 2D a square) of
     their present volume. Two points with the penetration p = R1 + R2 - |x2 - x1| > 0 get the force
-    m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction is at most
-    mu times this force, against the slip (de Vaucorbeil & Nguyen 2021, "Modelling contacts with a
-    total Lagrangian material point method"). It stops and reverses the slip: a load that friction
-    can hold stays at rest, and yields by mu p before it slides.
+    m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction, at most
+    mu times this force, stops and reverses the slip (de Vaucorbeil & Nguyen 2021, "Modelling
+    contacts with a total Lagrangian material point method"): a load that it can hold stays at rest,
+    and yields by mu p before it slides.
 
-    dt is the step of the scene, not a step that is shortened to end a run on time. If steps drop
-    suddenly, as by set_dt, it drops by 1 % of the time.
+    dt is the step of the scene, not one shortened to end a run on time. If steps drop suddenly, as
+    by set_dt, it drops by 1 % of the time.
 
-    A surface of spheres is rough and resists sliding. The force on a block (two points per cell and
-    direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces
-    inclined to the grid lock: on a slope of 20 degrees with mu = 0 a block sticks, and with
-    points=cut it accelerates by 2.8 instead of 3.4. The program therefore warns of a coefficient.
-    For correct friction use method ulmpm/contacts.
+    A surface of spheres is rough. The force on a block (two points per cell and direction) is 0.19,
+    0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces inclined to the grid lock:
+    on a slope of 20 degrees with mu = 0 a block sticks, and with points=cut it accelerates by 2.8
+    instead of 3.4. So a coefficient gives a warning; for correct friction use method
+    ulmpm/contacts.
 
-    Pairs are found with cells, so the cost is proportional to the number of points. With several
-    processes, the first one searches among all points that may touch.
+    The cost is proportional to the number of points. With several processes, the first one searches
+    among all points that may touch.
 
     See Also
     --------
@@ -253,8 +250,8 @@ class ContactHertz(PairContact):
     -----
     Points are spheres as in contact/minimize_penetration. Two points that overlap by p repel each
     other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 +
-    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. The force is for single points: bodies overlap
-    noticeably before it is large, and a fast body may pass through.
+    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. For single points: bodies overlap noticeably
+    before it is large, and a fast body may pass through.
 
     Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. With
     several processes, the first one searches among all points that may touch.
@@ -284,10 +281,10 @@ class ContactFriction(Fix):
     Parameters
     ----------
     solid1, solid2
-        IDs of the two solids. Other pairs remain frictionless; one fix per pair.
+        IDs of the two solids; one fix per pair, other pairs are frictionless.
     mu
-        Coefficient of friction (Coulomb): the tangential force is at most mu times the normal
-        force. The words ``no-slip`` make the solids stick while they are pressed together.
+        Coefficient of friction (Coulomb), a bound of tangential over normal force; or ``no-slip``:
+        the solids stick while pressed together.
 
     Example
     -------

@@ -36,7 +36,7 @@ class PythonFunction:
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """Find the function that `argument` names; modules next to the script come first."""
+        """Modules next to the script come first."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
@@ -78,17 +78,16 @@ class Python(Fix):
     function
         ``module.function``; the module is next to the script or installed.
     moment
-        When it is called in a step. The default is ``initial_integrate`` for points, where
-        ``points.force`` accepts forces, and ``post_update_grid_state`` for nodes, where
+        When it is called in a step. Default for points: ``initial_integrate``, where
+        ``points.force`` accepts forces; for nodes: ``post_update_grid_state``, where
         ``nodes.velocity_update`` accepts velocities.
 
     Notes
     -----
-    The function gets a view of the group: dt, time, and arrays with a row per member. Points have
-    position, velocity, mass, force and more; nodes have position, velocity, velocity_update, mass,
-    force and more. Changes to these arrays take effect. The return value is published: a number as
-    ID, up to three as ID_x, ID_y, ID_z. The page on plug-ins describes the views in full. A step
-    costs some ten microseconds more, plus the time of the function.
+    The function gets a view of the group: dt, time, and arrays with a row per member (position,
+    velocity, mass, force ...; of nodes also velocity_update), described on the page on plug-ins.
+    Changes to these arrays take effect. The return value is published: a number as ID, up to three
+    as ID_x, ID_y, ID_z. A step costs some ten microseconds more, plus the time of the function.
 
     With several processes all points are gathered in each step. If the function treats each point
     or node separately and moves no points, write ``pull.point_by_point = True`` after it: each
@@ -96,10 +95,10 @@ class Python(Fix):
     (n,) or (n, k) over all points.
 
     Restart files hold values that the function stores between steps, if ``remembers = ("taken",
-    "left")`` names them: variables in the module, or attributes in the class of a callable object.
-    Possible values: numbers, texts, arrays, NumPy generators, and lists, tuples, sets and
-    dictionaries of these. The first restart file warns of other such data that has changed.
-    Defaults of arguments, other objects, other modules, and ``np.random`` itself are not checked.
+    "left")`` names them: variables in the module, or attributes in the class of a callable object,
+    with numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these.
+    The first restart file warns of other such data that has changed. Defaults of arguments, other
+    objects, other modules, and ``np.random`` itself are not checked.
 
     Example
     -------
@@ -148,7 +147,6 @@ class Python(Fix):
 
     @property
     def state(self) -> dict[str, Any]:
-        """Values that the function stores and names."""
         return {name: getattr(self.keeper.owner, name) for name in self.keeper.names}
 
     @state.setter
@@ -232,7 +230,7 @@ class Keeper:
         self.seen = self._look()
 
     def forgotten(self) -> list[str]:
-        """Return the names that have changed since the last call and are not remembered."""
+        """Names that have changed since the last call and are not remembered."""
         before, self.seen = self.seen, self._look()
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 

@@ -1,4 +1,4 @@
-"""Fixes that set node velocities, and compute reaction for the force that holds nodes."""
+"""Fixes that set node velocities, and compute reaction."""
 
 import re
 from typing import Annotated, Any
@@ -35,7 +35,7 @@ def prescribe_mapped(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
-    """Limit v* to at most the value; the total is the reaction, which pushes backwards."""
+    """The total is the reaction, which pushes backwards."""
     allowed = min(v_star, value)
     return v, allowed, force, mass * (allowed - v_star) / dt
 
@@ -50,13 +50,13 @@ def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
 
 
 def prescribe_at_least(mass, v, v_star, force, value, before, dt, share):
-    """Limit v* to at least the value; the total is the reaction, which pushes forwards."""
+    """The total is the reaction, which pushes forwards."""
     allowed = max(v_star, value)
     return v, allowed, force, mass * (allowed - v_star) / dt
 
 
 def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
-    """Limit the re-mapped velocity likewise (see `prescribe_mapped_at_most`)."""
+    """See `prescribe_mapped_at_most`."""
     allowed = value if v_star == value else max(v, value)
     return allowed, allowed, force, 0.0
 
@@ -99,10 +99,9 @@ class VelocityNodes(Fix):
         published values. NULL leaves a component free. With ``leq`` or ``geq`` before it, the
         velocity is an upper or lower bound: nodes within it are free.
     mu
-        Coefficient of friction (Coulomb): a number or a formula. The wall is at rest in the
-        directions that are NULL. On nodes that it holds or bounds, the tangential force is at most
-        mu times the normal force. With `velocity` (not ``geq`` or ``leq``), friction also acts
-        under tension.
+        Coefficient of friction (Coulomb): a number or a formula. The wall is at rest in NULL
+        directions. On nodes that it holds or bounds, the tangential force is at most mu times the
+        normal force. With `velocity` (not ``geq`` or ``leq``), friction also acts under tension.
 
     Example
     -------
@@ -115,10 +114,10 @@ class VelocityNodes(Fix):
     Notes
     -----
     Publishes ID_x, ID_y, ID_z: the force that holds the nodes, with friction. Frictional work heats
-    points with a temperature. The wall takes no heat.
+    points with a temperature; the wall takes no heat.
 
-    Of several such fixes on a node in one direction, the last decides: it has the whole reaction of
-    the node, and only its friction acts. A bound that is not reached exerts no force.
+    Of several such fixes on a node in one direction, the last decides: it has the node's whole
+    reaction, and only its friction acts. A bound that is not reached exerts no force.
 
     A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
     in cells next to faces whose nodes are all held or bounded, so a group should extend to the last

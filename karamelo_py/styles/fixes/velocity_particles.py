@@ -1,4 +1,4 @@
-"""Fixes that set point velocities, with a warning before the run if several conflict."""
+"""Fixes that set point velocities, with a warning of conflicts before the run."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -56,13 +56,13 @@ class VelocityParticles(VelocityOfPoints):
     Notes
     -----
     Publishes the force that holds the points as ID_x, ID_y, ID_z. Of several such fixes on a point
-    in one direction, the last decides. It also overrides initial velocities and held nodes; a run
-    warns of this before its first step.
+    in one direction, the last decides. It also overrides initial velocities and held nodes, with a
+    warning before the first step.
 
     Use two cells of points or more, FLIP, and a scheme that maps velocities again (musl). The rest
     of a solid slips past a grip of one cell when squeezed by 20 % in ulmpm (linear,
-    quadratic-spline, cubic-spline); a bar in tlmpm is pulled with 94 % of the force. With APIC and
-    its kin, or usl, it slips past any grip.
+    quadratic-spline, cubic-spline); a bar in tlmpm is pulled with 94 % of the force. With affine
+    transfers such as APIC, or usl, it slips past any grip.
 
     See Also
     --------
@@ -93,7 +93,7 @@ class InitialVelocityParticles(VelocityOfPoints):
     Notes
     -----
     With transfers that store a velocity gradient or affine velocity (APIC, TPIC and others), points
-    also get the gradient of the formulas. The first step then preserves an affine motion.
+    also get the gradient of the formulas, so the first step preserves an affine motion.
 
     See Also
     --------
@@ -120,7 +120,7 @@ class InitialVelocityParticles(VelocityOfPoints):
 def gradient(
     evaluate: Callable, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
 ) -> np.ndarray:
-    """Return derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
+    """Derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
 
     At the reference position, x and x0 are the same coordinate.
     """
@@ -139,7 +139,7 @@ def gradient(
 
 
 def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
-    """Find the fixes that this one overrides, with the data for the warning."""
+    """The fixes that this one overrides, with the data for the warning."""
     fixes = list(simulation.hub.fixes.values())
     first = [one for one in simulation.fixes.new if isinstance(one, VelocityOfPoints)]
     if not (fix.leads_points or fix in first):
@@ -208,7 +208,7 @@ def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -
 
 
 def _within(simulation: Any, support: Any, driven: Any) -> np.ndarray:
-    """Return the ids of the driven points in cells whose corners are all held."""
+    """Ids of the driven points in cells whose corners are all held."""
     hub, method = simulation.hub, simulation.hub.update.method
     still = np.zeros(support.group.total(), np.bool_)
     still[support.nodes] = True

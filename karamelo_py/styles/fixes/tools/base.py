@@ -23,7 +23,7 @@ class ToolFix(PointForces):
     """Base of fixes that push points, taken as small cubes (in 2D squares)."""
 
     follows_points = True
-    needs_stiffness = False  # whether the force scales with the point's shear modulus
+    needs_stiffness = False  # the force scales with the point's shear modulus
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -37,7 +37,7 @@ class ToolFix(PointForces):
             )
 
     def behind(self, points: PointTable) -> tuple[int, float]:
-        """Return the number of points in the tool now, and the largest depth."""
+        """Number of points in the tool now, and the largest depth."""
         depth = self.depth_of(points)
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
@@ -76,7 +76,6 @@ def _shear_modulus(solid: Solid) -> float:
 
 
 def unit(vector: np.ndarray) -> np.ndarray:
-    """Return a vector (d,) of length 1; a zero vector is refused."""
     length = np.linalg.norm(vector)
     if not (np.isfinite(length) and length > 0):
         raise ScriptError("the normal has no direction", expected="a vector that is not 0")
@@ -103,7 +102,7 @@ class PlaneTool(ToolFix):
             unit(self.now(*self.towards))
 
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Return the present depth (n,) of points behind the plane, and its normal (d,)."""
+        """Present depth (n,) of points behind the plane, and its normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_place(points, self.origin) @ normal), normal
 
@@ -129,9 +128,9 @@ class BallTool(ToolFix):
     kind
         The word ``sphere``.
     R
-        Radius of the ball: a number or a formula of time.
+        Radius: a number or a formula of time.
     x, y, z
-        Its centre: numbers or formulas of time; z is 0 in 2D.
+        Centre: numbers or formulas of time; z is 0 in 2D.
     """
 
     published = ("x", "y", "z", "s")

@@ -24,7 +24,7 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     x, y, z
         A point of the plane: numbers or formulas of time; z is 0 in 2D.
     nx, ny, nz
-        Its normal, of any length, towards the side where the solid is.
+        Its normal, of any length, towards the solid.
     mu
         Coefficient of friction (Coulomb).
 

@@ -36,7 +36,7 @@ class ContactSurface(StiffTool):
         Coefficient of friction (Coulomb); default 0.
     way
         ux, uy, uz, one per dimension of the domain: displacement of the region, formulas of time.
-        Default: it does not move.
+        Default: none. A region does not rotate.
 
     Example
     -------
@@ -49,14 +49,13 @@ class ContactSurface(StiffTool):
 
     Points are spheres (in 2D disks) with a radius of half the side of a cube of their present
     volume. A point at the depth p that approaches with the speed v gets the force m (v / dt + p /
-    (10 dt^2)) out of the region. This stops it within one step and removes 10 % of p. The force
-    never pulls. Friction is at most mu times this force. It stops the slip on the moving region and
-    reverses 10 % of the slip distance per step, whatever loads the point: a load that friction can
-    hold stays at rest, and yields by mu p before it slides. dt is as in
-    contact/minimize_penetration.
+    (10 dt^2)) out of the region, never a pull: it stops within one step, and 10 % of p is removed.
+    Friction, at most mu times this force, stops the slip on the moving region and reverses 10 % of
+    the slip distance per step: a load that it can hold stays at rest, and yields by mu p before it
+    slides. dt is as in contact/minimize_penetration.
 
     The force acts in the direction in which the depth decreases fastest. A point deeper than a
-    cell, or in the middle of a thin region, ends the run. A region does not rotate.
+    cell, or in the middle of a thin region, ends the run.
 
     A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.56 in tlmpm and 1.57 in
     ulmpm (exact 1.541; points=cut). Its energy is balanced to 0.3 %. It sinks in by ten times the
@@ -110,7 +109,7 @@ class ContactSurface(StiffTool):
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
 
     def faces_of(self) -> np.ndarray | None:
-        """Return the present faces (m, d, d) of the region, if it consists of faces."""
+        """Present faces (m, d, d) of the region, if any."""
         skin = self.region.skin
         return None if skin is None else skin.faces + self.moved(1.0)[0]
 

@@ -20,8 +20,7 @@ class CuttingTool(ToolFix):
     Parameters
     ----------
     K
-        Stiffness of the tool, relative to the shear modulus of the point: a number or a formula of
-        time.
+        Stiffness relative to the shear modulus of the point: a number or a formula of time.
     x_tip, y_tip, z_tip
         The tip: numbers or formulas of time; z is 0.
     vx, vy, vz
@@ -35,8 +34,8 @@ class CuttingTool(ToolFix):
 
     Notes
     -----
-    A point between the two faces, at the depth p from the nearer one, gets the force K G (1 - D) p
-    out of it (de Vaucorbeil & Nguyen 2021). G is the shear modulus and D the damage. Publishes the
+    A point between the faces, at the depth p from the nearer one, gets the force K G (1 - D) p out
+    of it, with the shear modulus G and the damage D (de Vaucorbeil & Nguyen 2021). Publishes the
     force on the points as ID_x, ID_y, ID_z.
 
     See Also
@@ -73,7 +72,7 @@ class CuttingTool(ToolFix):
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
 
     def _depths(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Return the depths (n, 2) of points below both faces, and the normals (2, 2)."""
+        """Depths (n, 2) of points below both faces, and the normals (2, 2)."""
         normals, tip = self._faces()
         return (tip - points.position.astype(float)) @ normals.T, normals
 

@@ -18,8 +18,7 @@ class ImpenetrableSurface(PlaneTool):
     Parameters
     ----------
     K
-        Stiffness of the wall, relative to the shear modulus of the point: a number or a formula of
-        time.
+        Stiffness relative to the shear modulus of the point: a number or a formula of time.
     xs, ys, zs
         A point of the plane: numbers or formulas of time; z is 0 in 2D.
     nx, ny, nz
@@ -31,9 +30,9 @@ class ImpenetrableSurface(PlaneTool):
 
     Notes
     -----
-    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal. G
-    is the shear modulus, D the damage, V the present volume and d the number of dimensions.
-    Publishes the force on the points as ID_x, ID_y, ID_z.
+    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal,
+    with the shear modulus G, damage D, present volume V and number of dimensions d. Publishes the
+    force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------

@@ -45,9 +45,9 @@ class Indent(BallTool):
 
     Notes
     -----
-    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it. In
-    LAMMPS, ``fix indent`` does the same, but not per mass. Publishes the force on the points as
-    ID_x, ID_y, ID_z and the number of pushed points as ID_s.
+    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it (in
+    LAMMPS' ``fix indent`` not per mass). Publishes the force on the points as ID_x, ID_y, ID_z and
+    the number of pushed points as ID_s.
 
     See Also
     --------

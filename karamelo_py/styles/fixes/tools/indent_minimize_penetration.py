@@ -30,8 +30,8 @@ class IndentMinimizePenetration(StiffTool, BallTool):
     Notes
     -----
     Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
-    volume. A point at the distance r from the centre overlaps by p = R + rp - r. With p > 0 it gets
-    the force m p / dt^2, which moves a free point out within one step. Friction and dt are as in
+    volume. A point at the distance r from the centre, with the overlap p = R + rp - r > 0, gets the
+    force m p / dt^2, which moves a free point out within one step. Friction and dt are as in
     contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
 
     Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s, one face of

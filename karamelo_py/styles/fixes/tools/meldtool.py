@@ -20,8 +20,8 @@ class MeldTool(ToolFix):
     Parameters
     ----------
     K
-        Stiffness of the tool in shear moduli of the point, times a length: a number or a formula of
-        time, as are all the following.
+        Stiffness in shear moduli of the point, times a length: a number or a formula of time, as
+        are all the following.
     axis
         The word x, y or z: the direction of the axis.
     half_width
@@ -42,8 +42,8 @@ class MeldTool(ToolFix):
     Notes
     -----
     The tool is a cylinder without its channel. A point inside gets the force K G (1 - D) times the
-    shortest way out: into the channel, out of the cylinder, or below its end. G is the shear
-    modulus and D the damage. Publishes the force on the points as ID_x, ID_y, ID_z.
+    shortest way out (into the channel, out of the cylinder, or below its end), with the shear
+    modulus G and the damage D. Publishes the force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------

@@ -28,9 +28,8 @@ class NeumannBcMech(ToolFix):
     Notes
     -----
     A point has one outer face, the side of a cube of its present volume: V^(2/3) in 3D, V^(1/2) in
-    2D, the whole section in 1D. In axisymmetry the face is at the radius of the point. Points lie
-    half a side inside the surface on which the real load acts. Publishes the total force as ID_x,
-    ID_y, ID_z.
+    2D, the whole section in 1D; in axisymmetry at the radius of the point. Points lie half a side
+    inside the loaded surface. Publishes the total force as ID_x, ID_y, ID_z.
 
     See Also
     --------

@@ -14,8 +14,6 @@ CLOSE = 0.5  # radii off the surface, within which bouncing points retain their 
 
 
 class StiffTool(Gripping, ToolFix):
-    """Base of tools that stop a point within a step, with friction."""
-
     by_sizes = True
     impulsive = True
     kind_of_grip = GripOfTool
@@ -34,8 +32,8 @@ class StiffTool(Gripping, ToolFix):
     ) -> np.ndarray:
         """Forces (n, d) that move points by `push` (n,) along `normal` in a step: m push / dt^2.
 
-        Friction is at most mu times this force (de Vaucorbeil & Nguyen 2021). It stops the slip on
-        a tool of this `velocity`, and reverses the fraction `share` of a point's slip distance: of
+        Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops the slip on a
+        tool of this `velocity`, and reverses the fraction `share` of a point's slip distance: of
         the positions (n, d) `seen`, minus the displacement `led` by the tool.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
