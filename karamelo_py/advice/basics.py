@@ -23,8 +23,6 @@ class Body(NamedTuple):
 
 
 class BasicFacts:
-    """Parts and motions of a scene before a run of `duration` (300 steps if infinite)."""
-
     def __init__(self, hub: Hub, simulation: Simulation, duration: float):
         self.hub, self.simulation = hub, simulation
         self.duration = duration if isfinite(duration) else 300 * simulation.dt

@@ -33,8 +33,6 @@ class Noise(NamedTuple):
 
 
 class Lag(NamedTuple):
-    """A free rotation that points follow too slowly."""
-
     share: float = 0.0  # of the angular velocity
     turns: float = 0.0
 
@@ -62,7 +60,6 @@ def vibrating(facts: BasicFacts) -> list[Body]:
 
 
 def drift_of(facts: BasicFacts) -> Noise | None:
-    """The energy gain by drift, also if tolerable."""
     if not (facts.scheme.traits.keeping and facts.moves and facts.kept > 0.9) or _thrown(facts):
         return None
     limits = drift_limits(facts.basis)
@@ -164,7 +161,6 @@ def lattice_at(facts: BasicFacts, body: Body) -> Lattice:
 
 
 def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
-    """Fixes that prescribe velocities, and positions (n, d) of their nodes at a body."""
     lattice, low, high = lattice_at(facts, body), body.motion.low, body.motion.high
     for fix in facts.hub.fixes.values():
         if not fix.prescribes_velocity:

@@ -56,7 +56,6 @@ def expected(facts: BasicFacts) -> Crossing:
 
 
 def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Speed and duration if there is initial stress."""
     points = facts.simulation.points
     stored = points.total("stored")
     if facts.simulation.step or not stored > 0:

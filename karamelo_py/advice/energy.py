@@ -23,7 +23,6 @@ def not_watched(why: str) -> str:
 
 
 def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
-    """Likely cause of an energy gain ("" if unknown) and its fix."""
     update, method = hub.update, hub.update.method
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
@@ -119,7 +118,6 @@ def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
 
 
 def taken_by(hub: Hub) -> list[str]:
-    """Choices that dissipate energy without a record."""
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")

@@ -218,7 +218,6 @@ def _loose(simulation: Simulation, number: int, x: np.ndarray, reach: float) -> 
 
 
 def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
-    """The domain of a point is folded."""
     s = simulation.setup
     if not s.frame.moves or carried(s.basis, s.kin) == 0:
         return False

@@ -36,8 +36,6 @@ class Vibration(NamedTuple):
 
 
 class SceneFacts(BasicFacts):
-    """Facts of a scene before a run of `duration`, computed on demand."""
-
     def parts(self) -> Iterator[tuple[Any, Any]]:
         """Each part once, with its material if it is part of a law."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
@@ -54,7 +52,6 @@ class SceneFacts(BasicFacts):
         yield from ((kind, None) for kind in dict.fromkeys(kinds))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
-        """Advice of one kind; with `of_laws`, only of laws and initial states."""
         foreign = {piece.kind: piece for piece in foreign_parts(self.hub)}
         for piece, owner in self.parts():
             if of_laws and owner is None and not (isinstance(piece, Fix) and piece.first_step_only):
@@ -134,7 +131,6 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def vibration(self) -> Vibration:
-        """Vibration with the largest strain amplitude, rate L/(2 c)."""
         most = Vibration(0.0, 0.0)
         for motion in self.motions if self.waves > 0 else ():
             strain = motion.rate * motion.size / (2 * self.waves)

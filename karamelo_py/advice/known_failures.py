@@ -200,7 +200,6 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
-    """Warn once of likely failures in a run of `duration` and later ones."""
     _warn_about_groups(hub, simulation)
     refuse_endless_speeds(simulation)
     scene = SceneFacts(hub, simulation, duration)
@@ -270,7 +269,6 @@ def _tell(hub: Hub, advice: Iterable[Advice]) -> None:
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
-    """The known durations of later runs of the same scene."""
     present = step_of(hub, False).scene
     later = [step for step in later_steps(hub) if step.scene == present]
     spans = [min(s.span[0], s.span[1] * (s.fixed_dt or simulation.dt)) for s in later]
@@ -317,7 +315,6 @@ def _warn_about_precision(s: SceneFacts) -> None:
 
 
 def _out_of_reach(hub: Hub, simulation: Simulation, fix: Fix) -> bool:
-    """No point is in reach of a fix's nodes, taken as a box."""
     x = places_of(hub, fix.nodes)[:, : hub.domain.dimension]
     method, setup = hub.update.method, simulation.setup
     reach = (method.basis.traits.cells + 1) / 2 * max(lattice.h for lattice in hub.lattices)

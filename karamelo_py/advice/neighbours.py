@@ -20,8 +20,6 @@ STEPS = 500  # the first failed after 800
 
 
 class Uneven(NamedTuple):
-    """The pair of bodies that most exceeds the light one's stable step."""
-
     heavy: str = ""
     light: str = ""
     ratio: float = 1.0  # of densities

@@ -34,7 +34,6 @@ LOADED = 24 << 20  # bytes of compiled loops and imported modules
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
-    """Needs of a run to `end_time`: fields, stages, tiles, memory, first dt."""
     program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)

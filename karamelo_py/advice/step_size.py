@@ -34,7 +34,6 @@ def blows_up(simulation: Simulation) -> bool:
 
 
 def what_follows(simulation: Simulation, step: float) -> str:
-    """Effects of a `step` above the stable one for moving bodies."""
     stable = _stable_in_place(simulation)
     if step <= stable:
         return (
@@ -55,14 +54,12 @@ def own_step_instead_of(simulation: Simulation) -> float | None:
 
 
 def words_of_own_step(simulation: Simulation, step: float) -> str:
-    """The default step, and the one after a quarter of a cell of motion."""
     after = own_step(simulation, still=False)
     far = f", {after:.6g} once points have gone a quarter of a cell"
     return f"{step:.6g}" + (far if after < step else "")
 
 
 def step_after_motion(simulation: Simulation) -> float:
-    """Fraction of the first step that is left after a quarter of a cell of motion."""
     update, clock = simulation.hub.update, simulation.control.clock[0]
     if update.fixed_dt is not None or update.dt_factor is not None:
         return 1.0
@@ -75,7 +72,6 @@ def stable_step(simulation: Simulation, limit: float) -> float:
 
 
 def own_step_instead(simulation: Simulation, command: str = "") -> str:
-    """Fix for a step above the limit, by the command that set it."""
     update = simulation.hub.update
     if command == "set_dt" or (not command and update.fixed_dt is not None):
         return f"set_dt({own_step(simulation):.3g}) or less, or remove set_dt"

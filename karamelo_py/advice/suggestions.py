@@ -33,7 +33,6 @@ LONG = 10.0  # seconds of output worth a suggestion
 
 
 def seconds_of_step(hub: Hub, count: int) -> float:
-    """Estimate of the least core seconds per step."""
     return POINT * count + sum(fix.seconds() for fix in hub.fixes.values())
 
 
@@ -274,7 +273,6 @@ def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
 
 
 def _both_sides(solid: Solid, sides: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Each point has a mirror image."""
     cells = np.rint(sides(solid.x0) * (1e6 / solid.h)).astype(np.int64)
     return bool((np.unique(cells, axis=0, return_counts=True)[1] == 2).all())
 

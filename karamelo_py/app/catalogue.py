@@ -67,7 +67,6 @@ def print_styles(words: Sequence[str]) -> int:
 
 
 def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
-    """Explain a name, or a family and a name."""
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
             with registry.modules_of(Path()):
@@ -190,7 +189,7 @@ def _explain(family: str, name: str) -> int:
 
 
 def _about(word: str) -> list[tuple[str, str]]:
-    """Find styles by a part of their name, then by summary, else by text."""
+    """By a part of the name, then by summary, else by text."""
     topics = {synonym: topic for topic, alike in table()["topics"].items() for synonym in alike}
     word = topics.get(word.lower(), word)
     words = [term for term in word.split() if len(term) > 2] or [word]  # without a, of, ...
@@ -208,7 +207,6 @@ def _about(word: str) -> list[tuple[str, str]]:
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
-    """Arguments of this name, else with this value, by style."""
     parameters = {}
     for family in families():
         for name in registry.names(family):

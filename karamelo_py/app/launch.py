@@ -128,8 +128,6 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
 
 
 class Launcher:
-    """The processes of a run as one: signals, exit status, message."""
-
     def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
         self.links: dict[socket.socket, Message] = {}  # empty until the rank is known
@@ -255,7 +253,6 @@ _link: socket.socket | None = None  # to the launcher
 
 
 def keep_to_oneself() -> None:
-    """Silence all ranks but 0; connect to the launcher."""
     size, rank = mpi.launched()
     if size > 1:
         _report_to_launcher(rank)
@@ -372,7 +369,6 @@ def _signed(text: str, rank: int, size: int) -> str:
 
 
 def _join(asked: int | None, ends: Callable[[BaseException], None]) -> mpi.MpiComm:
-    """Connect to the processes started by mpiexec; `ends` as in `MpiComm`."""
     size, _ = mpi.launched()
     if asked is not None and asked != size:
         raise ScriptError(

@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
-    """Explain, for an unknown name, where names missing in dumps come from."""
+    """Names missing in dumps come from logs or the script."""
     try:
         yield
     except ScriptError as error:
@@ -264,8 +264,6 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> Look:
 
 
 class Drawing:
-    """Look, log and empty picture of dumps, from the first snapshot."""
-
     def __init__(
         self, options: argparse.Namespace, files: Sequence[Path], scene: Hub, first: Snapshot
     ):
@@ -275,7 +273,7 @@ class Drawing:
         self.picture = self._picture(first)
 
     def chosen(self, snapshot: Snapshot) -> Snapshot:
-        """Select the points to draw, and add the column of a colouring formula.
+        """Points to draw, with the column of a colouring formula.
 
         Sets the scene to the snapshot's time and log.
         """
@@ -311,7 +309,6 @@ class Drawing:
         return snapshot._replace(columns=columns)
 
     def _picture(self, first: Snapshot) -> Any:
-        """Make an empty picture with position and colours that fit all snapshots."""
         from karamelo_py.output import outlines, pictures
 
         look, scene, with_script = self.look, self.scene, self.options.script is not None

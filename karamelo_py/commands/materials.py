@@ -47,7 +47,7 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
 
 
 def judge(hub: Hub, made: Material) -> None:
-    """Test the law of a plug-in, and warn of values that hardly any material has."""
+    """Test the law of a plug-in; warn of values that hardly any material has."""
     try_law(hub, made)
     with attributed(hub):
         for doubt, hint in doubts(made.whole):
@@ -108,7 +108,7 @@ temperature = _part(
 
 
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
-    """Store the object made by the style under `ID`; refuse an ID in use first."""
+    """Refuses an ID in use first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
     values: dict = {}

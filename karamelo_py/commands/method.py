@@ -381,7 +381,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """Return the one of `words` that an argument names; variables of that name are ignored."""
+    """One of `words` that an argument names; variables of that name are ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

@@ -21,8 +21,6 @@ from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 
 class Solids(tuple):
-    """For signatures: one solid or all of them."""
-
     script_kind = "the ID of a solid, or all"
 
     @classmethod

@@ -235,8 +235,6 @@ def _check(command: str, condition: Expression) -> None:
 
 
 class EveryOrNever(Every):
-    """As `Every`, or 0."""
-
     script_kind = "a whole number of steps, time(T), or 0 for never"
 
     @classmethod

@@ -136,7 +136,6 @@ class Argument:
         return self._interpreter.knows(name)
 
     def part(self, text: str) -> Argument:
-        """The last occurrence of `text` in it."""
         start = self._raw.source.text.rindex(text, self._raw.start, self._raw.end)
         return self._from(start, start + len(text))
 

@@ -18,7 +18,6 @@ def wrong_count(
     arguments: Sequence[Argument],
     keywords: Sequence[str],
 ) -> ScriptError:
-    """Error for too few or too many `arguments` of `name`, or missing `keywords`."""
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()

@@ -34,7 +34,6 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
 
 
 def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:
-    """Error for a faulty style (``fix drag``), naming its package."""
     family, _, style = name.rpartition(" ")
     family = family or "command"
     origin = registry.origin(family, style) if registry.knows(family, style) else ""
@@ -74,7 +73,6 @@ def steps_to(error: BaseException) -> list[str]:
 
 
 def place_of(function: Callable) -> str:
-    """First line of a Python function: `` (spring.py:12)``."""
     code = function.__code__
     return f" ({Path(code.co_filename).name}:{code.co_firstlineno})"
 

@@ -10,8 +10,6 @@ from karamelo_py.language import signature
 
 @dataclass(frozen=True)
 class Help:
-    """Help about a command or style; `sections` by title, such as Example, Notes, See Also."""
-
     name: str
     syntax: str
     summary: str
@@ -25,7 +23,6 @@ class Help:
 
 
 def describe(target: Callable, name: str) -> Help:
-    """Help from signature and docstring of a command or style, and of its bases."""
     head, sections = sections_of(target.__doc__ or "")
     summary, _, text = head.partition("\n\n")
     noun = name.removeprefix("delete_").replace("_", " ")

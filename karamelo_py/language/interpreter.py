@@ -127,7 +127,6 @@ class Interpreter:
 
     @property
     def folders(self) -> list[Path]:
-        """Folders of input files: output, current, script's."""
         return [self.hub.folder, Path(), self.folder]
 
     def _run(self, text: str, name: str, path: Path | None = None) -> None:

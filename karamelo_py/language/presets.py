@@ -91,7 +91,6 @@ class Presets(dict[str, str]):
                 error.hint = f"{text}, and the script has a number, as in -var {name} {number}"
 
     def refuse_unused(self, statements: list[Statement]) -> None:
-        """Refuse a command-line variable that nothing reads or assigns."""
         scripts = list(self._scripts(statements, self._script.folder)) if self else [None]
         if None in scripts:
             return

@@ -25,8 +25,6 @@ When = Callable[[Any, Any], Any]
 
 
 class Advice(NamedTuple):
-    """A rule's words about a scene: what is wrong, costly or adds energy, and what to write."""
-
     name: str
     reason: str
     cure: str
@@ -61,7 +59,6 @@ def known_failure(
 
 
 def known_failures() -> Iterator[tuple[type, str, str, str]]:
-    """The known failures of loaded parts: part, name, reason and fix."""
     for (kind, part), some in _rules.items():
         for _, *words in some if kind == "failure" else ():
             name, reason, cure = (re.sub(r"\{[^{}]+\}", "…", text) for text in words)

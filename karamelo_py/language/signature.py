@@ -154,7 +154,6 @@ def style_of(
 def remade(
     hub: Scene, family: str, style: str, values: dict, arguments: Sequence[Argument]
 ) -> tuple[Any, dict]:
-    """Remake a law from its `values`, changed by ``name=value`` arguments; return both."""
     target, name = registry.find(family, style), f"{family} {style}"
     expected = {p.name: p for p in parameters(target)}
     bound: dict[str, list[Argument]] = {}
@@ -296,7 +295,6 @@ def syntax(target: Callable, name: str) -> str:
 
 
 def variants_of(style: Any) -> Mapping[str, Any]:
-    """Words that choose another class, or style by name."""
     return getattr(style, "variants", {})
 
 

@@ -280,7 +280,6 @@ def filled(statement: Any) -> str | None:
 
 
 def longer(name: str, arguments: Sequence[Any]) -> str | None:
-    """Complete the line of a style (``eos shock``) with too few arguments."""
     forms = table()["shorter"].get(name)
     if forms is None or not arguments:
         return None

@@ -41,8 +41,6 @@ class Grouped(Protocol):
 
 
 class Fields(PointTable):
-    """Tables, pieces and exact sums of all points, of `simulation` or the current arrays."""
-
     def __init__(self, hub: Scene, simulation: Any = None):
         self.hub = hub
         self._own = simulation
@@ -333,7 +331,6 @@ class ColumnFormula:
         return cls(hub, argument)
 
     def of(self, points: PointTable) -> np.ndarray:
-        """Value (n,) at each existing point."""
         columns = {name: points.particle(name) for name in self.columns}
         return self.formula.evaluate_columns(self.hub.values, columns)
 

@@ -21,7 +21,6 @@ _DISCARDED: ContextVar[Path | None] = ContextVar("discarded", default=None)
 
 @contextmanager
 def discarded() -> Iterator[None]:
-    """Write to a temporary folder and delete it: another process writes the real files."""
     with TemporaryDirectory() as folder:
         token = _DISCARDED.set(Path(folder))
         try:
@@ -112,7 +111,6 @@ def unwarned() -> Iterator[None]:
 
 @contextmanager
 def reported(path: Path, kind: str = "") -> Iterator[None]:
-    """Convert OSError on writing `path` to ScriptError."""
     try:
         yield
     except OSError as error:

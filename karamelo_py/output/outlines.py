@@ -20,13 +20,10 @@ Depth = Callable[[np.ndarray], np.ndarray]  # (n,) in a tool, at (n, d)
 
 
 class Tool(NamedTuple):
-    """Depth function, and faces (m, d, d) if any."""
-
     depth: Depth
     faces: np.ndarray | None = None
 
     def lines(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
-        """Lines (m, d) on the surface between two corners (d,)."""
         plane = len(lo) == 2
         if self.faces is None:
             contours = (
@@ -66,7 +63,6 @@ def _contours(x: np.ndarray, y: np.ndarray, z: np.ndarray, level: float) -> list
 
 
 def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Nodes (n,) around positions (n, d), and linear weights (n,)."""
     first = at.astype(int)
     for corner in product((0, 1), repeat=len(shape)):
         node = first + corner
@@ -126,7 +122,6 @@ class _Lattice(NamedTuple):
 
 
 def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
-    """Depths (n, m, k)."""
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     return depth(places.reshape(-1, 3)).reshape(places.shape[:3])
 
@@ -240,11 +235,9 @@ class Front:
         return tuple(np.clip((x[:, :2] - self.low) / self.cell, 0, last).astype(int).T)
 
     def beside(self, x: np.ndarray) -> np.ndarray:
-        """Heights at lines (n, 2) around the points."""
         return _largest(self.height, 2)[self._cells(x)]
 
     def outlines(self) -> list[np.ndarray]:
-        """Lines (m, 2) around the points."""
         filled = smoothed(np.isfinite(self.height).astype(float))
         across, up = (
             low + self.cell * (np.arange(n) + 0.5)

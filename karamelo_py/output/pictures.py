@@ -174,7 +174,6 @@ class Picture:
         )
 
     def show(self, snapshot: Snapshot, side: float, title: str, tools: Sequence[Tool] = ()) -> None:
-        """Set points, title and outlined `tools`; `side` is the size of a typical point."""
         if not self._laid_out:
             self._lay_out()
         everything = snapshot.columns

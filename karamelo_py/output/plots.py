@@ -36,8 +36,6 @@ class PlottedCurve(Rhythmic):
 
 
 class Plots(dict[str, PlottedCurve]):
-    """Curves by ID, and their file, if any; curves of the same quantity have common axes."""
-
     def __init__(self, hub: Scene):
         super().__init__()
         self.hub = hub

@@ -38,8 +38,6 @@ VECTORS = {
 
 
 class Part(NamedTuple):
-    """Points of a block, and their rows in a table."""
-
     block: Block
     rows: np.ndarray | None  # ascending; None: all points of the block
     places: np.ndarray | slice
@@ -78,7 +76,6 @@ class Rows(NamedTuple):
         return field.T
 
     def put(self, of: Callable[[Points], np.ndarray], values: np.ndarray) -> None:
-        """Scatter a field (n, ...) selected by `of`."""
         for block, rows, places in self.parts:
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
@@ -256,7 +253,6 @@ def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:
-    """Columns of some scenes only, without those `present`."""
     return [name for name, show in columns.items() if show is None and name not in present]
 
 

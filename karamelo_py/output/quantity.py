@@ -139,8 +139,6 @@ class Caption:
 
 
 class Logged(Quantity):
-    """A quantity, or the word ``limit``."""
-
     words = True
 
 

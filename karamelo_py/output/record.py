@@ -48,8 +48,6 @@ def processor() -> str:
 
 
 class RunRecord:
-    """Facts and messages of a script's runs, written at each begin and end (with a `path`)."""
-
     def __init__(self) -> None:
         self.path: Path | None = None
         self.is_asked_for = False  # also for a script that ends before its first run

@@ -27,8 +27,6 @@ class ByTime:
 
 
 class Rhythmic:
-    """Output at the interval `every`, last at `last_step`."""
-
     remembers = ("last_step", "passed")
     every: int | ByTime
     last_step: int | None = None

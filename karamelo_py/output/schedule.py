@@ -57,7 +57,6 @@ class Output:
         raise ScriptError(error, argument="file", expected="the name of another file")
 
     def claim(self, file: Path, writer: str) -> None:
-        """Reserve `file` for one writer; only restart files may be overwritten."""
         other = self.files.get(file)
         if other is not None and not other == writer == RESTART:
             raise ScriptError(
@@ -68,7 +67,7 @@ class Output:
         self.files[file] = writer
 
     def begin(self, *, within: bool = False) -> None:
-        """Write headers, and the first state unless the run continues `within` another."""
+        """The first state unless the run continues `within` another."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not self.plots:
@@ -89,7 +88,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write what is due; with `last`, everything not yet written."""
+        """With `last`, everything not yet written."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time

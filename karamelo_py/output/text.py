@@ -195,8 +195,6 @@ def _without_zeros(word):
 
 @intrinsic
 def _put_eight(text, at, word):
-    """Write the bytes of an integer, unaligned."""
-
     def codegen(builder, array, at, number):
         data = llvm.ArrayParts(builder, text, array).data
         place = builder.bitcast(builder.gep(data, [at]), ir.IntType(64).as_pointer())

@@ -92,14 +92,12 @@ class Vtu:
         self.counts = [0, 0]
 
     def add_points(self, x: np.ndarray, columns: Iterable[np.ndarray]) -> None:
-        """Add points at `x` (n, 3), with rows (n,) of each column."""
         self.points.add(np.ascontiguousarray(x, float))
         for column, rows in zip(self.columns, columns, strict=True):
             column.add(rows)
         self.counts[0] += len(x)
 
     def add_cells(self, kind: str, corners: np.ndarray) -> None:
-        """Add cells between points (n, corners)."""
         count, each = corners.shape
         ends = each * np.arange(self.counts[1] + 1, self.counts[1] + count + 1, dtype=np.int64)
         arrays = corners.ravel(), ends, np.full(count, KINDS[kind], np.int64)

@@ -71,7 +71,6 @@ class SerialComm:
         return list(answers)
 
     def at_first(self, make: Callable[[list[T]], list], thing: T) -> Any:
-        """Let rank 0 answer all processes."""
         gathered = self.gather(thing)
         return self.scatter(None if gathered is None else make(gathered))
 

@@ -74,8 +74,6 @@ class Catalogue(dict):
 
 
 class Parts(dict):
-    """Catalogues of parts of laws by kind, also of plug-ins."""
-
     def __init__(self, hub: Hub):
         self.hub = hub
         super().__init__((k, Catalogue(k, hub)) for k in PARTS)
@@ -159,7 +157,6 @@ class Update:
 
 
 def _with_numbers(name: str, tag: NamedTuple) -> str:
-    """``FLIP (alpha 0.99)``."""
     numbers = ", ".join(
         f"{key} {value:g}" if isinstance(value, (int, float)) else f"{key} {value}"
         for key, value in tag._asdict().items()

@@ -115,8 +115,6 @@ def in_words(count: float) -> str:
 
 
 class Room(NamedTuple):
-    """Memory for points in addition to `already` existing ones."""
-
     whole: float  # bytes, for all points
     of_one: int  # bytes, at least
     already: int

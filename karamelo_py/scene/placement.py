@@ -60,7 +60,6 @@ class Filled:
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
 
     def keep(self, kept: np.ndarray) -> None:
-        """Select candidates of the next chunk by a mask (m,)."""
         count = int(np.count_nonzero(kept))
         self._kept.append(np.packbits(kept) if 0 < count < len(kept) else None)
         self._ends.append(self._ends[-1] + count)
@@ -75,7 +74,6 @@ class Filled:
         return np.where(none, -1, number + self._number[tuple(index_in_cell.T)])
 
     def middles(self, number: np.ndarray) -> np.ndarray:
-        """Positions (n, d) by number."""
         cell, index_in_cell = self._cell_and_place(number)
         return self._corner + (cell + self._cells[0] + 0.5) * self._h + self._places[index_in_cell]
 

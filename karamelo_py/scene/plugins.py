@@ -49,7 +49,6 @@ ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelli
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:
-    """ScriptError, naming package and place, for wrong hooks or fields."""
     name = f"fix {fix.style}"
     for error in _wrong_hooks(fix):
         raise faults.fault(name, error, fix.place)
@@ -280,8 +279,6 @@ def _shown(kind: object) -> str:
 
 
 class PartInUse(NamedTuple):
-    """A style in use, such as ``fix drag``, its class and its place in the script."""
-
     name: str
     kind: type
     place: Place | None

@@ -180,7 +180,6 @@ def solid_with(hub: Scene, number: int) -> Solid:
 
 
 def named(hub: Scene, number: int) -> str:
-    """``point 3 of solid 'disk'``."""
     return f"point {number + 1} of solid '{solid_with(hub, number).id}'"
 
 

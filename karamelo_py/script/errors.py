@@ -181,7 +181,6 @@ def plural(count: float, noun: str) -> str:
 def unknown(
     message: str, name: str, names: Iterable[str], hint: str | None = None, **where: Any
 ) -> ScriptError:
-    """Error for a `name` that is not among `names`; `where` gives the place."""
     names = list(names)
     few = nearest_few(name, names)
     return ScriptError(
@@ -204,7 +203,6 @@ def nearest_few(name: str, names: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """Most similar name, or None if none is similar."""
     names = list(names)
     lowered = name.lower()
     for candidate in names:

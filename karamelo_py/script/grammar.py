@@ -76,7 +76,6 @@ def _spelled(sign: str) -> str:
 
 
 def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
-    """Start, end and depth of a node above others."""
     depth = 1 + max((node.depth for node in below), default=0)
     if depth > MAX_DEPTH:
         raise Mistake(

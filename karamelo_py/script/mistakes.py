@@ -54,7 +54,6 @@ def check_characters(text: str) -> None:
 
 
 def in_script(text: str) -> Mistake:
-    """The mistake in quotes or parentheses."""
     opened: list[int] = []
     for match in _PUNCTUATION.finditer(text):
         word, start = match[0], match.start()
@@ -292,7 +291,6 @@ NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:
-    """The correct line for ``name word word``."""
     if name in table()["blocks"]:
         return NO_BLOCKS
     if name in _NAMED and words and re.fullmatch(r"\d\w*", words[0]):

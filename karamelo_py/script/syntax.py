@@ -23,7 +23,6 @@ class Source:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
     def place(self, start: int, end: int) -> Place:
-        """Place of the characters from `start` to before `end`."""
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
@@ -72,8 +71,6 @@ class NumberLiteral(Node):
 
 @dataclass(frozen=True, slots=True)
 class TextLiteral(Node):
-    """A string literal, without quotes."""
-
     value: str
 
 
@@ -99,8 +96,6 @@ class BinaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class FunctionCall(Node):
-    """A call of a function, or of a command that returns a value."""
-
     name: str
     operands: tuple[Node, ...]
 
@@ -142,14 +137,10 @@ class Assignment(Statement):
 
 @dataclass(frozen=True, slots=True)
 class CommandCall(Statement):
-    """``name(arguments)`` alone on a line."""
-
     name: str
     arguments: tuple[Raw, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Evaluation(Statement):
-    """An expression alone on a line."""
-
     node: Node

@@ -354,6 +354,6 @@ class Difference(region.Region):
 
 
 def outlines(parts: Sequence[region.Region]) -> tuple | None:
-    """Return the descriptions of regions for kernels; None if a region has none."""
+    """Descriptions of regions for kernels; None if a region has none."""
     shapes = [part.outline() for part in parts]
     return None if any(one is None for one in shapes) else tuple(shapes)

@@ -128,7 +128,7 @@ class RegionSolid(Solid):
         self._warn_of_size(hub)
 
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
-        """Return the volume of the points, and of the shape in a file, if any."""
+        """The second: of the shape in a file, if any."""
         whole = self.region.volume
         total = float(np.sum(np.broadcast_to(placement.volume, self.count)))
         return None if whole is None else (total, whole)

@@ -90,7 +90,7 @@ class Scaled(NamedTuple):
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
-    """Measure with 1 and several processes and as many threads, then weak scaling."""
+    """Then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
         yield measured_with_ranks(job._replace(ranks=n))

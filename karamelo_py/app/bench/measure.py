@@ -200,7 +200,6 @@ def build(
 
 
 def measured(simulation: Simulation, seconds: float, triad: float, lead: int) -> Measured | Solved:
-    """Measure a scene for about `seconds`; `triad` is the memory bandwidth."""
     if simulation.implicit:
         return _solved(simulation, seconds, lead)
     count, times = repeated(simulation, seconds, lead)

@@ -35,7 +35,6 @@ class OnCard(NamedTuple):
 
 
 def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
-    """Variables for each of `SIZES`, or `presets` if they set the size."""
     if {"N", "coarser"} & {*presets}:
         yield dict(presets)
         return
@@ -48,7 +47,6 @@ def sizes_of(name: str, presets: Mapping[str, str]) -> Iterator[dict[str, str]]:
 def measured(
     name: str, presets: Mapping[str, str], card: Any, copied: float, seconds: float
 ) -> OnCard:
-    """Measure a workload on a GPU for about `seconds`; `copied` is its memory bandwidth."""
     simulation = build(WORKLOADS[name], 1, presets, card=card)
     begun = perf_counter()
     simulation.compile()

@@ -29,7 +29,6 @@ class Frame(NamedTuple):
     def of_columns(
         cls, step: int, time: float, axes: str, column: str, *, read: Callable[[str], np.ndarray]
     ) -> Frame:
-        """Make a frame from columns (n,) that ``read(name)`` returns."""
         columns = [np.asarray(read(name)) for name in (*axes, column)]
         count = len(columns[0])
         if count > POINTS:
@@ -39,10 +38,7 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """Select about `POINTS` of the points (n,), the same ones in each state.
-
-    Solids of up to 10 % of an equal part stay complete.
-    """
+    """About `POINTS` of the points (n,), the same in each state; small solids stay complete."""
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
     small = counts * POINTS < least * len(ids)
@@ -92,7 +88,6 @@ class KeptFrames:
 
 
 def number_in(words: Mapping[str, str]) -> int:
-    """Number of a frame, or -1."""
     text = words.get("k", "")
     return int(text) if text.isdecimal() and len(text) < 19 else -1
 

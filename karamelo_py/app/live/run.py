@@ -38,8 +38,6 @@ class Row(NamedTuple):
 
 
 class RunPage(Rhythmic, Listener):
-    """The page of a run, updated with the log; can pause the run."""
-
     remembers = ()
     id, place = "live", None
 

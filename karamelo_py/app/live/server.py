@@ -84,7 +84,6 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Serve until a page has been opened and all are closed."""
         with self._changed:
             self._changed.wait_for(lambda: self.opened and not self._shown)
 

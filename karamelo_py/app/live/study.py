@@ -56,7 +56,7 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """Colour rows by class: ``judged(row)`` adds class and reason, `colours` maps classes."""
+        """``judged(row)`` adds class and reason, `colours` maps classes."""
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(

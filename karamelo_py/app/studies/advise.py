@@ -63,8 +63,6 @@ SECOND = 2.0  # order that all methods may reach
 
 @dataclass(frozen=True)
 class Forecast:
-    """Expected error of a run, its bounds, and its cost."""
-
     error: float
     low: float
     high: float
@@ -129,8 +127,6 @@ def _power(x: float, xs: np.ndarray, values: np.ndarray) -> float:
 
 @dataclass
 class ChoiceRuns:
-    """A choice of words and its runs, coarse ones first."""
-
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()  # of its method
@@ -142,7 +138,6 @@ class ChoiceRuns:
 
     @property
     def kind(self) -> set[str]:
-        """Words of basis and method, which limit the order."""
         return {*self.values.values(), *self.words} & {*REACHED, *look.FAMILIES[2]}
 
     @property
@@ -159,8 +154,6 @@ class ChoiceRuns:
 
 @dataclass
 class Candidate:
-    """A variant that may meet the target; without a forecast it was run."""
-
     choice: ChoiceRuns
     step: int
     cost: float
@@ -194,7 +187,7 @@ class Adviser:
         return {name: case[name] for name in self.study.names}
 
     def pilot(self, count: int) -> None:
-        """Run the coarsest variants up to the target, and read earlier runs."""
+        """Up to the target, with earlier runs."""
         for _ in range(min(count, len(self.values))):
             for choice in self.choices:
                 if not self._met(choice):
@@ -249,7 +242,6 @@ class Adviser:
         return None
 
     def lucky(self) -> Candidate | None:
-        """The cheapest variant that meets the target, if only by chance."""
         candidates = filter(None, (self.candidate(choice, lucky=True) for choice in self.choices))
         return min(candidates, key=lambda c: c.cost, default=None)
 
@@ -279,7 +271,6 @@ class Adviser:
             self.go_on(follow)
 
     def _doubted(self, limit: float) -> ChoiceRuns | None:
-        """A choice that meets the target below a cost, if only by chance."""
         for choice in self.choices:
             finest = len(choice.rows) - 1
             for last in self._met(choice)[-1:] if finest < len(self.values) - 1 else ():
@@ -288,7 +279,6 @@ class Adviser:
         return None
 
     def _risen(self, limit: float) -> ChoiceRuns | None:
-        """A choice whose last error alone has grown, if its next run is cheap."""
         for choice in self.choices:
             count = len(choice.rows)
             fell = np.diff(sizes(choice.rows, self.accuracy)) < 0
@@ -318,7 +308,6 @@ class Adviser:
         return reasons
 
     def hopeful(self) -> Candidate | None:
-        """The cheapest variant that may meet the target, though not expected to."""
         return next((c for c in self.candidates(hope=True) if c.forecast), None)
 
     def label(self, choice: ChoiceRuns, step: int) -> str:
@@ -391,7 +380,7 @@ def run(options: Namespace) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Sort values by the work they cause, as `check` measures."""
+    """By the work that they cause, as `check` measures."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):

@@ -149,7 +149,7 @@ def run(options: Namespace) -> int:
 
 
 def ended(folder: Path) -> tuple[list[str], int]:
-    """The runs in an entry's tables that did not end well, and the count of all."""
+    """Runs in an entry's tables that did not end well, and the count of all."""
     tables = [records.read(path) for path in sorted(folder.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)
@@ -196,7 +196,6 @@ def key_of(lines: list[str]) -> str:
 
 
 def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> None:
-    """Write the page of finished entries; parts of the others stay."""
     before = page.read_text(encoding="utf-8") if page.exists() else ""
     before_by_name = {
         section.partition("\n")[0]: section.rstrip()

@@ -112,14 +112,13 @@ class Launch:
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
-        """Hash all that a result depends on."""
         parts = [karamelo_py.__version__, *self.texts, str(self.threads), str(self.repeat)]
         parts += [f"{name}={value}" for name, value in case.items()]
         parts.append(os.environ.get("NUMBA_DISABLE_JIT", "0"))
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """This case's outcome from an earlier study, or None to run it again."""
+        """None to run the case again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
@@ -193,7 +192,7 @@ class Launch:
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
-        """Wait for the end; return the peak memory (MiB) and whether time was up."""
+        """The peak memory (MiB), and whether time was up."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):

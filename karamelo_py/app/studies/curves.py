@@ -242,7 +242,6 @@ class Family:
         return f"{self.accuracy} = {f'abs({formula})' if signed else formula}"
 
     def front(self) -> list[Mapping[str, str]]:
-        """Runs that none beats in cost and error, cheapest first, without chance."""
         members = [
             (c, e, k, row)
             for line in self.lines

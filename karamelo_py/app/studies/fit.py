@@ -44,8 +44,6 @@ ALIKE = 0.99  # correlation of indistinguishable variables
 
 
 class Observation:
-    """A measured number of the log, or a log column over time."""
-
     def __init__(self, text: str, script: variables.ScriptFiles, values: Mapping[str, list[str]]):
         word, _, target = (piece.strip() for piece in text.partition("="))
         if not (word and target):
@@ -99,8 +97,6 @@ class End:
 
 
 class Search:
-    """Runs by the positions of variables in their ranges, 0 to 1."""
-
     def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
         self.failed: dict[str, ScriptError] = {}  # by folder

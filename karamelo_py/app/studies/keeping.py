@@ -73,7 +73,6 @@ def look_at(
 
 
 def _general(note: Mapping[str, str]) -> str:
-    """The cause in a message, else its title, else its text."""
     title = codes().get(note.get("code", ""), {}).get("title")
     return note.get("cause") or title or note["text"]
 

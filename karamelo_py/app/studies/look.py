@@ -150,7 +150,6 @@ def log_axis(axis: "Axis", low: float, high: float, values: Sequence[float] | No
 
 
 def slope(axes: "Axes", lines: Sequence[tuple[np.ndarray, np.ndarray]], exponent: float) -> None:
-    """Draw a triangle of y = x^exponent below lines (x, y), on logarithmic axes."""
     p, falls = abs(exponent), exponent < 0
     logs = [np.log([x, y]) for x, y in lines]
     low, high = min(x.min() for x, _ in logs), max(x.max() for x, _ in logs)
@@ -192,7 +191,6 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 
 
 def direct_labels(axes: "Axes", ends: Sequence[tuple[float, float, str, str]]) -> None:
-    """Write names at line ends (x, y, name, colour); equal ends have one label."""
     if not ends:
         return
     axes.autoscale_view()  # limits are final from here on

@@ -112,7 +112,6 @@ def _gone(axes: "Axes", marks: Sequence[tuple[float, str]]) -> None:
 
 
 def _slope(axes: "Axes", family: Family) -> None:
-    """Draw a triangle with the median order, in halves."""
     lines = [line for line in family.lines if len(set(line.x[line.shown])) > 1]
     sure = [line for line in lines if not line.lucky.any()] or lines
     fits = [order(line.x[line.shown], line.error[line.shown]).exponent for line in sure]
@@ -216,7 +215,7 @@ class History(NamedTuple):
 def histories(
     table: Table, by: Sequence[str], over: str, curve: str, *, log: str, names: Sequence[str]
 ) -> list[History]:
-    """Read one column `over` another from the logs, labelled by `names` or variables `by`."""
+    """Labels are `names` or variables `by`."""
     curves = []
     for k, row in enumerate(table.rows):
         columns = read_log(table.path.parent / row["folder"], log)
@@ -339,7 +338,6 @@ def tell_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, cost
 
 
 def draw_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, sheet: Sheet) -> None:
-    """Draw errors on the left, cost ratios on the right."""
     figure = blank_figure(9.0, 1.1 + 0.3 * len(pairs))
     left, right = figure.subplots(1, 2, sharey=True, width_ratios=(3, 2))
     errors = np.array([pair.error for pair in pairs])

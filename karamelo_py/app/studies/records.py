@@ -35,8 +35,6 @@ SIGNED = "_signed"  # suffix of the column with the signed value
 
 
 class Reduction:
-    """A number from a log column: last, first, max, min, mean, or the time when it has a value."""
-
     def __init__(self, reduction: str, column: str, level: str | None, word: str):
         column = "".join(column.split())
         self.reduction, self.column = reduction, KEYWORDS.get(column, column)
@@ -102,7 +100,7 @@ class Recorded:
             self.parts[name] = Reduction("last", name, None, word)
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
-        """The log columns it reads, which are not among `variables`."""
+        """Without `variables`."""
         return [reduction.column for name, reduction in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Row) -> float:

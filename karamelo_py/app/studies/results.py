@@ -45,7 +45,6 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
 
 
 def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) -> list[History]:
-    """A line for each result and each group of runs that differ only in `x`."""
     differing = [
         name
         for name in by or table.variables
@@ -82,7 +81,7 @@ class Law:
 
 
 def measured_in(path: Path, x: str, result: str) -> History:
-    """Read the columns of these names, else the first two."""
+    """Columns of these names, else the first two."""
     columns = read_table(path)
     if len(columns) < 2:
         raise ScriptError(f"{path} has one column", expected="two, of x and of what was measured")

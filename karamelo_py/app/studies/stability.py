@@ -284,10 +284,8 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Each row's x where the first step equals the column `step`, or None.
-
-        Extrapolates the ratio of the steps as a power of x; interpolates rows with too few runs.
-        """
+        """Each row's x where the first step equals the column `step`, or None: by extrapolated
+        powers of x."""
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.results.items()):
             dt, same = row.get("dt"), row.get(step)
@@ -318,7 +316,6 @@ class Map:
         return exp(at) if at <= log(high) and exp(at) >= low else None
 
     def margins(self) -> list[tuple[float, int]]:
-        """The largest stable step over the program's, and its steps, by row."""
         ratios, classes = [], self.classes
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
@@ -535,7 +532,6 @@ def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]
 
 
 def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) -> list[list[int]]:
-    """Stretches longer than 1 where two lines differ and one is unknown."""
     line = (near, far)[which]
     stretches: list[list[int]] = [[]]
     for i in np.flatnonzero((near != far) & (runs == UNKNOWN)):

@@ -96,10 +96,7 @@ class Study:
             write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
-        """The rows of cases, in order, after running unknown ones.
-
-        An interrupt ends runs in progress; finished ones are stored.
-        """
+        """An interrupt ends runs in progress; finished ones are stored."""
         waiting = []
         for case in cases:
             if tuple(case.values()) in self.rows:
@@ -163,7 +160,7 @@ class Study:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
-        """Update the page; KeyboardInterrupt if the study was stopped there."""
+        """KeyboardInterrupt if the study was stopped on the page."""
         of = self.most or display.count + len(self.rows) - display.finished
         left = display.left([case for case, _ in queue], running)
         places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
@@ -244,7 +241,6 @@ def guessed_time(
     """
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
-        """Logarithms of numbers above 0, and 1 for each other word."""
         logs: dict[Any, float] = {}
         for name, word in case.items():
             number = number_of(word)
@@ -314,7 +310,6 @@ def results_table(rows: Sequence[Row], study: Study, console: Console) -> Table:
 
 
 def terminal() -> Console:
-    """Make a console for tables; rows in a file are up to 200 characters wide."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=200)

@@ -116,7 +116,6 @@ class WarmProcesses:
         self.keepers[()] = WarmProcess(mine, process.pid)
 
     def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
-        """Make the socket for the process that a run is to leave, if none exists."""
         if key in self.keepers:
             return None
         if len(self.keepers) > MOST:
@@ -178,7 +177,7 @@ def keep(link: socket.socket) -> NoReturn:
 
 
 def _run(request: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
-    """Run the program, and leave a copy if it went well."""
+    """Leaves a copy if it went well."""
     from karamelo_py.app.start import main
 
     folder, *sys.argv[1:] = request

@@ -63,8 +63,6 @@ class _Elements(NamedTuple):
 
 
 class _Part:
-    """Nodes, elements and sets of a part, the assembly or a deck without parts."""
-
     def __init__(self) -> None:
         self.numbers: list[np.ndarray] = []
         self.places: list[np.ndarray] = []
@@ -100,7 +98,6 @@ def _wrong(keyword: _Keyword, error: str, expected: str | None = None) -> Script
 
 
 def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Keyword]:
-    """Keywords with data lines, also of included files."""
     lines = [line.lstrip() for line in path.read_text("utf-8", errors="replace").splitlines()]
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
@@ -428,8 +425,6 @@ class _Numbering(NamedTuple):
 
 
 class _Sets:
-    """Sets of nodes or elements, by NAME and BODY.NAME, and the numbering of each body."""
-
     def __init__(self) -> None:
         self.by_name: dict[str, list[np.ndarray]] = defaultdict(list)
         self.numbering: dict[str, _Numbering] = {}
@@ -446,8 +441,6 @@ def _names(body: _Instance, name: str) -> set[str]:
 
 
 class _Merged:
-    """The mesh of all bodies; nodes and elements are numbered from 0."""
-
     def __init__(self, path: Path) -> None:
         self.path = path
         self.points: list[np.ndarray] = []

@@ -18,8 +18,6 @@ _CHUNK = 4096  # integrated at once
 
 
 class Shape(NamedTuple):
-    """A family of elements; nodes in VTK's order."""
-
     name: str
     words: str  # plural
     dimension: int

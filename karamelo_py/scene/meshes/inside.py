@@ -227,7 +227,6 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
 
 
 def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
-    """Lowest node of the component of each node (count,), with links from a to b."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

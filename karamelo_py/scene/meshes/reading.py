@@ -44,8 +44,6 @@ _FOREIGN = (
 
 
 class MeshFile(InputFile):
-    """Annotation: a file that `read` can read, by its ending."""
-
     endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH, *EXODUS} - {".svg"}
 
 

@@ -11,8 +11,6 @@ from karamelo_py.script.expressions import Expression
 
 
 class Energy(Compute):
-    """Base of computes of an energy, given by `measured`."""
-
     published: tuple[str, ...] = ("", "s")
     measured = ""
 
@@ -114,7 +112,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """Return the present drift; `scale` > 0 is a possible magnitude of the value."""
+        """Present drift; `scale` > 0 is a possible magnitude of the value."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value

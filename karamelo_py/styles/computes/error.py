@@ -82,7 +82,7 @@ class Norm:
         self._exact = 0.0  # the largest norm of the exact values
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Return the terms of a norm from the magnitudes (2, n) of differences and exact values."""
+        """Terms of a norm from the magnitudes (2, n) of differences and exact values."""
         return np.vstack([weight * sizes**self.power, weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
@@ -112,7 +112,7 @@ class Norm:
         return now
 
     def scaled(self, difference: float, exact: float) -> float:
-        """Return the absolute or relative norm, from those of differences and exact values."""
+        """Absolute or relative norm, from those of differences and exact values."""
         if not self.relative or difference == 0:
             return float(difference)
         return float(difference / exact) if exact else inf
@@ -137,7 +137,6 @@ class Compared:
 
 
 def refuse_absent(hub: Any, columns: tuple[str, ...]) -> None:
-    """Refuse a column that no material has."""
     absent = [name for name in columns if name in hub.fields.absent_at_points()]
     if absent and hub.materials:
         message = f"'{absent[0]}' is 0 because no material of the scene has it"
@@ -333,6 +332,6 @@ class Reference(Compared, Compute):
         return sizes, points.reference_volume[within], exact, np.ones(len(exact))
 
     def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return which positions (n,) the curve covers, and its values there."""
+        """Which positions (n,) the curve covers, and its values there."""
         within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
         return within, np.interp(at[within], *self.curve)

@@ -119,7 +119,7 @@ class LammpsDump(TableDump):
 
 
 def box(hub: Hub) -> list[tuple[float, float]]:
-    """Return the ends of the domain along the three axes.
+    """Ends of the domain along the three axes.
 
     OVITO takes a box of zero thickness for degenerate; one cell about zero suits a slice of unit
     width.

@@ -176,7 +176,6 @@ class PyPlot(Dump):
                 self._picture.begin_with(limits)
 
     def _marks(self) -> list[Any]:
-        """Identify what the colour limits belong to."""
         more = [self.look[name] for name in ("log", "quantile") if self.look[name]]
         return [*self.limits, *more]
 

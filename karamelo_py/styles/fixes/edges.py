@@ -23,8 +23,6 @@ PARTS = 4  # per direction of a box, for measuring the surface
 
 
 class Faces(NamedTuple):
-    """Faces of points on the edge of a region, before the first step."""
-
     point: np.ndarray  # (m,) numbers of the points, or their rows in a view
     axis: np.ndarray  # (m,) normal to the face
     sign: np.ndarray  # (m,) outward: -1 or 1
@@ -62,8 +60,6 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
 
 
 class EdgePieces(NamedTuple):
-    """Pieces of the surface of a region, and their points."""
-
     point: np.ndarray  # (m,)
     area: np.ndarray  # (m, d) times the outward normal
     length: np.ndarray  # (m,) area of a piece, with both sides of an edge

@@ -44,7 +44,6 @@ class Gripping(Fix):
             self.point_fields = (*self.point_fields, self.grip)
 
     def begin_to_touch(self) -> None:
-        """Clear the grips of an earlier fix."""
         if self.grip is not None and not self.has_touched:
             for block in self.hub.simulation.setup.blocks:
                 if (grip := field(block.points.fields, self.grip)) is not None:

@@ -235,7 +235,6 @@ class Keeper:
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 
     def _look(self) -> dict[str, int]:
-        """Checksums of all data that the function may change, by name."""
         data = dict(self.data)
         if inspect.isfunction(self.function):
             seen = inspect.getclosurevars(self.function)

@@ -139,7 +139,6 @@ def gradient(
 
 
 def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
-    """The fixes that this one overrides, with the data for the warning."""
     fixes = list(simulation.hub.fixes.values())
     first = [one for one in simulation.fixes.new if isinstance(one, VelocityOfPoints)]
     if not (fix.leads_points or fix in first):

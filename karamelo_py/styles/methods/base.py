@@ -30,7 +30,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """Return True if the yield surface of a law uses part of the averaged pressure (F-bar)."""
+    """True if the yield surface of a law uses part of the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -85,7 +85,7 @@ class Method:
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Return the tag of contact between solids with separate velocity fields."""
+        """Tag of contact between solids with separate velocity fields."""
         return NoContact()
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
@@ -106,7 +106,7 @@ class Method:
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        """Return a mask (F,) of the velocity fields of rigid solids; (0,) if none is."""
+        """Mask (F,) of the velocity fields of rigid solids; (0,) if none is."""
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
@@ -120,7 +120,7 @@ class Method:
         return hub.domain.kin
 
     def averaging(self, hub: Hub) -> NamedTuple:
-        """Return the tag of averaging: `FBar` if volume changes are averaged."""
+        """Tag of averaging: `FBar` if volume changes are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
         if hub.domain.thin:

@@ -26,7 +26,7 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 def fields(hub: Hub) -> list[int]:
-    """Return the velocity field of each solid; glued solids have the same."""
+    """Velocity field of each solid; glued solids have the same."""
     numbers: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
@@ -37,7 +37,6 @@ def fields(hub: Hub) -> list[int]:
 
 
 def flows(law: NamedTuple) -> bool:
-    """Return True if a law holds no shape."""
     traits = [law_traits(kind) for kind in law_kind(law)]
     return any(of.flows or of.any_speed for of in traits)
 
