@@ -29,10 +29,9 @@ CREATE_DOMAIN_WITHOUT_H = Forms(
 def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
-    A point that leaves the domain ends the run, unless boundary says otherwise. Strain is uniaxial
-    in 1D and plane (unit thickness) in 2D. The grid starts at the lower corner and covers the whole
-    domain. If a side is not a multiple of the cell size, no node lies at its upper end: a wall
-    there would be too far out.
+    A point that leaves the domain ends the run (see boundary). Strain is uniaxial in 1D and plane
+    (unit thickness) in 2D. The grid starts at the lower corner and covers the domain. If a side is
+    not a multiple of the cell size, no node lies at its upper end: a wall there is too far out.
 
     Parameters
     ----------
@@ -86,8 +85,7 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
 
     Notes
     -----
-    Without ``dimension(1|2|3)`` before it, the number of arguments sets the dimension. New scripts
-    need only dimension.
+    Without ``dimension(1|2|3)`` before it, the number of arguments sets the dimension.
 
     See Also
     --------
@@ -118,17 +116,15 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
 
     Notes
     -----
-    ``delete`` and ``reflect`` are for splashes. For a body against a wall use fix velocity_nodes. A
-    warning names the first point, and the end of a run reports their number.
+    ``delete`` and ``reflect`` are for splashes; for a body against a wall use fix velocity_nodes. A
+    warning names the first point; the end of a run reports their number.
 
     A point is deleted before the step in which it would leave: dumps omit it, other ids do not
     change. The run returns to its last stored state, at most a hundred steps back, and repeats
-    these steps with their Python hooks. If points leave in every step, a run takes about six times
-    as long.
+    these steps with their Python hooks (about six times as long if points leave in every step).
 
-    A reflected point retains its stress and tangential velocity. Neighbours that still push
-    outwards may return it to the edge. A body that hits the edge as a whole loses most of its
-    normal velocity.
+    A reflected point retains its stress and tangential velocity. Neighbours may push it back to the
+    edge. A body that hits the edge as a whole loses most of its normal velocity.
 
     Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 
@@ -222,9 +218,9 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
         Where the points come from.
     arguments
         For ``region``: ``regionID, ppc, material, h[, T0]``: the region to fill, the points per
-        cell in each direction, the material, the cell size of the domain, the initial temperature
-        (default: the material's). For ``mesh``: ``file, material, h[, T0]``. For others see the
-        page of the style.
+        cell in each direction, the material, the cell size, the initial temperature (default: the
+        material's). For ``mesh``: ``file, material, h[, T0]``. For others see the page of the
+        style.
 
     Example
     -------
@@ -268,7 +264,6 @@ solid.syntax = "ID, region, regionID, ppc, material, h[, T0] | ID, mesh, file, m
 
 
 def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
-    """Explain the old form, with the number of points along each direction of a region."""
     region, *counts, material, h = (argument.text for argument in arguments)
     if len(counts) == hub.domain.dimension > 1:
         raise ScriptError(
@@ -291,9 +286,8 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    Points belong to it by their reference positions when the command is read, nodes by their
-    positions. Separate nodes of later solids also belong, unless solids are named. The group
-    ``all`` always exists.
+    By reference positions of points when the command is read, or positions of nodes. Separate nodes
+    of later solids also belong, unless solids are named. The group ``all`` always exists.
 
     Parameters
     ----------

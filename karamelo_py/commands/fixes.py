@@ -202,10 +202,9 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Nodes: the sum of the forces from the points, i.e. the divergence of stress and the forces of
-    fixes on points (contact, tools, tractions). At held nodes with little acceleration it is minus
-    the reaction. Points: the rate of change of their momentum in the last step, sum m a. 0 before
-    the first step.
+    Nodes: the sum of the forces from the points: the divergence of stress, and fixes on points
+    (contact, tools, tractions); at held nodes with little acceleration minus the reaction. Points:
+    the rate of change of their momentum in the last step, sum m a. 0 before the first step.
 
     See Also
     --------
@@ -236,9 +235,9 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Nodes: the forces of fixes on nodes, such as body_force and force_nodes. Points: the forces of
-    fixes on points (contact, tools, tractions). Prescribed velocities are not included: those fixes
-    publish their reactions. 0 before the first step. Karamelo gives the internal force here.
+    Nodes: fixes on nodes, such as body_force and force_nodes. Points: fixes on points (contact,
+    tools, tractions). Not included: prescribed velocities, whose fixes publish reactions. 0 before
+    the first step. Karamelo gives the internal force here.
 
     See Also
     --------

@@ -135,16 +135,16 @@ def load_path(
 ) -> None:  # fmt: skip
     """Define one segment of a load path, by its final strains or stresses.
 
-    It starts from the current state and reaches its final values in equal increments. A strain
-    component that is not named stays constant.
+    It starts from the current state and reaches its final values in equal increments. Strain
+    components that are not named stay constant.
 
     Parameters
     ----------
     increments
         Number of increments.
     exx, eyy, ezz, exy, exz, eyz
-        Strain: the sum of the increments, so ln(length/initial length) for many increments. Shear
-        strains are tensor components, half the angle.
+        Strain: the sum of the increments, so ln(length/initial length) for many; shear strains are
+        tensor components, half the angle.
     gxy, gxz, gyz
         Angle of simple shear, twice the tensor strain. gxy moves x along y and rotates the point by
         gxy/2; exy does not rotate it.
@@ -156,8 +156,7 @@ def load_path(
         Angle in radians by which the point rotates about z. Strains and stresses refer to fixed
         axes.
     duration
-        Duration for rate-dependent laws, by default 1. A segment with only a duration holds the
-        point.
+        Duration for rate-dependent laws, by default 1. Alone, it holds the point.
 
     Example
     -------
@@ -219,7 +218,7 @@ def element(
     """Take one point of a material along a load path, to check its law before a run.
 
     Writes the table element_ID.txt and the plot element_ID.png. Needs no domain and compiles
-    nothing. The point begins at rest and stress-free; cam-clay begins at its pressure p0.
+    nothing. The point begins stress-free; cam-clay begins at its pressure p0.
 
     Parameters
     ----------
@@ -234,8 +233,8 @@ def element(
         ``plane-stress`` (no stress szz); ``axisymmetric`` (x the radius, y the axis, z around it);
         ``1D`` (exx only); ``uniaxial-stress`` (stress sxx only).
     tangent
-        Whether to print the tangent of the last increment: derivatives of the Cauchy stress with
-        respect to strains and angles of shear, which are twice the tensor strains.
+        Whether to print the tangent of the last increment: derivatives of the Cauchy stress by
+        strains and angles of shear (twice the tensor strains).
 
     Example
     -------
@@ -253,10 +252,10 @@ def element(
     published as ID_exx, ID_sxx and so on.
 
     The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. The increment of
-    a rotation is skew to first order. Its second-order part is chosen for the least stored energy,
-    because laws in rate form and laws in F differ on what is rigid. Prescribed stresses are found
-    by Newton's method with the exact tangent. An increment that does not converge is halved, up to
-    eight times. If that fails, the files show the increments so far.
+    a rotation is skew to first order; its second-order part has the least stored energy, because
+    laws in rate form and laws in F differ on rigid motion. Prescribed stresses are found by
+    Newton's method with the exact tangent. An increment that does not converge is halved, up to
+    eight times; then the files show the increments so far.
 
     See Also
     --------

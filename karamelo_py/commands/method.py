@@ -32,11 +32,11 @@ def method(
     basis
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
-        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), then those for
-        the basis and the method. Words in any order. ``thermo-mechanical``: heat flows between
-        points (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the
-        velocity gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp.
-        ``R4``, ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
+        First the numbers of the transfer (the FLIP coefficient, the order of XPIC), of the basis
+        and the method; then words in any order. ``thermo-mechanical``: heat flows between points
+        (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the velocity
+        gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp. ``R4``,
+        ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
 
     Example
     -------
@@ -51,12 +51,11 @@ def method(
     Before the first solid.
 
     ``thermo-mechanical``: before each momentum update, heat flows between points of materials with
-    a temperature: ``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, and
-    ``eos-strength`` with a temperature. Points take the temperature increments of the nodes (FLIP,
-    for any velocity transfer), so only conduction smears temperatures. `dt` also respects the
-    stable step of conduction, h^2/(4 d) rho cp/kappa in d dimensions. Heat flows between bodies
-    with common nodes. Otherwise it leaves a body only by a fix. Without that word, points are
-    heated only by their own work.
+    a temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength``
+    with a temperature), also between bodies with common nodes. Otherwise it leaves a body only by a
+    fix. Points take the temperature increments of the nodes (FLIP, for any velocity transfer), so
+    only conduction smears temperatures. `dt` also respects the stable step of conduction, h^2/(4 d)
+    rho cp/kappa in d dimensions. Without that word, points are heated only by their own work.
 
     See Also
     --------
@@ -99,8 +98,8 @@ def scheme(
     arguments
         Arguments of the style; explicit schemes have none.
     start
-        Fraction of the first explicit step in which forces act: ``full``, or ``half``. With
-        ``half``, velocities and kinetic energies belong to the logged time.
+        Fraction of the first explicit step in which forces act: ``full``, or ``half``: velocities
+        and kinetic energies then belong to the logged time.
 
     Example
     -------
@@ -109,11 +108,11 @@ def scheme(
 
     Notes
     -----
-    In explicit steps, positions belong to the end of a step and velocities to its middle. With
-    ``full`` the initial velocity belongs to half a step before the start: a projectile is g dt t/2
-    too far, and the log shows velocities and kinetic energies half a step early. With ``half`` both
-    are second-order accurate in the step, and points also store their previous velocity. Velocities
-    set after the first step, such as ``sim.points["vx"] = values``, belong to half a step earlier.
+    Explicit positions belong to the end of a step, velocities to its middle. With ``full`` the
+    initial velocity belongs to half a step before the start: a projectile is g dt t/2 too far, and
+    logged velocities and kinetic energies are half a step early. With ``half`` both are
+    second-order accurate in the step, and points also store their previous velocity. Velocities set
+    after the first step, such as ``sim.points["vx"] = values``, belong to half a step earlier.
 
     See Also
     --------
@@ -173,10 +172,10 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     """Average volume changes over neighbouring points (F-bar).
 
-    Nearly incompressible and plastic bodies are too stiff if the volume of each point is
-    constrained: low-order basis functions cannot deform accordingly. Averaging the volume increment
-    with the basis weights removes the excess constraints (Coombs et al. 2018). The mean stress is
-    averaged likewise, so the forces do the work of the averaged strain.
+    Nearly incompressible and plastic bodies are too stiff if low-order basis functions constrain
+    the volume of each point. Averaging the volume increment with the basis weights removes the
+    excess constraints (Coombs et al. 2018); the mean stress is averaged likewise, so forces do the
+    work of the averaged strain.
 
     Example
     -------
@@ -381,7 +380,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """One of `words` that an argument names; variables of that name are ignored."""
+    """Variables of these names are ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

@@ -35,11 +35,10 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
     Notes
     -----
-    The next run uses the new constants, without compilation. A stress outside the new yield surface
-    returns to it in the first step. If an elastic modulus changes, an incremental law retains its
-    stress; the stress of a law of the total deformation changes at once. Not changeable: the
-    density, because points have their masses, and constants that set the initial state of points,
-    such as pc of cam-clay.
+    The next run uses them, without compilation. A stress outside the new yield surface returns to
+    it in the first step. If an elastic modulus changes, an incremental law retains its stress; with
+    a law of the total deformation it changes at once. Not changeable: the density (points have
+    masses), and constants of the initial state, such as pc of cam-clay.
 
     ``kind`` material also finds constants of the parts of eos-strength, if only one part has the
     name.
@@ -84,7 +83,7 @@ def _parts(material: Material) -> list[MaterialPart]:
 
 
 def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
-    """Find the material, or its only part, that has all the constants."""
+    """The material, or its only part, that has all the constants."""
     names = {(argument.keyword() or ("",))[0] for argument in numbers}
     if names <= set(material.given):
         return material

@@ -34,8 +34,8 @@ def dump(
     Notes
     -----
     File names are relative to the folder where the program was started; ``~`` is the home folder.
-    Folders in the name must exist. Existing files are overwritten. Snapshots of a longer, earlier
-    run remain if this run does not reach their steps: a viewer shows them after the new ones.
+    Folders must exist; files are overwritten. Snapshots of a longer, earlier run remain, and a
+    viewer shows them after the new ones.
 
     Example
     -------
@@ -59,7 +59,6 @@ def dump(
 
 
 def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
-    """Explain that the number of steps comes before the file name."""
     if len(arguments) < 2:
         return
     first, second = arguments[:2]
@@ -97,7 +96,7 @@ def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> N
     """Set how often a line is logged, and in which format.
 
     Lines go at once to the terminal and to log.mpm in the current folder. The first and last state
-    of each run are always logged. Without this command, every step is.
+    of each run are always logged; by default every step is.
 
     Parameters
     ----------
@@ -270,8 +269,8 @@ def units(
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
 
     No number is converted. A scene in mm, g, ms has forces in N, stresses in MPa and energies in
-    mJ. Before the first step, the program warns of values that no real material has: densities
-    outside 10 to 100000 kg/m^3 (gases: below 0.001), and wave speeds outside 1 m/s to 50 km/s.
+    mJ. Warns before the first step of densities outside 10 to 100000 kg/m^3 (gases: below 0.001),
+    and wave speeds outside 1 m/s to 50 km/s.
 
     Parameters
     ----------

@@ -134,9 +134,8 @@ def translate_particles(
 
     Notes
     -----
-    The reference positions move, so the points start there. Volumes do not change, except that they
-    follow the radius in axisymmetry. A separate grid of a solid covers the new positions. The
-    points stay in their groups.
+    The reference positions move. Volumes do not change, except with the radius in axisymmetry. A
+    separate grid of a solid covers the new positions. Points stay in their groups.
 
     See Also
     --------
@@ -234,10 +233,10 @@ def populate_cylindrical_coordinates(
         ID of the region. Points outside it are dropped.
     lattice
         In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: the centre, the outer radius, the number of rings,
-        the number of points in each ring, the initial temperature. In 3D ``axis, c1, c2, R, lo, hi,
-        Ndx, Ndr, Ndtheta, T0``: the word x, y or z, the centre in the other two directions (in the
-        order x, y, z), the outer radius, the ends along the axis, the number of slices along it,
-        then as in 2D.
+        the points per ring, the initial temperature. In 3D ``axis, c1, c2, R, lo, hi, Ndx, Ndr,
+        Ndtheta, T0``: the word x, y or z, the centre in the other two directions (in the order x,
+        y, z), the outer radius, the ends along the axis, the number of slices along it, then as in
+        2D.
 
     Example
     -------
@@ -247,12 +246,11 @@ def populate_cylindrical_coordinates(
     -----
     Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``, and points at the
     angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx`` with
-    ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``; the
-    sum is ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo has rings at ``j dr`` with a point in
-    the centre, and slices at ``lo + i dx``; their volumes do not give this sum.
+    ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``, in
+    total ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``); not so in Karamelo, with rings at ``j dr``, a
+    point in the centre, and slices at ``lo + i dx``.
 
-    Before the first run, and before groups that select from these points. T0 replaces the
-    temperature of the solid.
+    Before the first run, and before groups of these points. T0 replaces the solid's.
 
     See Also
     --------
@@ -282,7 +280,7 @@ populate_cylindrical_coordinates.syntax = (
 
 
 def _polar(values: dict, places: dict) -> Placement:
-    """The points of all polar cells: slices outermost, then rings, then angles."""
+    """Slices outermost, then rings, then angles."""
     check_radius(values["R"], place=places["R"])
     counts = [
         _count(values[name], name, places[name]) if name in values else 1

@@ -37,10 +37,10 @@ def cylindrical(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Before the first solid, in a 1D domain with x >= 0. Everything depends on the radius alone. The
-    hoop strain is the radial displacement over r (component 22); there is no strain along the axis
-    (33). Points carry the volume and mass of one radian and of unit length, r dr: multiply masses,
-    forces and energies by 2 pi for the whole ring. A node at x = 0 does not move.
+    Before the first solid, in a 1D domain with x >= 0. The hoop strain is the radial displacement
+    over r (component 22); there is no strain along the axis (33). Points carry the volume and mass
+    of one radian and of unit length, r dr: multiply masses, forces and energies by 2 pi for the
+    whole ring. A node at x = 0 does not move.
 
     See Also
     --------
@@ -59,12 +59,11 @@ def spherical(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Before the first solid, in a 1D domain with x >= 0. Everything depends on the radius alone. The
-    hoop strains, components 22 and 33, are the radial displacement over r. Points carry the volume
-    and mass of one steradian, r^2 dr: multiply masses, forces and energies by 4 pi for the whole
-    sphere. A node at x = 0 does not move. The material must be the same in y and z. Linear cells
-    lock where the volume cannot change: with a Poisson's ratio near 0.5, or metals that flow, use
-    anti_volumetric_locking(true).
+    Before the first solid, in a 1D domain with x >= 0. The hoop strains, components 22 and 33, are
+    the radial displacement over r. Points carry the volume and mass of one steradian, r^2 dr:
+    multiply masses, forces and energies by 4 pi for the whole sphere. A node at x = 0 does not
+    move. The material must be the same in y and z. With a Poisson's ratio near 0.5, or metals that
+    flow, linear cells lock: use anti_volumetric_locking(true).
 
     See Also
     --------

@@ -91,11 +91,10 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Above 0, by default 0.9; a run warns of unstable factors. The default is 0.4 (0.2 with one
-        point per cell) where a drifting body would gain energy: linear basis in ulmpm, FLIP
-        coefficient above 0.99, and musl or usf. Until a point has moved a quarter of a cell, it is
-        0.9, and more with splines. A given factor always refers to the stable step of moving
-        bodies.
+        Above 0, by default 0.9; 0.4 (0.2 with one point per cell) where a drifting body would gain
+        energy: linear basis in ulmpm, FLIP coefficient above 0.99, and musl or usf. Until a point
+        has moved a quarter of a cell, it is 0.9, and more with splines. A given factor always
+        refers to the stable step of moving bodies; a run warns of unstable factors.
 
     Example
     -------
@@ -124,11 +123,10 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     steps
         Exact number of steps.
     on_trouble
-        ``stop``, or ``halve``: when a point fails, when energy appears that no load supplied
-        (otherwise a warning), or when the step becomes unstable, the run returns to its last good
-        state and halves the step, at most five times, with a message. Log, dumps, curves and
-        computes are rewound too. Points that leave the domain without an energy gain stop the run
-        (see `boundary`).
+        ``stop``, or ``halve``: when a point fails, energy appears that no load supplied (otherwise
+        a warning), or the step becomes unstable, the run returns to its last good state, with log,
+        dumps, curves and computes, and halves the step, at most five times. Points that leave the
+        domain without an energy gain stop the run (see `boundary`).
 
     Example
     -------
@@ -261,23 +259,21 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     bit-identical to an uninterrupted run, with any number of threads. The log and the dumps are
     continued; lines written after that step are cut off.
 
-    The script must be unchanged up to this run, except for commands that only control how a run
-    proceeds or its output (set_dt, dt_factor, set_output, dump, plot), an added
-    ``boundary(delete)``, and the length of the last run, as a number in its own line. Variables
-    that were set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run of
+    The script must be unchanged up to this run, except for set_dt, dt_factor, set_output, dump,
+    plot, an added ``boundary(delete)``, and the length of the last run, as a number in its line.
+    Variables set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run of
     this length; so is a longer ``run_time(T)``, if the file was written before the last two steps
     of the shorter run, which are shortened.
 
     A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
     plots, and the values that the script has read. A run killed while writing leaves the previous
-    file intact. The last state of each run is written too. A run that fails writes
-    last_good.<step>.h5 instead: if its energy has grown, the last state before the growth, to
-    within ten steps; if its step was above the stable limit from the start, the state before the
-    first step. No such file is written with boundary(delete), or if the run was resumed from a file
-    at that step.
+    file intact. The last state of each run is written too; a failed run writes last_good.<step>.h5
+    instead: if its energy has grown, the last state before the growth, to within ten steps; if its
+    step was above the stable limit from the start, the state before the first step; none with
+    boundary(delete), or if the run was resumed from a file at that step.
 
-    Dumps include the state in which a run was interrupted or failed. A resumed run removes this
-    state from files with several snapshots, not snapshots in separate files.
+    Dumps include the state in which a run was interrupted or failed. A resumed run removes it from
+    files with several snapshots, not separate files.
 
     Example
     -------
@@ -348,9 +344,8 @@ def read_restart(hub: Hub, file: str) -> None:
     Notes
     -----
     First repeat the domain, method and solids of the script that wrote the file, and the fixes and
-    computes to continue: those with the same ID and style retain their values. Initial velocities
-    are not applied again. Anything else may differ: constants of materials, fixes, the time step,
-    outputs. Time and step continue from the file.
+    computes to continue: with the same ID and style they retain their values. Initial velocities
+    are not applied again. Anything else may differ. Time and step continue from the file.
 
     The run starts new output files. A picture or movie with the same ID, style and field retains
     the earlier colour scale.

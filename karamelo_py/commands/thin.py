@@ -27,12 +27,12 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
 
     Notes
     -----
-    Before the first material. Each law finds the strain across the plate for which the stress szz
-    vanishes. The column ``thickness`` is the present thickness over the initial one. Masses, forces
-    and energies refer to the whole thickness. Refused are liquids, gases and loose grains, which
-    have no strength without stress across, and anti_volumetric_locking: plane stress does not lock.
-    With a thickness other than 1, fixes that take the size of a point from its volume are refused:
-    contact between points and with surfaces, and fluxes through faces of points.
+    Before the first material. Each law finds the strain across the plate for which szz vanishes.
+    The column ``thickness`` is the present thickness over the initial one. Masses, forces and
+    energies refer to the whole thickness. Refused are liquids, gases and loose grains, which have
+    no strength without stress across, and anti_volumetric_locking: plane stress does not lock. With
+    a thickness other than 1, fixes that use sizes of points are refused: contact between points and
+    with surfaces, and fluxes through faces of points.
 
     See Also
     --------
@@ -104,7 +104,6 @@ def refuse_uneven(hub: Hub, material: Material, argument: str) -> None:
 
 
 def fit_to_domain(hub: Hub, material: Material) -> None:
-    """Make a material thin if the bodies of the scene are."""
     refuse_uneven(hub, material, "style")
     if hub.domain is None or not hub.domain.thin or is_rigid(material.whole):
         return

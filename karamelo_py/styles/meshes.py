@@ -59,8 +59,6 @@ def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> 
 
 
 class Enclosed(Region):
-    """Base of regions inside a `skin`."""
-
     skin: Skin
     from_file = True
 
@@ -96,8 +94,7 @@ class MeshRegion(Enclosed):
     group
         Name or number of a physical group; in other formats a set, an instance, a block, a property
         or a surface, and ``name:number`` for numbers of cells in VTK. Default: the whole mesh. A
-        group of lower dimension, such as a boundary, contains the positions on it, for groups of
-        nodes.
+        group of lower dimension, such as a boundary, serves to select nodes.
     exterior
         The word ``exterior`` selects everything outside.
 
@@ -109,8 +106,8 @@ class MeshRegion(Enclosed):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; elements of higher order count by their corners. Faces belong to elements.
-    Non-planar faces with four corners are two triangles. In 2D the mesh lies in the plane z = 0.
+    pyramids in 3D, by their corners, faces included. Non-planar faces with four corners are two
+    triangles. In 2D the mesh lies in the plane z = 0.
 
     See Also
     --------
@@ -159,8 +156,8 @@ class STL(Enclosed):
     Parameters
     ----------
     file
-        Name of a file with triangles or quadrilaterals: STL (text or binary), OBJ, or any format
-        that region mesh reads. In the length unit of the script: the file is not scaled.
+        A file with triangles or quadrilaterals: STL (text or binary), OBJ, or any format that
+        region mesh reads, in the length unit of the script.
     exterior
         The word ``exterior`` selects everything outside the surface.
 
@@ -170,8 +167,8 @@ class STL(Enclosed):
 
     Notes
     -----
-    The surface must be closed: every edge belongs to two triangles. A shell inside another one is a
-    cavity, whatever the orientation of its triangles. Shells that overlap are one body.
+    The surface must be closed: every edge belongs to two triangles. Shells inside others are
+    cavities, whatever their orientation; overlapping shells are one body.
 
     See Also
     --------
@@ -201,14 +198,14 @@ class STL(Enclosed):
 class MeshSolid(Solid):
     """A body with one point in each element of a mesh.
 
-    The point lies at the centroid of its element and has its exact volume, for every shape (times x
-    in axisymmetric domains).
+    It lies at the centroid of the element and has its exact volume (times x in axisymmetric
+    domains).
 
     Parameters
     ----------
     file
-        Name of a mesh file or of a geometry, as in region mesh. It is searched for in the current
-        folder, then next to the script.
+        Name of a mesh file or of a geometry, as in region mesh, in the current folder or next to
+        the script.
     group
         Name or number of a physical group (a set of elements, a part or an instance in other
         formats). Default: the whole mesh.
@@ -220,10 +217,9 @@ class MeshSolid(Solid):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; lower dimensions are ignored, and elements whose centroid lies outside the
-    domain too, with a warning. Elements of higher order have the volume within their curved edges.
-    The cpdi methods take elements of one shape, by their corners. In 2D the mesh lies in the plane
-    z = 0.
+    pyramids in 3D; lower dimensions are ignored, and, with a warning, centroids outside the domain.
+    Elements of higher order have the volume within their curved edges. The cpdi methods take
+    elements of one shape, by their corners. In 2D the mesh lies in the plane z = 0.
 
     See Also
     --------

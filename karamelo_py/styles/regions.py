@@ -113,10 +113,9 @@ class Cylinder(Primitive):
     Parameters
     ----------
     shape
-        In 2D ``xc, yc, R``: centre and radius. In 3D ``axis, c1, c2, R, lo, hi``: the word x, y
-        or z, the centre in the other two directions (in the order x, y, z), the radius, and the
-        ends along the axis, which may be ``INF`` (or ``EDGE``). A last word ``exterior`` selects
-        everything outside.
+        In 2D ``xc, yc, R``: centre and radius. In 3D ``axis, c1, c2, R, lo, hi``: the word x, y or
+        z, the centre in the other directions (in the order x, y, z), the radius, and the ends,
+        which may be ``INF`` (or ``EDGE``). A last word ``exterior`` selects everything outside.
 
     Example
     -------
@@ -224,7 +223,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """A half-space has no volume; the domain cuts it anywhere."""
+        """The domain cuts a half-space anywhere."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)
@@ -272,7 +271,6 @@ class Union(region.Region):
     intersection, difference
     """
 
-    # Combine the inside tests and the box corners of the parts.
     joined, low, high = np.logical_or, np.minimum, np.maximum
     kind: type = Joined
 
@@ -354,6 +352,6 @@ class Difference(region.Region):
 
 
 def outlines(parts: Sequence[region.Region]) -> tuple | None:
-    """Descriptions of regions for kernels; None if a region has none."""
+    """Descriptions of regions for kernels; None if one has none."""
     shapes = [part.outline() for part in parts]
     return None if any(one is None for one in shapes) else tuple(shapes)

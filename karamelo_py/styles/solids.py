@@ -29,9 +29,8 @@ MANY = 10  # more points per cell and direction than useful
 class RegionSolid(Solid):
     """A body that fills a region, with `ppc` points per cell and direction.
 
-    Points are placed in the cells of the grid, if they lie in the region and in the domain. Each
-    has the volume ``(h / ppc)^dimension`` (times x in axisymmetric domains) and the corresponding
-    mass of its material.
+    Points are placed in the cells of the grid, within the region and the domain. Each has the
+    volume ``(h / ppc)^dimension`` (times x in axisymmetric domains).
 
     Parameters
     ----------
@@ -42,10 +41,9 @@ class RegionSolid(Solid):
     points
         ``regular``: equally spaced. ``gauss``: at the Gauss points of the cell, with their weights
         as volumes. ``cut``: equally spaced, with boxes cut by the edge of the region. Default:
-        regular, with three exceptions. With ``ppc`` 3, points are at the Gauss points with equal
-        volumes, as in Karamelo, unless the basis has domains (ugimp, cpgimp, cpdi). Regions from
-        files (mesh, stl) are cut, unless the basis has domains. In ulmpm/contacts, regions with
-        curved or inclined faces are cut.
+        regular, except that, without domains of the basis (ugimp, cpgimp, cpdi), ``ppc`` 3 uses the
+        Gauss points with equal volumes, as in Karamelo, and regions from files (mesh, stl) are cut.
+        In ulmpm/contacts, regions with curved or inclined faces are cut.
 
     Example
     -------
@@ -55,16 +53,15 @@ class RegionSolid(Solid):
 
     Notes
     -----
-    Cells start at the lower corner of the domain; in methods with a grid for each solid, at the
-    lower corner of the box around the region, whose open sides end at the domain.
+    Cells start at the lower corner of the domain; in methods with a grid for each solid, of the box
+    around the region, whose open sides end at the domain.
 
-    A cut point lies at the centroid of the rest of its box and has the volume of this rest. A rest
-    of less than a tenth is merged with the nearest point. Round bodies then have their volume to
-    0.01 %, and no stair-stepped surface for contacting bodies to lock on. Fins and slots as thin as
-    a tenth of h/ppc have their mass to 3 %. A message warns if thinner parts may be missing. The
-    region of a plug-in without `distance` is sampled along the axes and may miss thin parts. With
-    ugimp and cpgimp, cut points have square domains, which do not tile the body at its edge. cpdi
-    refuses them.
+    A cut point has the volume and centroid of the rest of its box; a rest of less than 10 % is
+    merged with the nearest point. Round bodies have their volume to 0.01 %, and no stair-stepped
+    surface for contacting bodies to lock on. Fins and slots as thin as 10 % of h/ppc have their
+    mass to 3 %; a message warns if thinner parts may be missing. The region of a plug-in without
+    `distance` is sampled along the axes and may miss thin parts. With ugimp and cpgimp, cut points
+    have square domains, which do not tile the edge; cpdi refuses them.
 
     See Also
     --------
@@ -134,7 +131,7 @@ class RegionSolid(Solid):
         return None if whole is None else (total, whole)
 
     def _warn_of_size(self, hub: Hub) -> None:
-        """Warn if all of the body fits into a cell: the grid then sees hardly any deformation."""
+        """The grid then sees hardly any deformation."""
         size = float((self.hi - self.lo).max()) if self.count > 1 else np.inf
         if size < (1 - 1e-6) * self.h:
             hub.warn(
@@ -171,12 +168,12 @@ class PointsSolid(Solid):
     Parameters
     ----------
     table
-        Name of a file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z``
-        (one per dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains
-        the area in the plane xy) or ``mass``. Optional: velocities (``vx`` ...), temperatures
-        (``T``), Cauchy stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump
-        particle, vtk or hdf5, or of LAMMPS), points in VTK (.vtu), or an .xyz file, whose last
-        snapshot gives these columns. In Python, a dictionary of arrays or a DataFrame.
+        A file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z`` (one per
+        dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains the area in
+        the plane xy) or ``mass``. Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
+        stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump particle, vtk
+        or hdf5, or of LAMMPS), points in VTK (.vtu), or an .xyz file, whose last snapshot gives
+        these columns. In Python, a dictionary of arrays or a DataFrame.
     volume
         Volume of each point, if the file has none.
     GlueToSolid
@@ -189,11 +186,11 @@ class PointsSolid(Solid):
 
     Notes
     -----
-    With a basis that has domains around points, each domain is a square or cube of the volume of
-    its point. The cpdi methods refuse this style: their domains tile a body.
+    Domains of a basis are squares or cubes of the volume of the point. The cpdi methods, whose
+    domains tile a body, refuse this style.
 
-    From a dump, other columns (``ep``, ``damage`` ...) are not taken: materials start without a
-    history. ``read_restart`` continues a run with all of it.
+    Materials start without a history: other columns of a dump (``ep``, ``damage`` ...) are ignored.
+    ``read_restart`` continues a run with all of it.
 
     See Also
     --------

@@ -28,7 +28,7 @@ class KineticEnergy(Energy):
 
     Notes
     -----
-    Like velocities, it belongs to half a step before the logged time (see `scheme`).
+    It belongs to half a step before the logged time (see `scheme`).
 
     See Also
     --------
@@ -85,8 +85,7 @@ class FixStrainEnergy(StrainEnergy, Fix):
 class DissipatedEnergy(Energy):
     """Measure the energy that a group of points has dissipated; published as ID.
 
-    Plastic and viscous work, and energy released by damage. It is 0 for materials without
-    dissipation.
+    Plastic and viscous work, and energy released by damage; 0 without dissipation.
 
     Example
     -------
@@ -112,7 +111,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """Present drift; `scale` > 0 is a possible magnitude of the value."""
+        """`scale` > 0 is a possible magnitude of the value."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value
@@ -138,11 +137,11 @@ class EnergyBalance(Compute):
 
     Notes
     -----
-    Publishes ID, the sum, and ID_total, the energies without the work. ID_drift is the change of ID
-    since the first output, divided by the largest kinetic, stored or dissipated energy or work so
-    far. Velocities lag positions by half a step, which gives a drift of the order of dt (33 % in a
-    body of a few cells); the end of a run prints the change between energies at equal times. The
-    energy that affine transfers store within points is not included.
+    Publishes ID, the sum; ID_total, without the work; and ID_drift, the change of ID since the
+    first output over the largest kinetic, stored or dissipated energy or work so far. Velocities
+    lag positions by half a step, which gives a drift of the order of dt (33 % in a body of a few
+    cells); the end of a run prints the change between energies at equal times. Energy stored within
+    points by affine transfers is not included.
 
     See Also
     --------
@@ -221,8 +220,7 @@ class AngularMomentum(Momentum):
     Notes
     -----
     Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
-    the largest sum m |x - c| |v| so far. The sum contains the angular momentum in the affine
-    velocity of points (APIC), which that transfer conserves with it.
+    the largest sum m |x - c| |v| so far. The affine velocity of points (APIC) is included.
 
     See Also
     --------

@@ -32,7 +32,7 @@ def column(points: PointTable, name: str) -> np.ndarray:
 class PointField:
     """A field of points: its name in the script, and its columns (one for a scalar).
 
-    `weights` count components in the square of the magnitude: shear components twice.
+    `weights` count shear components twice in the square of the magnitude.
     """
 
     script_kind = "a column of points, or displacement, velocity, stress or strain"
@@ -56,8 +56,8 @@ class PointField:
 class Norm:
     """Norm of a difference: L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    In a history, each difference is weighted by the time since the last output: the result does not
-    depend on the number of outputs.
+    In a history, differences are weighted by the time since the last output: the number of outputs
+    has no effect.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -92,7 +92,7 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """Like `scaled`, and add the moment to `history` and `largest`, once."""
+        """As `scaled`, and add the moment to `history` and `largest`, once."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -112,7 +112,6 @@ class Norm:
         return now
 
     def scaled(self, difference: float, exact: float) -> float:
-        """Absolute or relative norm, from those of differences and exact values."""
         if not self.relative or difference == 0:
             return float(difference)
         return float(difference / exact) if exact else inf
@@ -153,9 +152,9 @@ class Error(Compared, Compute):
         field: ``displacement``, ``velocity``, ``stress``, ``strain``.
     expression
         The exact value: a formula of x, y, z (present position), x0, y0, z0 (initial position),
-        time, and published values. For a whole field: one formula per known component, in the order
-        x, y, z or 11, 22, 33, 12, 13, 23. NULL omits a component. Then, in any order, the norm,
-        ``L1``, ``L2`` (default) or ``max``, and ``absolute`` (default) or ``relative``.
+        time, and published values. For a whole field: one per known component, in the order x, y, z
+        or 11, 22, 33, 12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2``
+        (default) or ``max``, and ``absolute`` (default) or ``relative``.
 
     Example
     -------
@@ -165,14 +164,14 @@ class Error(Compared, Compute):
 
     Notes
     -----
-    With e the magnitude of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and V0 the
-    initial volume of the point: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max
-    e. ``relative`` divides by the same norm of the exact values; while they vanish, by the largest
-    norm so far; before the first it gives inf.
+    With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and its initial
+    volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e. ``relative``
+    divides by the same norm of the exact values; while they vanish, by the largest norm so far;
+    before the first it gives inf.
 
-    Publishes ID, the present error; ID_max, the largest output so far; and ID_history, the norm
-    over points and all time so far, in which each output is weighted by the time since the previous
-    one. With ``relative`` both norms cover the whole history: exact values may vanish at times.
+    Publishes ID, the present error; ID_max, the largest so far; and ID_history, the norm over
+    points and all outputs so far, weighted by the time since the previous one. With ``relative``
+    both norms cover the whole history: exact values may vanish at times.
 
     See Also
     --------
@@ -237,16 +236,14 @@ class Reference(Compared, Compute):
     Parameters
     ----------
     subject
-        A value (``v_x``, a variable, a formula of values), compared over time. Or a group of points
-        or ``all``, compared over a coordinate.
+        A value (``v_x``, a variable, a formula of values), compared over time, or a group of
+        points, compared over a coordinate.
     file
-        Columns of numbers, separated by commas, semicolons or blanks. The first row has their
-        names; without it they are named 1, 2, ... Lines that begin with # are comments. The first
-        column is the time, or for points the coordinate of that name: x, y, z, x0, y0, z0 or any
-        other column of points.
+        Columns of numbers, separated by commas, semicolons or blanks, with names in the first row
+        (else 1, 2, ...); # begins a comment line. The first column is the time, or for points the
+        coordinate of that name: x, y, z, x0, y0, z0 or any other column of points.
     column
-        The column of the file to compare with; for points also the column of the points, such as
-        s11 or vx.
+        The column to compare with; for points also their column, such as s11 or vx.
     norm
         ``L1``, ``L2`` (default) or ``max``, and ``absolute`` (default) or ``relative``, in any
         order.
@@ -262,10 +259,10 @@ class Reference(Compared, Compute):
     -----
     The curve is linear between its rows. Values beyond its ends are not compared.
 
-    For a value, ID is the norm of its difference over the time so far, each output weighted by the
-    time since the previous one. ID_now is the present difference, ID_curve the present value of the
-    curve. For points, ID and ID_now are the present norm over the points, weighted by initial
-    volumes. ID_curve is the mean of the curve at the points.
+    For a value, ID is the norm of its difference over the outputs so far, weighted by the time
+    since the previous one, ID_now the present difference, ID_curve the present value of the curve.
+    For points, ID and ID_now are the present norm, weighted by initial volumes, ID_curve the mean
+    of the curve at the points.
 
     See Also
     --------
@@ -332,6 +329,6 @@ class Reference(Compared, Compute):
         return sizes, points.reference_volume[within], exact, np.ones(len(exact))
 
     def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which positions (n,) the curve covers, and its values there."""
+        """Mask (n,) of the positions that the curve covers, and its values there."""
         within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
         return within, np.interp(at[within], *self.curve)

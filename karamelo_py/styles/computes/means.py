@@ -17,7 +17,7 @@ from karamelo_py.script.errors import ScriptError
 class Mean(Compute):
     """Base of computes of means: `terms` of points are weights, and weights times quantities.
 
-    With zero total weight the mean is 0, like the sums of other computes.
+    With zero total weight the mean is 0.
     """
 
     empty = 0.0
@@ -55,8 +55,8 @@ class AverageStress(Mean):
 
     Notes
     -----
-    The mean is over the present volume: sum V sigma / sum V. For a body at rest it depends only on
-    the forces on its surface. A group without points gives 0.
+    Over the present volume: sum V sigma / sum V; 0 without points. For a body at rest it depends
+    only on the forces on its surface.
 
     See Also
     --------
@@ -73,8 +73,7 @@ class AverageStress(Mean):
 class AverageTemperature(Mean):
     """Measure the mean temperature of a group of points; published as ID.
 
-    Weighted by mass. Points of materials without a temperature count as 0. A scene without any
-    such material is refused.
+    Weighted by mass; points without a temperature count as 0. Refused if no material has one.
 
     Example
     -------
@@ -205,8 +204,8 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z: the coordinate up to which the mass of the points reaches the
-    fraction. Unlike the largest position, it does not jump when a few points fly ahead.
+    Published as ID_x, ID_y, ID_z. Unlike the largest position, it does not jump when a few points
+    fly ahead.
 
     Parameters
     ----------
@@ -231,7 +230,7 @@ class PositionQuantile(Compute):
 
     def refresh(self) -> None:
         d = self.hub.domain.dimension
-        # Radix selection: bits of coordinates, eight at a time, from the highest.
+        # Radix selection: eight bits of coordinates at a time, from the highest.
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
@@ -332,7 +331,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Distance, id and columns of the given point, or of the nearest of these."""
+        """Distance, id and columns of the given or nearest point."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

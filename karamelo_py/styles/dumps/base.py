@@ -24,8 +24,8 @@ class Dump(Rhythmic):
         Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
         always written.
     file
-        File name. The first ``*`` becomes the step number; without ``*`` all snapshots are written
-        to one file, one after another.
+        File name. The first ``*`` becomes the step number; without ``*`` one file has all
+        snapshots.
     columns
         Content of the dump, interpreted by the style.
     """
@@ -48,7 +48,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """Do what the first of several processes does, which alone writes."""
+        """As the first process does, which alone writes."""
         with discarded():
             self.write()
 
@@ -63,12 +63,12 @@ class Dump(Rhythmic):
 
 
 POSITIONS = ("x", "y", "z")
-# Written with every row anyway, so requests are ignored. `tag` is Karamelo's other name of the id.
+# Written with every row anyway; `tag` is Karamelo's other name of the id.
 LEADING = ("id", "type", "tag")
 
 
 class TableRows(NamedTuple):
-    """Rows in the order of their ids: identities and types, (n,) integers; columns."""
+    """Rows in the order of ids: ids and types, (n,) integers; columns."""
 
     ids: np.ndarray
     types: np.ndarray
@@ -78,9 +78,9 @@ class TableRows(NamedTuple):
 class TableDump(Dump):
     """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
 
-    `OfPoints` or `OfNodes`, which precedes this class among the bases of a style, defines the rows:
-    `names` of columns that can be written, `absent` ones (always 0), the `extent` (number of rows,
-    largest id), and all rows in the order of their ids, in `tables` that fit into memory.
+    `OfPoints` or `OfNodes`, an earlier base of a style, defines the rows: `names` of columns,
+    `absent` ones (always 0), the `extent` (number of rows, largest id), and all rows by id, in
+    `tables` that fit into memory.
 
     Attributes
     ----------

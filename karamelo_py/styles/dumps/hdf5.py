@@ -22,8 +22,6 @@ OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
 
 
 class SnapshotRows(NamedTuple):
-    """The rows of one snapshot, in pieces; `last` is the largest id."""
-
     time: float
     step: int
     last: int
@@ -101,8 +99,8 @@ class Hdf5Dump(TableDump):
     def resumed(self) -> None:
         """Continue the file of an earlier run, with the snapshots that it had then.
 
-        They are rewritten, as at first, for equal bytes. A file that a killed program was writing
-        can be read but not written.
+        They are rewritten for equal bytes. A file that a killed program was writing can be read but
+        not written.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -136,7 +134,7 @@ class Hdf5Dump(TableDump):
 
     @property
     def _first(self) -> int:
-        """Smallest id: points are numbered from 1, nodes from 0."""
+        """Points are numbered from 1, nodes from 0."""
         return int(self.rows_are == "points")
 
     def _prepare(self, root: Any, last: int) -> None:
@@ -227,16 +225,15 @@ class Hdf5(OfPoints, Hdf5Dump):
     """Write the material points to one compressed binary file, which h5py and xarray read.
 
     Each column is an array over time and id. Deleted points are NaN. The file is complete after
-    every snapshot. A small file of the same name with the ending ``.vtkhdf`` refers to it: ParaView
-    opens that one, with all snapshots.
+    every snapshot. ParaView opens the small file of the same name with the ending ``.vtkhdf``, with
+    all snapshots.
 
     Notes
     -----
     In Python::
 
-        points = xarray.open_dataset("points.h5", engine="h5netcdf")
-        points.seq.sel(time=0.5, method="nearest").max()
-        h5py.File("points.h5")["seq"][-1]
+        points = xarray.open_dataset("points.h5", engine="h5netcdf") points.seq.sel(time=0.5,
+        method="nearest").max() h5py.File("points.h5")["seq"][-1]
 
     Open a file whose program was killed while writing with ``h5py.File(name, swmr=True)``. After a
     full disk, the file has the snapshots that were complete.

@@ -42,8 +42,6 @@ class Plain:
 
 
 class LammpsDump(TableDump):
-    """A dump in LAMMPS text format."""
-
     # For a file with all snapshots: position of the next one, length of the text so far, and the
     # encoder's state.
     remembers = ("_end", "_length")
@@ -140,7 +138,7 @@ class Gzipped:
     """
 
     def encoder(self) -> Any:
-        """Make a gzip stream without name and date, for reproducible bytes."""
+        """Without name and date, for reproducible bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
     opened = staticmethod(gzip.open)
@@ -173,9 +171,8 @@ class Particle(OfPoints, LammpsDump):
     """Write the material points in LAMMPS text format, which OVITO opens.
 
     Each row begins with the point's number (``id``, constant during the run) and the number of its
-    solid (``type``, from 1). Positions are always written. The header contains the step and, as
-    ``ITEM: TIME``, the time. The column ``element`` has the names of the solids, which OVITO shows
-    as particle types.
+    solid (``type``, from 1). Positions are always written. The header has the step and, as ``ITEM:
+    TIME``, the time. The column ``element`` has the names of solids, OVITO's particle types.
 
     Example
     -------
@@ -199,9 +196,9 @@ class GridDump(OfNodes, LammpsDump):
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
     number of its grid (``type``, from 1). Positions are always written.
 
-    Grids follow one another, with consecutive ids. ulmpm and ulcpdi have one grid. tlmpm and tlcpdi
-    have one for each solid, over its reference shape. ulmpm/contacts has the grid of the domain
-    once for each velocity field, so several rows have the same position.
+    Grids have consecutive ids: one in ulmpm and ulcpdi; in tlmpm and tlcpdi one for each solid,
+    over its reference shape; in ulmpm/contacts the domain's once for each velocity field, so
+    several rows have the same position.
 
     Example
     -------
@@ -212,7 +209,7 @@ class GridDump(OfNodes, LammpsDump):
 class ParticleGz(Gzipped, Particle):
     """Write the material points in LAMMPS text format, gzipped, which OVITO opens directly.
 
-    A file has less than half the size. Otherwise like dump particle.
+    Less than half the size; otherwise like dump particle.
 
     Example
     -------
@@ -242,7 +239,7 @@ class GridGz(Gzipped, GridDump):
 class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers retain all digits, and files are written faster than text. Otherwise like dump particle.
+    All digits, written faster than text; otherwise like dump particle.
 
     Example
     -------
@@ -259,7 +256,7 @@ class ParticleBin(BinaryRows, Particle):
 class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers retain all digits, and files are written faster than text. Otherwise like dump grid.
+    All digits, written faster than text; otherwise like dump grid.
 
     Example
     -------

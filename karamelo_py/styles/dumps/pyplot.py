@@ -38,8 +38,8 @@ SAMPLE = 1 << 16  # points, about, from which the typical size is measured
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
-    In 2D and 3D the points are drawn at their positions; in 1D the field is drawn over x. By
-    default the colour limits grow with the values, so the pictures of a run can be compared.
+    In 1D the field is drawn over x. By default the colour limits grow with the values, so the
+    pictures of a run can be compared.
 
     Parameters
     ----------
@@ -50,14 +50,12 @@ class PyPlot(Dump):
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
         ``*`` each picture replaces the previous one.
     width, height
-        Size of the picture: up to 50 in inches (of 100 pixels), above that in pixels; from 20 to
-        20000 pixels.
+        Size: up to 50 in inches (of 100 pixels), above in pixels; from 20 to 20000 pixels.
     field
-        Column of dump particle that sets the colour, or a formula of columns, time and published
-        values. The name of a group or solid is a column, too: 1 for its points, 0 elsewhere.
-        Default: the solid (in 1D: vx is drawn).
+        Column of dump particle that sets the colour, or a formula of columns, groups and solids (1
+        for their points, else 0), time and published values. Default: the solid (in 1D: vx).
     vmin, vmax
-        Limits of the colours. If a picture has values beyond, the colour bar ends in an arrow.
+        Limits of the colours. With values beyond, the colour bar ends in an arrow.
     cmap
         A Matplotlib colour map; default viridis, or coolwarm for components with either sign.
     azimuth, elevation
@@ -66,20 +64,18 @@ class PyPlot(Dump):
         false: without axes and numbers.
     title
         Text above, before step and time. A name or formula in braces becomes its present number, as
-        in "force {press_y} N". Two braces make one, and dollars enclose mathematics, as in
-        "$v_{max}$".
+        in "force {press_y} N"; two braces make one. Mathematics is in dollars, as in "$v_{max}$".
     label
         Label of the colour bar, such as "stress (MPa)"; default: the column.
     only
-        A condition of columns as in `field`: other points are omitted, to slice a body or omit
-        groups and solids, as in ``not tool && y > 0``.
+        A condition of columns as in `field`; other points are omitted, as in ``not tool && y > 0``.
     xmin, xmax, ymin, ymax, zmin, zmax
         Limits of the view; default: the domain.
     scale
         log: colours follow the logarithm of the column.
     quantile
-        Fraction of the values beyond either colour limit, such as 0.01, so that a few large values
-        do not use up all colours.
+        Fraction of the values beyond either colour limit, such as 0.01: a few large values do not
+        use up all colours.
     dpi
         Pixels per inch. A picture of 600 pixels is 6 inches wide, and has 1800 with 300.
     fontsize
@@ -89,9 +85,8 @@ class PyPlot(Dump):
     mirror
         true: in an axisymmetric scene, draw the points on both sides of the axis.
     outlines
-        true: a line around each solid, and around the regions, walls and rigid tools of fixes, such
-        as contact/surface. In 3D tools are drawn by their edges and sections; hidden lines are
-        light.
+        true: a line around each solid, and around the regions, walls and rigid tools of fixes. In
+        3D tools are drawn by edges and sections; hidden lines are light.
 
     Example
     -------
@@ -259,7 +254,7 @@ class PyPlot(Dump):
 
 
 def title_of(step: int, time: float, unit: str) -> str:
-    """Write the time in its unit; without one, the step and the time."""
+    """Without a unit, the step and the time."""
     if unit:
         return f"t = {time_text(time, unit)}"
     return f"step {step}" + ("" if np.isnan(time) else f", time {time:.6g}")
@@ -342,13 +337,13 @@ FRAMES_PER_SECOND = 25
 class Movie(PyPlot):
     """Draw a movie of the points, with pictures like dump pyplot: 25 frames per second.
 
-    The file is written at the end of each run, also of a failed or interrupted one.
+    Written at the end of each run, also of a failed or interrupted one.
 
     Parameters
     ----------
     every
-        Steps between two frames, or ``time(T)``. The first and the last state of a run are
-        always drawn.
+        Steps between two frames, or ``time(T)``. The first and the last state of a run are always
+        drawn.
     file
         File name ending in .gif or, if the program ffmpeg is installed, .mp4.
     vmin, vmax

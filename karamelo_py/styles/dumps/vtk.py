@@ -83,9 +83,9 @@ class VtkDump(TableDump):
 class Vtk(OfPoints, VtkDump):
     """Write the material points as a series of VTU files, which ParaView opens.
 
-    A file of the same name with the ending ``.pvd`` lists all snapshots with their times: open that
-    one. All components of velocity, force, stress or strain are also written as one array, for
-    ParaView's filters Glyph, Warp By Vector and Tensor Glyph.
+    Open the file of the same name with the ending ``.pvd``, which lists all snapshots with their
+    times. All components of velocity, force, stress or strain are also one array, for ParaView's
+    filters Glyph, Warp By Vector and Tensor Glyph.
 
     Example
     -------
@@ -109,7 +109,7 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 class GridVtk(OfNodes, VtkDump):
     """Write the background grids, with values at their nodes, as a series of VTU files.
 
-    Open the file of the same name with the ending ``.pvd`` in ParaView, which lists all snapshots
+    In ParaView open the file of the same name with the ending ``.pvd``, which lists all snapshots
     with their times.
 
     Parameters
@@ -127,7 +127,7 @@ class GridVtk(OfNodes, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Store the numbers of the written nodes if some are omitted."""
+        """The numbers of the written nodes, if some are omitted."""
         if self.occupied:
             kept.append(ids)
 

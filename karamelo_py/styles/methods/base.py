@@ -30,7 +30,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """True if the yield surface of a law uses part of the averaged pressure (F-bar)."""
+    """The yield surface of a law uses part of the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -61,7 +61,7 @@ class Method:
     place
         Place of the command in the script, for messages.
     frame
-        Whether weights belong to present or reference positions.
+        Weights belong to present or reference positions.
     own_grids
         Whether each solid has a separate grid over its bounding box, with its cell size.
     fields_per_solid
@@ -81,7 +81,7 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """True if the points of a cell are equally spaced, so that their domains tile it."""
+        """The points of a cell are equally spaced, so that their domains tile it."""
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
@@ -113,7 +113,7 @@ class Method:
         return 0
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """The nodes to hold where a fix gives all components of the velocity of `nodes`."""
+        """Nodes to hold where a fix gives all components of the velocity of `nodes`."""
         return nodes
 
     def kinematics(self, hub: Hub) -> Any:

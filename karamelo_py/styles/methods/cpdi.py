@@ -82,8 +82,8 @@ class Convected(Method):
 class ULCPDI(Convected, ULMPM):
     """CPDI: each point has a deforming domain, and sees the nodes around its corners.
 
-    All solids share one grid. A body does not fracture numerically, however far it stretches.
-    Forces do not jump when a point crosses a cell face (Sadeghirad et al. 2011, 2013).
+    All solids have one grid. No numerical fracture at any stretch, and no jump of forces when a
+    point crosses a cell face (Sadeghirad et al. 2011, 2013).
 
     ``R4`` and ``R8``
         parallelograms and parallelepipeds that follow the deformation of their point: robust;
@@ -102,8 +102,8 @@ class ULCPDI(Convected, ULMPM):
 class TLCPDI(Convected, TLMPM):
     """Total Lagrangian CPDI: initial domains on a separate grid for each solid.
 
-    Domains do not deform, so they cannot tangle, and weights never change. Solids do not interact
-    on the grid. The variants are listed under ulcpdi.
+    Domains do not deform, so they cannot tangle. Solids do not interact on the grid. Variants: see
+    ulcpdi.
 
     Example
     -------

@@ -16,10 +16,10 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 class ULMPM(Method):
-    """Updated Lagrangian MPM: weights follow the present positions; all solids share one grid.
+    """Updated Lagrangian MPM: weights follow the present positions; one grid for all solids.
 
-    Solids that meet on the grid move together there: contact without slip, with no further
-    definition. Nodes near points of a rigid solid take its velocity.
+    Solids that meet on the grid move together there: contact without slip. Nodes near points of a
+    rigid solid take its velocity.
 
     Example
     -------
@@ -27,9 +27,9 @@ class ULMPM(Method):
 
     Notes
     -----
-    Publishes the force on every rigid solid as ContactForce_ID_x, ContactForce_ID_y,
-    ContactForce_ID_z, with the solid's ID, and its torque about the origin as ContactTorque_ID_x
-    and so on. The torque about a position c is ContactTorque_ID - c x ContactForce_ID.
+    Publishes the force on every rigid solid ID as ContactForce_ID_x, ContactForce_ID_y,
+    ContactForce_ID_z, and its torque about the origin as ContactTorque_ID_x and so on. The torque
+    about a position c is ContactTorque_ID - c x ContactForce_ID.
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
@@ -61,11 +61,10 @@ known_failure(
 class TLMPM(Method):
     """Total Lagrangian MPM: weights belong to reference positions, each solid has its own grid.
 
-    Weights never change: no point crosses a cell face, and a body breaks only if its law says so.
-    Solids do not interact on the grid: define contact with fixes (contact/hertz,
-    contact/minimize_penetration). For bodies that retain their topology (de Vaucorbeil, Nguyen &
-    Hutchinson 2020, "A Total-Lagrangian material point method for solid mechanics problems
-    involving large deformations").
+    No point crosses a cell face, and a body breaks only if its law says so. Solids do not interact
+    on the grid: define contact with fixes (contact/hertz, contact/minimize_penetration). For bodies
+    that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A Total-Lagrangian
+    material point method for solid mechanics problems involving large deformations").
 
     Example
     -------

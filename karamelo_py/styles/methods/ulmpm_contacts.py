@@ -42,11 +42,10 @@ def flows(law: NamedTuple) -> bool:
 
 
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
-    """(F, F): the fraction of frictional heat that the first of two solids takes.
+    """(F, F): fraction of frictional heat that the first of two solids takes.
 
-    With conduction, by effusivity sqrt(kappa rho cp), as between two half-spaces in contact
-    (Carslaw & Jaeger 1959, section 2.15); otherwise half each. A solid without a temperature takes
-    none.
+    With conduction, by effusivity sqrt(kappa rho cp), as between half-spaces in contact (Carslaw &
+    Jaeger 1959, section 2.15); otherwise half each, none without a temperature.
     """
     takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
     root = [conductivity(law, 1.0) * heat_capacity(law, 1.0) / specific_volume(law) for law in laws]
@@ -59,10 +58,9 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
 class ULMPMContacts(Method):
     """Updated Lagrangian MPM with contact: a velocity field on the grid for each solid.
 
-    Solids move freely until they approach each other and the gap between them is closed. Then they
-    push each other along their common normal. They separate freely. Contact is frictionless unless
-    fix contact/friction defines friction for a pair of solids. Rigid solids do not yield to
-    contact.
+    Solids that approach each other push each other along their common normal once the gap is
+    closed, and separate freely. Contact is frictionless unless fix contact/friction defines
+    friction for a pair of solids. Rigid solids do not yield to contact.
 
     Example
     -------
@@ -70,42 +68,40 @@ class ULMPMContacts(Method):
 
     Notes
     -----
-    Publishes the contact force on every solid (the sum of m dv/dt over its nodes) as
-    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, with the solid's ID, and its torque
-    about the origin as ContactTorque_ID_x and so on. Solids that are glued together have one field
-    and one force.
+    Publishes the contact force on every solid ID (the sum of m dv/dt over its nodes) as
+    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and its torque about the origin as
+    ContactTorque_ID_x and so on. Glued solids have one field and one force.
 
-    The gap follows from the mean position of the points around a node. The outermost layer of
-    points lies half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the
-    material point method using multimaterial methods"). This is exact for plane surfaces along the
-    grid. Solids with curved or inclined faces use cut points there (points=cut), unless the command
-    ``solid`` says otherwise: whole squares (points=regular) make such a face stair-stepped, and a
-    block on a slope of 20 degrees sticks. With bernstein-quadratic the gap is unknown, and contact
-    begins as soon as two solids have mass at one node.
+    The gap follows from the mean position of the points around a node, with the outermost layer
+    half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the material
+    point method using multimaterial methods"): exact for plane surfaces along the grid. Solids with
+    curved or inclined faces use cut points (points=cut), unless the command ``solid`` says
+    otherwise: whole squares (points=regular) make such a face stair-stepped, and a block on a slope
+    of 20 degrees sticks. With bernstein-quadratic the gap is unknown, and contact begins as soon as
+    two solids have mass at one node.
 
     A node at a surface loses its velocity of approach. Colliding bars of 4, 8 and 16 cells lose 15,
     11 and 4 % of the kinetic energy.
 
     For a fixed base, use a rigid solid or fix velocity_nodes with all components, on a group with
-    all corners of the cells of the base. With splines a base should be three cells thick: the
-    surface of a thinner one appears higher by up to a quarter of a cell.
+    all corners of the cells of the base. With splines it should be three cells thick: the surface
+    of a thinner base appears higher by up to a quarter of a cell.
 
-    Walls of one cell contain liquids and granular materials, also in corners, inclined, and as they
-    move. In 1e5 steps the centres of points of water and sand reached at most 4 % of a cell into
-    walls at rest, and 26 % into moving walls. Within 100 steps after a contact at a node, they may
-    leave a wall there but not approach it.
+    Walls of one cell contain liquids and granular materials, also in corners, inclined, and moving.
+    In 1e5 steps the centres of points of water and sand reached at most 4 % of a cell into walls at
+    rest, and 26 % into moving walls. Within 100 steps after a contact at a node, they may leave a
+    wall there but not approach it.
 
-    Both solids at a node have one normal, so their impulses are opposite and momentum is conserved.
-    It comes from the sums of m grad N of both, averaged over the neighbouring nodes with the
-    weights 1/4, 1/2, 1/4 along each axis. The solid whose sums scatter less has more weight: the
-    face where a corner lies on a face. For a solid with a prescribed velocity, only its normal
-    counts, except at the end of its face. Solids that are apart along a grid axis are not in
-    contact.
+    Both solids at a node have one normal, so momentum is conserved. It comes from the sums of m
+    grad N of both, averaged over the neighbouring nodes with the weights 1/4, 1/2, 1/4 along each
+    axis. The solid whose sums scatter less has more weight: the face where a corner lies on a face.
+    For a solid with a prescribed velocity, only its normal counts, except at the end of its face.
+    Solids that are apart along a grid axis are not in contact.
 
     At a node of more than two solids, every approaching pair computes its impulse from the same
-    velocities. The impulse is smaller for solids in several pairs; the rest is removed in up to 16
-    passes. The order of the solids in the script has no effect. Contact does not move nodes held by
-    fix velocity_nodes: their impulse is added to the reaction of that fix.
+    velocities, less for solids in several pairs; the rest is removed in up to 16 passes. The order
+    of the solids has no effect. Contact does not move nodes held by fix velocity_nodes: their
+    impulse is added to the reaction of that fix.
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
     for the material point method and application to stress propagation in granular material".
