@@ -13,7 +13,7 @@ ROWS = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", PAGE, re.M)[1:]
 STYLES = {
     "water in pores": [("command", "pore"), ("fix", "pore"), ("material", "pore")],
     "inflow, outflow": [("fix", "inflow"), ("fix", "outflow"), ("fix", "absorbing")],
-    "rigid bodies": [("fix", "rigid_body"), ("fix", "rigid")],
+    "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],
     "creep": [("strength", "norton"), ("strength", "perzyna"), ("material", "mullins")],

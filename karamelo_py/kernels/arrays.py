@@ -382,6 +382,7 @@ class Setup(NamedTuple):
     transfer: Tag
     averaging: Tag  # F-bar or none
     contact: Tag
+    bodies: Tag  # rigid bodies that move freely, or none
     heat: Tag  # heat conduction and its nodes, or none
     grids: Grid  # with an array (g,) for each number
     nodes: Nodes

@@ -389,11 +389,13 @@ LOSS = SceneTask(
     "kinetic energy that the nodes lose, as heat to the points",
 )
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
-CONTACT = SceneTask(lambda s: s.contact.rows, "contact of v*")
+CONTACT = SceneTask(
+    lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
+)
 WORK_OF_LOADS = WorkOfLoads()
 # The deforming velocity must satisfy contact too, unless it is v*.
-CONTACT_BEFORE = SceneTask(lambda s: s.contact.rows_before)
-CONTACT_AFTER = SceneTask(lambda s: s.contact.rows_after)
+CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
+CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
 SERIES = SceneTask(sum_series, "series of XPIC")
 

@@ -8,7 +8,7 @@ from karamelo_py.points.laws.parameters import AboveZero
 
 
 class Rigid(NamedTuple):
-    """A body with prescribed velocity that nothing can deform or deflect.
+    """A body that nothing can deform, moved as prescribed or by the forces on it.
 
     Parameters
     ----------
@@ -22,7 +22,8 @@ class Rigid(NamedTuple):
     Notes
     -----
     Points retain the velocity set by fix initial_velocity_particles or fix velocity_particles
-    whatever forces act, without stress. The step is limited only to a cell of travel.
+    whatever forces act, without stress, unless fix rigid_body moves them. The step is limited only
+    to a cell of travel.
 
     In ulmpm and ulcpdi, nodes around its points have its velocity at any density; in
     ulmpm/contacts, contact does not move it. These methods publish the force on the solid ID as
@@ -33,7 +34,7 @@ class Rigid(NamedTuple):
 
     See Also
     --------
-    material, fix velocity_particles, fix initial_velocity_particles
+    material, fix rigid_body, fix velocity_particles, fix initial_velocity_particles
     """
 
     in_lanes = True

@@ -31,6 +31,7 @@ from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import flip_coefficient, lost_fractions, stores_moment
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
+from karamelo_py.run.lower.bodies import lower_bodies
 from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.stable_step import sparse
@@ -163,7 +164,8 @@ def lower(
     )
     setup = arrays.Setup(
         frame=method.frame, kin=kin, basis=basis, transfer=transfer,
-        averaging=method.averaging(hub), contact=contact, heat=heat, grids=grids, nodes=nodes,
+        averaging=method.averaging(hub), contact=contact, bodies=lower_bodies(hub, lattices),
+        heat=heat, grids=grids, nodes=nodes,
         buffers=tiles.empty_buffers(nodes, len(hub.solids)),
         blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
         **no_nodes(), control=control,

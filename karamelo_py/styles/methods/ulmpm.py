@@ -38,7 +38,8 @@ class ULMPM(Method):
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         solids = list(hub.solids.values())
-        rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
+        free = [fix.body for fix in hub.fixes.values()]
+        rigid = [can(s.material.law, constrained_velocity) and s not in free for s in solids]
         if not any(rigid):
             return super().contact_between(hub, lattices)
         slots = np.full((2, len(solids)), -1)

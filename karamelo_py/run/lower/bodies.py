@@ -1,0 +1,156 @@
+"""Lowering of rigid bodies that move freely, and what they do not support."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from karamelo_py.compiler import address_of
+from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
+from karamelo_py.kernels import free_bodies as kernel
+from karamelo_py.kernels.contact import ListedPairs
+from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import Lattice
+from karamelo_py.scene.modify import Fix
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.fixes.rigid_body import ContactRigidBody, surfaces_of
+
+
+def key_of_bodies(hub: Hub) -> tuple:
+    """What the arrays of bodies depend on: they are made again if it changes."""
+    fixes = hub.fixes.values()
+    if not any(fix.body for fix in fixes):
+        return ()
+    kinds = (fix for fix in fixes if fix.body or isinstance(fix, ContactRigidBody))
+    return tuple(kinds), tuple(fix for fix in fixes if fix.prescribes_velocity)
+
+
+def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies | kernel.NoBodies:
+    moving = [fix for fix in hub.fixes.values() if fix.body]
+    _refuse(hub, moving)
+    if not moving:
+        return kernel.NoBodies()
+    held = np.zeros(
+        (sum(lattice.node_count for lattice in lattices), hub.domain.dimension), np.bool_
+    )
+    for fix in hub.fixes.values():
+        for k, formula in enumerate(fix.formulas) if fix.prescribes_velocity else ():
+            if formula is not None:
+                held[slice(None) if fix.group.all else fix.nodes, k] = True
+    return kernel.FreeBodies(tuple(_body(hub, fix, len(held)) for fix in moving), held)
+
+
+def _body(hub: Hub, fix: Any, nodes: int) -> kernel.Body:
+    count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
+    separate = hub.update.method.fields_per_solid
+    pairs = nodes if separate else 1
+    capacity = (nodes if separate else count * max(1, len(surfaces_of(fix)))) + 1
+    programs, code, numbers = np.full((kernel.FORMULAS, 4), -1), [], [np.empty(0)]
+    lines = values = 0
+    for k, formula in enumerate(fix.formulas_of_body):
+        if formula is None:
+            continue
+        program = formula.program(hub.values) if not formula.is_constant else None
+        constants = np.array([formula.constant]) if program is None else program.constants
+        length = 0 if program is None else len(program.code)
+        programs[k] = lines, lines + length, values, values + len(constants)
+        code += [] if program is None else [program.code]
+        numbers.append(constants)
+        lines, values = lines + length, values + len(constants)
+    surfaces = tuple(
+        kernel.Surface(
+            touch.region.outline(),
+            touch.group.has(np.arange(count)) & ~_of(fix.body, count),
+            float(touch.mu),
+            hub.values.slot(f"{touch.id}_x"),
+        )
+        for touch in surfaces_of(fix)
+    )
+    ends = fix.body.first_id, fix.body.first_id + fix.body.count
+    return kernel.Body(
+        field=hub.update.method.lattice_of(hub, fix.body), ids=np.array(ends), dofs=fix.dofs,
+        constants=fix.constants, state=fix.state, slots=fix.slots(),
+        evaluate=address_of(evaluate_in_table, EVALUATE), programs=programs,
+        code=np.concatenate([np.empty((0, 2), np.int64), *code]), numbers=np.concatenate(numbers),
+        scratch=np.zeros((STACK + ROWS + 1, BLOCK)), matrices=np.zeros((2, 6, 7)),
+        vectors=np.zeros((kernel.ROWS, 6)), lever=np.eye(3, 6),
+        contacts=np.empty((capacity, kernel.COLUMNS)),  # pages cost nothing until written
+        count=np.zeros(1, np.int64), which=np.empty((capacity, 3), np.int64),
+        pairs=ListedPairs(
+            np.empty((pairs, 2), np.int64), np.empty((pairs, d)), np.empty(pairs)
+        ),
+        surfaces=surfaces,
+    )  # fmt: skip
+
+
+def _of(solid: Any, count: int) -> np.ndarray:
+    mask = np.zeros(count, np.bool_)
+    mask[solid.first_id : solid.first_id + solid.count] = True
+    return mask
+
+
+def _refuse(hub: Hub, moving: list) -> None:
+    """Refuse what rigid bodies do not support, before the run."""
+    bodies = {fix.body for fix in moving}
+    for fix in hub.fixes.values():
+        if isinstance(fix, ContactRigidBody):
+            _refuse_contact(hub, fix, bodies)
+    method, settings = hub.update.method, hub.settings
+    wrong = {
+        "takes explicit steps": hub.update.scheme.traits.implicit,
+        "runs in one process": settings.comm.size > 1,
+        "runs on processors": settings.engine == "gpu",
+        "needs double precision": settings.precision != "double",
+    }
+    cure = (
+        "scheme(musl), or a prescribed motion: fix velocity_particles",
+        "no --ranks; --threads divides the points",
+        "no --gpu",
+        "no precision(single)",
+    )
+    for fix in moving:
+        for (why, refused), hint in zip(wrong.items(), cure, strict=True):
+            if refused:
+                raise _error(fix, f"a rigid body that moves freely {why}", hint)
+    solids = hub.solids.values()
+    rigid = [solid for solid in solids if can(solid.material.law, constrained_velocity)]
+    for fix in moving:
+        body, apart = fix.body, method.own_grids or method.fields_per_solid
+        other = next((solid for solid in rigid if solid not in bodies and not apart), None)
+        if other is not None:
+            message = f"'{body.id}' moves freely, and rigid solid '{other.id}' on its grid does not"
+            raise _error(fix, message, "method(ulmpm/contacts, ...) or method(tlmpm, ...)")
+        if any(body in (s, s.glued_to) for s in solids if s.glued_to is not None):
+            raise _error(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
+        acts = fix.has_load or np.any(fix.state[kernel.V : kernel.L]) or surfaces_of(fix)
+        if not acts and not (method.fields_per_solid and len(solids) > len(rigid)):
+            hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
+            raise _error(fix, f"nothing acts on the body '{body.id}': it stays at rest", hint)
+    for fix in hub.fixes.values() if moving else ():
+        leads = fix.leads_points or fix.style == "initial_velocity_particles"
+        led = [s for s in bodies if leads and not fix.group.all and fix.group.touches(s)]
+        if led:
+            message = f"fix {fix.style} also moves '{led[0].id}', which fix rigid_body moves"
+            hint = "velocity=, spin=, motion= or turning= of fix rigid_body, or another group"
+            raise _error(fix, message, hint)
+
+
+def _refuse_contact(hub: Hub, fix: ContactRigidBody, bodies: set) -> None:
+    if fix.touched not in bodies:
+        hint = f"fix(ID, rigid_body, {fix.touched.id}, ...); or fix contact/surface, which moves "
+        hint += "by formulas"
+        raise _error(fix, f"solid '{fix.touched.id}' has no fix rigid_body", hint)
+    if hub.update.method.fields_per_solid:
+        hint = "fix contact/friction for friction, or method ulmpm"
+        raise _error(fix, "ulmpm/contacts has this contact on its grid already", hint)
+    other = next((body for body in bodies if not fix.group.all and fix.group.touches(body)), None)
+    if other is not None:
+        message = f"the group has points of '{other.id}': rigid bodies pass through each other"
+        raise _error(fix, message, "a group of points that deform")
+
+
+def _error(fix: Fix, message: str, hint: str) -> ScriptError:
+    error = ScriptError(message, place=fix.place, hint=hint)
+    error.command = f"fix {fix.style}"
+    return error

@@ -1,0 +1,433 @@
+"""Rigid bodies that move by the forces on them, and their contact with points."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+
+from karamelo_py.kernels import free_bodies as kernel
+from karamelo_py.kernels.equations import RigidSums
+from karamelo_py.language.arguments import NULL
+from karamelo_py.language.signature import Argument, NonNegative, Positive
+from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.region import Region
+from karamelo_py.scene.solid import Solid
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.styles.fixes.formulas import judge_friction
+
+COLUMNS = kernel.X, kernel.ANGLE, kernel.V, kernel.W, kernel.FORCE, kernel.TORQUE
+WAYS = "x", "y", "z", "rx", "ry", "rz"
+NOT_ROUND = 1e-9  # relative tolerance of moments of inertia
+
+
+class Components:
+    """Annotation: a formula, or several in parentheses; NULL leaves a component free."""
+
+    script_kind = "a formula, or several in parentheses: (a, b)"
+
+    def __init__(self, argument: Argument, items: list[Expression | None]):
+        self.argument, self.items = argument, items
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> "Components":
+        parts = [argument.part(text) for text in pieces(argument.text)]
+        return cls(argument, [None if p.text == NULL else Expression(p.value(hub)) for p in parts])
+
+    def numbers(self) -> list[float]:
+        if not all(item is not None and item.is_constant for item in self.items):
+            raise ScriptError(
+                f"{self.argument.text} is no fixed number", place=self.argument.place,
+                expected="numbers", hint="motion and turning take formulas of time",
+            )  # fmt: skip
+        return [float(item.constant) for item in self.items if item is not None]
+
+
+class Ways:
+    """Annotation: directions in parentheses, such as (x, rz)."""
+
+    script_kind = "directions in parentheses: (x, rz)"
+
+    def __init__(self, argument: Argument, names: list[str]):
+        self.argument, self.names = argument, names
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> "Ways":
+        return cls(argument, pieces(argument.text))
+
+
+def pieces(text: str) -> list[str]:
+    """Split ``(a, b)`` at the commas outside inner parentheses."""
+    if not (text.startswith("(") and text.endswith(")")):
+        return [text]
+    parts, level, begin, inner = [], 0, 0, text[1:-1]
+    for k, sign in enumerate(inner):
+        level += (sign == "(") - (sign == ")")
+        if level < 0:
+            return [text]  # (a + b) * (c + d)
+        if sign == "," and level == 0:
+            parts.append(inner[begin:k])
+            begin = k + 1
+    return [part.strip() for part in (*parts, inner[begin:])]
+
+
+class RigidBody(Fix):
+    """Let a rigid solid move by the forces on it.
+
+    Parameters
+    ----------
+    solid
+        The solid, of material rigid.
+    velocity
+        Initial velocity of its centre: one number per dimension, in parentheses.
+    spin
+        Initial angular velocity: one number in 2D, three in 3D.
+    gravity
+        Acceleration, one formula per dimension.
+    force
+        Further force on its centre: formulas of time and published values.
+    torque
+        Further torque about its centre: one formula in 2D, three in 3D.
+    motion
+        Prescribed velocity of its centre, one formula per dimension; NULL leaves one free.
+    turning
+        Prescribed angular velocity: one formula in 2D, three in 3D.
+    fixed
+        Directions in which it does not move: of x, y, z, and rx, ry, rz for rotation.
+    mass
+        Mass; default: of its points. In axisymmetry, masses and forces are per radian.
+    inertia
+        Moment of inertia about its centre in 2D; in 3D about the axes x, y, z through it at the
+        start. Default: of its points, as squares or cubes, in proportion to the mass.
+
+    Example
+    -------
+    fix(move, rigid_body, ball, velocity=(1, 0), gravity=(0, -9.81))
+    fix(roll, rigid_body, wheel, gravity=(0, -9.81), turning=2*PI, fixed=(x))
+
+    Notes
+    -----
+    Publishes its centre ID_x, ID_y, ID_z; velocity ID_vx, ...; rotation ID_rx, ...; angular
+    velocity ID_wx, ...; force and torque of contact about the centre, ID_fx, ... and ID_tx, ...
+    Names are those of its dimension: in 2D x, y, vx, vy, rz, wz, fx, fy, tz. In 2D the rotation is
+    an angle that may exceed 2 PI; in 3D it is a vector along the axis, at most PI long.
+
+    It pushes other solids, and they push it, on the grid in ulmpm/contacts (with the friction of
+    fix contact/friction). In the other methods fix contact/rigid_body does this. Its velocity at
+    the end of the step is found together with all impulses: it may be far lighter than what it
+    touches. Momentum is conserved to round-off. As for points, velocities belong to the middle of
+    a step, unless scheme(..., start=half).
+
+    A fix with the same ID replaces this one, and the body continues with its velocity: to release
+    it, write the line again without fixed. In axisymmetry it moves along the axis only. Rigid
+    bodies pass through each other and through rigid solids.
+
+    See Also
+    --------
+    contact/rigid_body, velocity_particles, material rigid, method ulmpm/contacts
+    """
+
+    syntax = (
+        "solid[, velocity=(vx, vy, vz)][, spin=w][, gravity=(gx, gy, gz)][, force=(fx, fy, fz)]"
+        "[, torque=t][, motion=(ux, uy, uz)][, turning=w][, fixed=(x, rz)][, mass=m][, inertia=I]"
+    )
+    published = (
+        "x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz",
+        "fx", "fy", "fz", "tx", "ty", "tz",
+    )  # fmt: skip
+    for_method = True
+    remembers = ("memory",)
+
+    def __init__(
+        self,
+        hub: Hub,
+        solid: Solid,
+        *,
+        velocity: Components | None = None,
+        spin: Components | None = None,
+        gravity: Components | None = None,
+        force: Components | None = None,
+        torque: Components | None = None,
+        motion: Components | None = None,
+        turning: Components | None = None,
+        fixed: Ways | None = None,
+        mass: Annotated[float, Positive] | None = None,
+        inertia: Components | None = None,
+    ):
+        super().__init__(hub)
+        kin, self.body = hub.domain.kin, solid
+        if not hub.update.method.fields_per_solid:
+            self.node_fields = (RigidSums,)  # without mass on the grid of others
+        d = kin.dimension
+        if not can(solid.material.law, constrained_velocity):
+            raise ScriptError(
+                f"solid '{solid.id}' deforms: its material '{solid.material.id}' is not rigid",
+                argument="solid",
+                expected="a solid of material rigid",
+                hint=f"material({solid.material.id}, rigid, density)",
+            )
+        if kin.hoops and d == 1:
+            raise ScriptError(
+                f"a rigid body cannot move in a {kin.word} domain", argument="solid",
+                expected="a domain in 1D, 2D or 3D, or axisymmetric",
+            )  # fmt: skip
+        spins = {1: (), 2: (5,), 3: (3, 4, 5)}[d] if not kin.hoops else ()
+        moves = tuple(range(d)) if not kin.hoops else (1,)
+        self.ways = (*moves, *spins)
+        self.given = velocity is not None, spin is not None
+        self.previous = next((f for f in hub.fixes.values() if f.body is solid), None)
+        self.led = self._spread(motion, range(d)) + self._spread(turning, spins, 3)
+        self._hold(fixed)
+        free = [k for k in self.ways if self.led[k] is None]
+        self.dofs = np.array([k in free for k in range(6)], np.int64)
+        loads = self._spread(force, range(d)) + self._spread(torque, spins, 3)
+        self.formulas_of_body = (*self.led, *loads, *self._spread(gravity, range(d)))
+        start = self._spread(velocity, range(d)) + self._spread(spin, spins, 3)
+        self.constants = np.zeros(kernel.CONSTANTS)
+        self._weigh(solid, mass, None if inertia is None else inertia)
+        self.state = np.zeros(kernel.STATE)
+        self.state[kernel.X : kernel.X + 3] = self.constants[kernel.START : kernel.START + 3]
+        self.state[kernel.Q] = 1
+        kernel.set_matrix(self.state)
+        for k, item in enumerate(start):
+            if item is not None:
+                self.state[kernel.V + k] = item.evaluate(hub.values)
+            elif self.led[k] is not None and not hub.rehearsing:
+                self.state[kernel.V + k] = self.led[k].evaluate(hub.values)
+        self._spin_up()
+        self.published = tuple(name for name in self.published if self._has(name, d))
+        self.has_load = any(item is not None for item in self.formulas_of_body)
+        if self.previous is None:
+            self._begin_points(solid)
+
+    @property
+    def memory(self) -> np.ndarray:
+        return self.state
+
+    @memory.setter
+    def memory(self, state: np.ndarray) -> None:
+        self.state[:] = state
+
+    def defined(self) -> None:
+        before = self.previous
+        if before is not None and before.id != self.id and before.id in self.hub.fixes:
+            error = ScriptError(
+                f"fix '{before.id}' in line {before.place.line} moves '{self.body.id}' already",
+                argument="solid",
+                expected="one fix rigid_body for each solid",
+                hint=f"fix({before.id}, rigid_body, {self.body.id}, ...) replaces it",
+            )
+            error.place, error.command = self.place, "fix rigid_body"
+            raise error
+        if before is None and self.hub.update.step > 0:
+            raise ScriptError(
+                f"solid '{self.body.id}' may have moved in earlier runs",
+                place=self.place,
+                expected="fix rigid_body before the first run",
+                hint="fixed=(...) or motion=(...) until it is released: a fix with the same ID "
+                "replaces it, and the body continues",
+            )
+        if before is not None:
+            kept, self.previous = before.state.copy(), None
+            for given, at in zip(self.given, (kernel.V, kernel.W), strict=True):
+                if given:
+                    kept[at : at + 3] = self.state[at : at + 3]
+            self.state[:] = kept
+            self._spin_up()
+        for slot, column in self.slots():
+            self.hub.values.array[slot] = self.state[column]
+
+    def slots(self) -> np.ndarray:
+        """Slots of its values, and their columns in the state: (k, 2)."""
+        columns = dict(zip(("", "r", "v", "w", "f", "t"), COLUMNS, strict=True))
+        names = [(name, columns[name[:-1]] + "xyz".index(name[-1])) for name in self.published]
+        return np.array([(self.hub.values.slot(f"{self.id}_{n}"), k) for n, k in names])
+
+    def _has(self, name: str, d: int) -> bool:
+        axis, kind = "xyz".index(name[-1]), name[:-1]
+        if kind in ("r", "w", "t"):
+            return 3 + axis in self.ways
+        return axis < d
+
+    def _spread(self, given: Components | None, ways: Sequence[int], size: int = 3) -> list:
+        """Components by axis, None if missing; of rotation if `ways` begin at 3."""
+        items: list[Expression | None] = [None] * size
+        if given is None:
+            return items
+        if len(given.items) != len(ways):
+            what = "formulas" if len(ways) != 1 else "formula"
+            raise ScriptError(
+                f"{len(given.items)} components", place=given.argument.place,
+                expected=f"{len(ways)} {what}" if ways else "nothing: it does not rotate here",
+            )  # fmt: skip
+        for way, item in zip(ways, given.items, strict=True):
+            items[way % 3] = item
+            if item is not None:
+                item.evaluate(self.hub.values)
+        return items
+
+    def _hold(self, fixed: Ways | None) -> None:
+        known = [WAYS[k] for k in self.ways]
+        for name in fixed.names if fixed else ():
+            if name not in known:
+                raise ScriptError(
+                    f"the body has no direction '{name}'", place=fixed.argument.place,
+                    expected="some of " + ", ".join(known),
+                )  # fmt: skip
+            if self.led[WAYS.index(name)] is not None:
+                word = "motion" if name in "xyz" else "turning"
+                raise ScriptError(
+                    f"{name} is fixed, and {word} prescribes it", place=fixed.argument.place,
+                    expected="one of the two",
+                )  # fmt: skip
+            self.led[WAYS.index(name)] = Expression(0.0)
+
+    def _weigh(self, solid: Solid, mass: float | None, inertia: Components | None) -> None:
+        """Set mass, centre, principal moments and axes."""
+        kin, d, m = self.hub.domain.kin, self.hub.domain.dimension, np.asarray(solid.mass, float)
+        x, total = np.zeros((solid.count, 3)), float(m.sum())
+        x[:, :d] = solid.x0
+        centre = m @ x / total if total else x.mean(axis=0)
+        if kin.hoops:
+            centre[0] = 0
+        arm = x - centre
+        side = (np.asarray(solid.volume0, float) / self.hub.domain.depth(solid.x0)) ** (1 / d)
+        own = m * side**2 / 12  # of a square or cube, about each axis across
+        square = np.einsum("n,ni,nj->ij", m, arm, arm)
+        square[range(d), range(d)] += own.sum()
+        tensor = np.trace(square) * np.eye(3) - square
+        if mass is not None:
+            tensor *= mass / total
+            total = mass
+        c = self.constants
+        c[kernel.OF_MASS], c[kernel.START : kernel.START + 3] = total, centre
+        c[kernel.BOUND] = np.sqrt((arm**2).sum(axis=1).max(initial=0)) + side.max(initial=0)
+        if inertia is not None:
+            numbers = inertia.numbers()
+            wanted = {2: 1, 3: 3}.get(d, 0) * bool(len(self.ways) > d)
+            if len(numbers) != wanted:
+                raise ScriptError(
+                    f"{len(numbers)} moments of inertia", place=inertia.argument.place,
+                    expected=f"{wanted} in {d}D" if wanted else "none: it does not rotate here",
+                )  # fmt: skip
+            tensor = np.diag(numbers if d == 3 else [1.0, 1.0, numbers[0]])
+            moments = np.array(numbers)
+            if moments.min() <= 0 or (
+                d == 3 and 2 * moments.max() > moments.sum() * (1 + NOT_ROUND)
+            ):
+                raise ScriptError(
+                    f"no body has the moments of inertia {inertia.argument.text}",
+                    place=inertia.argument.place,
+                    expected="moments above 0, each at most the sum of the other two",
+                )
+        if d < 3:
+            moments, axes = (
+                np.array([1.0, 1.0, tensor[2, 2] if d == 2 and not kin.hoops else 1.0]),
+                np.eye(3),
+            )
+        else:
+            moments, axes = principal(tensor)
+        c[kernel.INERTIA : kernel.INERTIA + 3] = moments
+        c[kernel.AXES : kernel.AXES + 9] = axes.ravel()
+
+    def _spin_up(self) -> None:
+        """Set the angular momentum from the spin."""
+        R = self.state[kernel.R : kernel.R + 9].reshape(3, 3)
+        axes = R @ self.constants[kernel.AXES : kernel.AXES + 9].reshape(3, 3)
+        spin = self.state[kernel.W : kernel.W + 3]
+        moments = self.constants[kernel.INERTIA : kernel.INERTIA + 3]
+        self.state[kernel.L : kernel.L + 3] = axes @ (moments * (axes.T @ spin))
+
+    def _begin_points(self, solid: Solid) -> None:
+        """Give its points their initial velocities, for the first step and the first output."""
+        d, arm = self.hub.domain.dimension, np.zeros((solid.count, 3))
+        arm[:, :d] = solid.x0
+        arm -= self.constants[kernel.START : kernel.START + 3]
+        v = self.state[kernel.V : kernel.V + 3] + np.cross(self.state[kernel.W : kernel.W + 3], arm)
+        if np.isfinite(v).all():
+            solid.initial |= {f"v{axis}": v[:, k].copy() for k, axis in enumerate("xyz"[:d])}
+
+
+def principal(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments (3,) and axes (3, 3), by columns; x, y, z if principal."""
+    off = np.abs(tensor - np.diag(np.diag(tensor))).max()
+    if off <= NOT_ROUND * np.trace(tensor):
+        return np.diag(tensor).copy(), np.eye(3)
+    moments, axes = np.linalg.eigh(tensor)
+    return moments, axes * np.sign(np.linalg.det(axes))
+
+
+class ContactRigidBody(Fix):
+    """Contact of points with a rigid body, both ways, with friction.
+
+    Parameters
+    ----------
+    solid
+        The rigid body, with a fix rigid_body.
+    mu
+        Coefficient of friction (Coulomb); default 0.
+    region
+        Its surface at the start; default: the region that the solid fills.
+
+    Example
+    -------
+    fix(touch, contact/rigid_body, soil, wheel, 0.4)
+
+    Notes
+    -----
+    Publishes the force on the points as ID_x, ID_y, ID_z.
+
+    A point is a ball (in 2D a disk) with half the side of a cube of its volume as its radius. Its
+    impulse acts on the nodes of the point, and on the body at the point: a spring of 0.1 m/dt^2
+    stops it, implicit in the velocity of the body at the end of the step. Friction stops the slip,
+    with at most mu times the normal impulse. Nodes held by fix velocity_nodes do not yield.
+
+    For methods other than ulmpm/contacts. Gases and liquids leave a gap that varies: use
+    ulmpm/contacts for them. A body rolls on its radius plus half a point: with a radius of 3 cells,
+    its acceleration on a slope is 3 % too large.
+
+    See Also
+    --------
+    rigid_body, contact/surface
+    """
+
+    published = ("x", "y", "z")
+    for_method = True
+    by_sizes = True
+
+    def __init__(
+        self,
+        hub: Hub,
+        group: ParticleGroup,
+        solid: Solid,
+        mu: Annotated[float, NonNegative] = 0.0,
+        *,
+        region: Region | None = None,
+    ):
+        super().__init__(hub, group)
+        judge_friction(hub, mu)
+        self.mu, self.touched, self.region = mu, solid, region or solid.region
+        if group.touches(solid) and not group.all:
+            raise ScriptError(
+                f"the group has points of the body '{solid.id}'", argument="group",
+                expected="points of other solids",
+            )  # fmt: skip
+        if self.region is None:
+            raise ScriptError(
+                f"solid '{solid.id}' fills no region", argument="solid",
+                expected="the region of its surface: region=ID",
+            )  # fmt: skip
+        if self.region.flat or self.region.outline() is None:
+            raise ScriptError(
+                f"region '{self.region.id}' has no surface that the program can follow",
+                argument="region" if region else "solid",
+                expected="a block, cylinder, sphere, closed STL surface or mesh, or some of these",
+            )
+
+
+def surfaces_of(body: Any) -> list[ContactRigidBody]:
+    fixes = body.hub.fixes.values()
+    return [f for f in fixes if isinstance(f, ContactRigidBody) and f.touched is body.body]

@@ -1,0 +1,205 @@
+"""Fix rigid_body: rigid bodies that move by the forces on them, and fix contact/rigid_body."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from going_on import goes_on, with_files
+
+pytestmark = pytest.mark.xdist_group("rigid body")
+ALONE = """
+method(ulmpm, FLIP, linear, 1)
+dimension({d}, {box}, 1)
+{line}
+region(body, block, {body})
+material(steel, rigid, 6)
+solid(body, region, body, {ppc}, steel, 1)
+scheme(musl, start=half)
+fix(b, rigid_body, body, {given})
+set_dt(0.1)
+set_output(1)
+log_modify(custom, step, time, {names})
+dump(end, all, particle, 10, end.*.LAMMPS, x, y, z, x0, y0, z0)
+run(10)
+"""
+BODIES = {1: "2, 4", 2: "2, 4, 3, 4", 3: "2, 4, 3, 4, 1, 2"}
+
+
+def alone(given, names, d=2, ppc=1, line=""):
+    box = ", ".join(["0, 9"] * d)
+    return ALONE.format(d=d, box=box, body=BODIES[d], ppc=ppc, given=given, names=names, line=line)
+
+
+def test_a_throw_is_exact(run_interpreted):
+    """A parabola that rotates; the points stay where a rigid body has them."""
+    given = "velocity=(1, 2), spin=PI/2, gravity=(0, -3), force=(12, 0), torque=5*time"
+    result = run_interpreted(alone(given, "b_x, b_y, b_vx, b_rz, b_wz", ppc=2))
+    log, t = result.log, result.log.Time
+    # 12 kg; a box of 2 by 1 of points that are squares has exactly m (a^2 + b^2)/12 = 5.
+    assert log.b_x == pytest.approx(3 + t + t**2 / 2)
+    assert log.b_y == pytest.approx(3.5 + 2 * t - 1.5 * t**2)
+    assert log.b_wz[1:] == pytest.approx(pi / 2 + 0.5 * (t[1:] - 0.1) * t[1:], rel=1e-8)
+    end = result.dump("end.10.LAMMPS")
+    a, c, x0, y0 = log.b_rz[-1], (log.b_x[-1], log.b_y[-1]), end.x0 - 3, end.y0 - 3.5
+    assert end.x == pytest.approx(c[0] + np.cos(a) * x0 - np.sin(a) * y0)
+    assert end.y == pytest.approx(c[1] + np.sin(a) * x0 + np.cos(a) * y0)
+
+
+def turned(r):
+    """Rotation matrix of a rotation vector (Rodrigues)."""
+    angle = np.linalg.norm(r)
+    k = np.cross(np.eye(3), r) / (angle or 1)
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def test_a_free_top_conserves_energy_and_angular_momentum(run_interpreted):
+    """About its middle axis, where it tumbles: 30 steps of 0.3 rad."""
+    names = "b_rx, b_ry, b_rz, b_wx, b_wy, b_wz"
+    given = "spin=(1, 3, 0.5), inertia=(3, 4, 5)"
+    log = run_interpreted(alone(given, names, d=3).replace("run(10)", "run(30)")).log
+    energy, momentum, moments = [], [], np.array([3.0, 4.0, 5.0])
+    spins = np.c_[log.b_wx, log.b_wy, log.b_wz]
+    for r, w in zip(np.c_[log.b_rx, log.b_ry, log.b_rz], spins, strict=True):
+        own = turned(r).T @ w
+        energy.append(moments @ own**2 / 2)
+        momentum.append(turned(r) @ (moments * own))
+    assert np.ptp(log.b_wx) > 0.5
+    assert np.array(momentum) == pytest.approx(np.tile(momentum[0], (31, 1)), abs=1e-6)
+    assert np.ptp(energy) < 5e-3 * energy[0]
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_prescribed_and_fixed_directions(run_interpreted, d):
+    """The centre is led along the last axis, and held along the first."""
+    led = {
+        1: "motion=2*time",
+        2: "motion=(NULL, 2*time), turning=1, fixed=(x)",
+        3: "motion=(NULL, NULL, 2*time), turning=(0, NULL, 0), spin=(0, 1, 0), fixed=(x)",
+    }[d]
+    last, fall = "xyz"[d - 1], {1: "3", 2: "(3, 3)", 3: "(3, 3, 3)"}[d]
+    names = f"b_x, b_{last}" + (", b_rz" if d == 2 else ", b_y, b_ry" if d == 3 else "")
+    log = run_interpreted(alone(f"{led}, gravity={fall}", names, d=d)).log
+    t, moved = log.Time, log[f"b_{last}"] - log[f"b_{last}"][0]
+    assert moved == pytest.approx(t * (t - 0.1))  # the rule of rectangles
+    if d > 1:
+        assert np.ptp(log.b_x) == 0
+        assert log["b_rz" if d == 2 else "b_ry"] == pytest.approx(t)
+    if d == 3:
+        assert log.b_y - log.b_y[0] == pytest.approx(1.5 * t**2)
+
+
+def test_a_body_of_revolution_moves_along_its_axis(run_interpreted):
+    """Its mass per radian is rho r dr dz: 6 times 2^2 / 2 times 1."""
+    text = alone("velocity=(0, 1), force=(7, 12)", "b_x, b_y", line="axisymmetric(true)")
+    log = run_interpreted(text.replace("block, 2, 4,", "block, 0, 2,")).log
+    assert log.b_y - log.b_y[0] == pytest.approx(log.Time + log.Time**2 / 2)
+    assert not log.b_x.any()
+
+
+def test_a_body_is_released(run_interpreted):
+    """A fix with the same ID replaces it: the body continues from where it was led to."""
+    more = "fix(b, rigid_body, body, gravity=(0, -2))\nrun(10)"
+    text = alone("motion=(2, 0), turning=1", "b_x, b_y, b_rz") + more
+    log = run_interpreted(text).log
+    end = slice(11, None)
+    t = log.Time[end] - 1
+    assert log.b_x[end] == pytest.approx(5 + 2 * t) and log.b_rz[end] == pytest.approx(1 + t)
+    assert log.b_y[end] == pytest.approx(3.5 - t * (t + 0.1))
+
+
+MISTAKES = {
+    "material(steel, rigid, 6)": ("material(steel, linear, 6, 9, 0)", "deforms", "rigid"),
+    "velocity=(1, 0)": ("mass=0", "0", "above 0"),
+    "spin=1": ("inertia=-1", "no body has", "above 0"),
+    "fixed=(x)": ("fixed=(z)", "no direction 'z'", "some of x, y, rz"),
+    "gravity=(0, -1)": ("gravity=(0, 0, -1)", "3 components", "2 formulas"),
+    "motion=(1, 0)": ("motion=(1, 0), fixed=(x)", "motion prescribes it", "one of the two"),
+    "turning=1": ("", "nothing acts on the body 'body'", "gravity=(...)"),
+    "scheme(musl, start=half)": ("scheme(newmark)", "explicit steps", "velocity_particles"),
+    "set_dt(0.1)": ("precision(single)", "double precision", "no precision(single)"),
+    "set_output(1)": (
+        "group(g, particles, region, body, solid, body)\nfix(v, velocity_particles, g, 1, 0)",
+        "also moves 'body'",
+        "another group",
+    ),
+    "run(10)": ("fix(c, rigid_body, body, spin=1)\nrun(10)", "moves 'body' already", "replaces it"),
+    "dump": (
+        "fix(c, contact/rigid_body, all, body, 0.2)\ndelete_fix(b)\ndump",
+        "no fix",
+        "rigid_body",
+    ),
+    "run": (
+        "delete_fix(b)\nrun(1)\nfix(b, rigid_body, body, spin=1)\nrun",
+        "earlier runs",
+        "before",
+    ),
+}
+
+
+@pytest.mark.parametrize("right", MISTAKES)
+def test_mistakes_are_refused(run_interpreted, right):
+    wrong, message, remedy = MISTAKES[right]
+    text = alone("velocity=(1, 0)", "step")
+    if "=" in right and right not in text:
+        text = text.replace("velocity=(1, 0)", right)
+    if not wrong:
+        text = text.replace(", " + right, "")
+    result = run_interpreted(text.replace(right, wrong), status=1)
+    assert result.err.count("error:") == 1, result.err
+    assert message in result.err and remedy in result.err, result.err
+
+
+def test_inertia_of_no_body_is_refused(run_interpreted):
+    result = run_interpreted(alone("inertia=(1, 1, 3)", "step", d=3), status=1)
+    assert "no body has" in result.err and "sum of the other two" in result.err
+
+
+def test_other_back_ends_are_refused(run_interpreted, state_interpreted):
+    text = alone("spin=1", "step")
+    assert "--gpu" in run_interpreted(text, "--gpu", status=1).err
+    said = state_interpreted(text, ranks=2, fails=True)
+    assert "rigid body that moves freely" in said and "--ranks" in said
+
+
+HIT = """
+method({method}, FLIP, linear, 1)
+dimension(2, 0, 10, 0, 10, 1)
+region(below, block, 3, 6, 2, 4)
+region(above, block, 4, 6, 4.2, 6.2)
+material(steel, rigid, {ratio})
+material(soft, linear, 1, 100, 0.3)
+solid(a, region, below, 1, soft, 1)
+solid(b, region, above, 1, steel, 1)
+fix(b, rigid_body, b, velocity=(0.2, -0.9), spin=0.1)
+{touch}
+group(a, particles, region, below, solid, a)
+compute(p, linear_momentum, a)
+compute(E, kinetic_energy, a)
+compute(S, strain_energy, a)
+set_output(1)
+log_modify(custom, step, p_x, p_y, E, S, b_vx, b_vy, b_wz, b_fy, f_y)
+run(20)
+"""
+GRID = "fix(f, contact/friction, a, b, 0.4)"
+POINTS = "fix(f, contact/rigid_body, all, b, 0.4)"
+
+
+@pytest.mark.parametrize("ratio", [1000, 1, 0.001])
+@pytest.mark.parametrize(("method", "touch"), [("ulmpm/contacts", GRID), ("ulmpm", POINTS)])
+def test_momentum_is_conserved_and_energy_does_not_grow(run_interpreted, method, touch, ratio):
+    """A free block hits a soft one obliquely, with friction, at any ratio of masses."""
+    log = run_interpreted(HIT.format(method=method, touch=touch, ratio=ratio)).log
+    m = 4 * ratio
+    assert np.abs(log.b_fy).max() > 0 and log.b_fy == pytest.approx(-log.f_y)
+    for own, other in ((log.p_x, log.b_vx), (log.p_y, log.b_vy)):
+        total = own + m * other
+        assert total == pytest.approx(np.full(21, total[0]), rel=1e-7, abs=1e-8 * m)
+    # Two sides of two: m (4 + 4) / 12 about the centre.
+    energy = m / 2 * (log.b_vx**2 + log.b_vy**2 + 2 / 3 * log.b_wz**2) + log.E + log.S
+    assert energy.max() < 1.01 * energy[0]
+
+
+@pytest.mark.parametrize(("method", "touch"), [("ulmpm/contacts", GRID), ("tlmpm", POINTS)])
+def test_a_restarted_run_has_the_same_bits(run_interpreted, method, touch):
+    text = HIT.format(method=method, touch=touch, ratio=1).replace("run(20)", "run(10)")
+    goes_on(run_interpreted, with_files(text))
