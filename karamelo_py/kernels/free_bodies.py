@@ -25,7 +25,6 @@ import numpy as np
 
 from karamelo_py.compiler import kernel, noinline
 from karamelo_py.compiler.fields import load_vector
-from karamelo_py.compiler.formula import call_evaluate
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, Tag, of_change, of_momentum
 from karamelo_py.kernels.contact import Bodies, ListedPairs, SeparateFields, list_pairs
@@ -39,6 +38,7 @@ from karamelo_py.points.bodies import radius
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
+from karamelo_py.script.formula import call_evaluate
 
 # Columns of Body.state. Vectors have three components in any dimension.
 X, V, W, L = 0, 3, 6, 9  # centre, velocity, spin, angular momentum

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.compiler import address_of
-from karamelo_py.compiler.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.kernels import free_bodies as kernel
 from karamelo_py.kernels.contact import ListedPairs
 from karamelo_py.points.laws import can, constrained_velocity
@@ -14,6 +13,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.styles.fixes.rigid_body import ContactRigidBody, surfaces_of
 
 
