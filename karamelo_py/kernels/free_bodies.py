@@ -40,7 +40,7 @@ from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 from karamelo_py.script.formula import call_evaluate
 
-# Columns of Body.state. Vectors have three components in any dimension.
+# Columns of FreeBody.state. Vectors have three components in any dimension.
 X, V, W, L = 0, 3, 6, 9  # centre, velocity, spin, angular momentum
 Q = 12  # rotation since the start, a quaternion
 ANGLE = 16  # the same as an angle about each axis (in 2D); as a vector in 3D
@@ -50,7 +50,7 @@ MOVE = 34  # displacement of the centre in this step, over dt
 SPREAD = 37  # of other points: (rotation in this step - 1) / dt, by rows
 PASSES, FAILED = 46, 47  # of Newton's method: in this step, and steps without a solution
 STATE = 48
-# Columns of Body.constants.
+# Columns of FreeBody.constants.
 OF_MASS, INERTIA, AXES, START, BOUND = 0, 1, 4, 13, 16  # AXES: principal axes, by columns
 CONSTANTS = 17
 # Formulas of a body: prescribed velocity and spin, force and torque, acceleration.
@@ -60,13 +60,13 @@ FORMULAS = 15
 AT, SOFT_V, NORMAL, GAP, SOFT_MASS, MU, SHARE, IMPULSE = 0, 3, 6, 9, 10, 11, 12, 13
 SLIP, SPEED, PUSH, RUB, MOST = 16, 19, 20, 21, 22  # of the last pass; MOST: bound of friction
 COLUMNS = 23
-# Rows of Body.vectors.
+# Rows of FreeBody.vectors.
 START_P, U, TRIAL, REST, REST_TRIAL, SUM, STEP, ROWS = range(8)
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
 SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the square of the residual at the start
 
 
-class Surface(NamedTuple):
+class TouchingSurface(NamedTuple):
     """The surface of a body, and the points that it touches."""
 
     shape: Tag
@@ -75,7 +75,7 @@ class Surface(NamedTuple):
     slot: int  # of the force on the points
 
 
-class Body(NamedTuple):
+class FreeBody(NamedTuple):
     field: int  # its velocity field, for contact at nodes
     ids: np.ndarray  # (2,) first id of its points, and the end
     dofs: np.ndarray  # (6,) int64: 1 if it moves freely, 0 if prescribed
@@ -94,7 +94,7 @@ class Body(NamedTuple):
     count: np.ndarray  # (1,) int64: number of contacts
     which: np.ndarray  # (n, 3) int64: block and number of the point, and slot of its force
     pairs: ListedPairs  # scratch, of contact at nodes
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[TouchingSurface, ...]
 
 
 class NoBodies(NamedTuple):
@@ -102,7 +102,7 @@ class NoBodies(NamedTuple):
 
 
 class FreeBodies(NamedTuple):
-    bodies: tuple[Body, ...]
+    bodies: tuple[FreeBody, ...]
     held: np.ndarray  # (N, d) bool: nodes whose velocity is prescribed
 
 

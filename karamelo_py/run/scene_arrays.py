@@ -25,8 +25,14 @@ from karamelo_py.run.access import NodesByNumber
 from karamelo_py.run.backend import WholeDomain
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint.parts import RollbackPoint
-from karamelo_py.run.lower.bodies import key_of_bodies
-from karamelo_py.run.lower.build import State, check_scene, lower, thread_count, warms_by_friction
+from karamelo_py.run.lower.build import (
+    State,
+    check_scene,
+    fixes_of_bodies,
+    lower,
+    thread_count,
+    warms_by_friction,
+)
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.lower.walls import key_of_walls
@@ -60,7 +66,7 @@ def scene_key(hub: Hub) -> tuple:
         hub.fields.rate_is_asked_for(),
         update.method is not None and warms_by_friction(hub),
         key_of_walls(hub),
-        key_of_bodies(hub),
+        fixes_of_bodies(hub),
         hub.settings.precision,
         hub.settings.threads,
     )

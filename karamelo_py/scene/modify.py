@@ -110,7 +110,7 @@ class Fix(Publisher):
     by_sizes = False  # sizes of points follow from their volumes, without a thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
-    body: Any = None  # solid that it moves by the forces on it
+    body: Any = None  # rigid solid that moves by the forces on it
     ignites = False  # lights explosives
     follows_points = False  # force depends on positions of points (tools)
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures

@@ -1,7 +1,6 @@
 """Lowering of rigid bodies that move freely, and what they do not support."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -12,25 +11,15 @@ from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
-from karamelo_py.styles.fixes.rigid_body import ContactRigidBody, surfaces_of
+from karamelo_py.styles.fixes.rigid_body import ContactRigidBody, RigidBody, surfaces_of
 
 
-def key_of_bodies(hub: Hub) -> tuple:
-    """What the arrays of bodies depend on: they are made again if it changes."""
-    fixes = hub.fixes.values()
-    if not any(fix.body for fix in fixes):
-        return ()
-    kinds = (fix for fix in fixes if fix.body or isinstance(fix, ContactRigidBody))
-    return tuple(kinds), tuple(fix for fix in fixes if fix.prescribes_velocity)
-
-
-def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies | kernel.NoBodies:
-    moving = [fix for fix in hub.fixes.values() if fix.body]
+def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
+    moving = [fix for fix in hub.fixes.values() if isinstance(fix, RigidBody)]
     _refuse(hub, moving)
-    if not moving:
-        return kernel.NoBodies()
     held = np.zeros(
         (sum(lattice.node_count for lattice in lattices), hub.domain.dimension), np.bool_
     )
@@ -41,7 +30,7 @@ def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies | k
     return kernel.FreeBodies(tuple(_body(hub, fix, len(held)) for fix in moving), held)
 
 
-def _body(hub: Hub, fix: Any, nodes: int) -> kernel.Body:
+def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     separate = hub.update.method.fields_per_solid
     pairs = nodes if separate else 1
@@ -59,7 +48,7 @@ def _body(hub: Hub, fix: Any, nodes: int) -> kernel.Body:
         numbers.append(constants)
         lines, values = lines + length, values + len(constants)
     surfaces = tuple(
-        kernel.Surface(
+        kernel.TouchingSurface(
             touch.region.outline(),
             touch.group.has(np.arange(count)) & ~_of(fix.body, count),
             float(touch.mu),
@@ -68,7 +57,7 @@ def _body(hub: Hub, fix: Any, nodes: int) -> kernel.Body:
         for touch in surfaces_of(fix)
     )
     ends = fix.body.first_id, fix.body.first_id + fix.body.count
-    return kernel.Body(
+    return kernel.FreeBody(
         field=hub.update.method.lattice_of(hub, fix.body), ids=np.array(ends), dofs=fix.dofs,
         constants=fix.constants, state=fix.state, slots=fix.slots(),
         evaluate=address_of(evaluate_in_table, EVALUATE), programs=programs,
@@ -84,13 +73,13 @@ def _body(hub: Hub, fix: Any, nodes: int) -> kernel.Body:
     )  # fmt: skip
 
 
-def _of(solid: Any, count: int) -> np.ndarray:
+def _of(solid: Solid, count: int) -> np.ndarray:
     mask = np.zeros(count, np.bool_)
     mask[solid.first_id : solid.first_id + solid.count] = True
     return mask
 
 
-def _refuse(hub: Hub, moving: list) -> None:
+def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
     """Refuse what rigid bodies do not support, before the run."""
     bodies = {fix.body for fix in moving}
     for fix in hub.fixes.values():
@@ -137,10 +126,10 @@ def _refuse(hub: Hub, moving: list) -> None:
 
 
 def _refuse_contact(hub: Hub, fix: ContactRigidBody, bodies: set) -> None:
-    if fix.touched not in bodies:
-        hint = f"fix(ID, rigid_body, {fix.touched.id}, ...); or fix contact/surface, which moves "
+    if fix.body not in bodies:
+        hint = f"fix(ID, rigid_body, {fix.body.id}, ...); or fix contact/surface, which moves "
         hint += "by formulas"
-        raise _error(fix, f"solid '{fix.touched.id}' has no fix rigid_body", hint)
+        raise _error(fix, f"solid '{fix.body.id}' has no fix rigid_body", hint)
     if hub.update.method.fields_per_solid:
         hint = "fix contact/friction for friction, or method ulmpm"
         raise _error(fix, "ulmpm/contacts has this contact on its grid already", hint)

@@ -16,6 +16,7 @@ from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat
+from karamelo_py.kernels.free_bodies import NoBodies
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.table import Insulated
@@ -162,15 +163,22 @@ def lower(
         arrays.Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
         for solids in solids_alike(hub, ids)
     )
+    bodies = lower_bodies(hub, lattices) if fixes_of_bodies(hub) else NoBodies()
     setup = arrays.Setup(
         frame=method.frame, kin=kin, basis=basis, transfer=transfer,
-        averaging=method.averaging(hub), contact=contact, bodies=lower_bodies(hub, lattices),
+        averaging=method.averaging(hub), contact=contact, bodies=bodies,
         heat=heat, grids=grids, nodes=nodes,
         buffers=tiles.empty_buffers(nodes, len(hub.solids)),
         blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
         **no_nodes(), control=control,
     )  # fmt: skip
     return setup, tiles
+
+
+def fixes_of_bodies(hub: Hub) -> tuple:
+    """Return the fixes of free rigid bodies, and those that hold nodes; () without bodies."""
+    fixes = [fix for fix in hub.fixes.values() if fix.body or fix.prescribes_velocity]
+    return tuple(fixes) if any(fix.body for fix in fixes) else ()
 
 
 def node_kinds(hub: Hub, basis: NamedTuple, contact: NamedTuple) -> list[type]:

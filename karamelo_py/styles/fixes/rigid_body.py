@@ -178,7 +178,9 @@ class RigidBody(Fix):
         moves = tuple(range(d)) if not kin.hoops else (1,)
         self.ways = (*moves, *spins)
         self.given = velocity is not None, spin is not None
-        self.previous = next((f for f in hub.fixes.values() if f.body is solid), None)
+        self.previous = next(
+            (f for f in hub.fixes.values() if isinstance(f, RigidBody) and f.body is solid), None
+        )
         self.led = self._spread(motion, range(d)) + self._spread(turning, spins, 3)
         self._hold(fixed)
         free = [k for k in self.ways if self.led[k] is None]
@@ -409,7 +411,7 @@ class ContactRigidBody(Fix):
     ):
         super().__init__(hub, group)
         judge_friction(hub, mu)
-        self.mu, self.touched, self.region = mu, solid, region or solid.region
+        self.mu, self.body, self.region = mu, solid, region or solid.region
         if group.touches(solid) and not group.all:
             raise ScriptError(
                 f"the group has points of the body '{solid.id}'", argument="group",
@@ -430,4 +432,4 @@ class ContactRigidBody(Fix):
 
 def surfaces_of(body: Any) -> list[ContactRigidBody]:
     fixes = body.hub.fixes.values()
-    return [f for f in fixes if isinstance(f, ContactRigidBody) and f.touched is body.body]
+    return [f for f in fixes if isinstance(f, ContactRigidBody) and f.body is body.body]
