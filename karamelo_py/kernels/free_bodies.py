@@ -14,8 +14,8 @@ k = 0.1 (dt / dt0)^2 with the whole step dt0: an implicit spring. Contact at nod
 
 Forces act over `kick`, motion over dt. Between the forces the angular momentum is constant, and the
 body rotates about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma &
-Wisdom 1994, "Lie-Poisson integrators for rigid body dynamics in the solar system"): the energy of a free
-top oscillates by O(dt^2) and does not drift.
+Wisdom 1994, "Lie-Poisson integrators for rigid body dynamics in the solar system"): the energy of a
+free top oscillates by O(dt^2) and does not drift.
 """
 
 from math import cos, sin, sqrt
