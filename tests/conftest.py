@@ -25,8 +25,6 @@ os.environ.setdefault("KARAMELO_PY_OPTIMISATION", "0")
 from comparisons.results import Result
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import case
-from karamelo_py.compiler import files
-from karamelo_py.compiler.disk import cache
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -45,16 +43,6 @@ os.environ["KARAMELO_PY_GPU"] = "emulated"
 # A shell that starts the tests in the background has them ignore Ctrl-C, which is inherited.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-
-def _keep_all(path: Path, content: bytes) -> None:
-    """Keep a kernel without looking at all others: test_cache.py tests how old ones make room."""
-    try:
-        files.write(path, content)
-    except OSError as error:
-        files.report_error(error)
-
-
-cache._keep, MAKING_ROOM = _keep_all, cache._keep
 
 # No test asserts a time, and a failure is the same in every run.
 settings.register_profile("tests", deadline=None, derandomize=True, max_examples=40)

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from conftest import MAKING_ROOM, forking
+from conftest import forking
 from listening import listening
 from numba import config
 
@@ -33,11 +33,6 @@ from karamelo_py.run.timings import Timings
 from karamelo_py.scene.hub import Hub
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
-
-
-@pytest.fixture(autouse=True)
-def _old_ones_make_room(monkeypatch):
-    monkeypatch.setattr(cache, "_keep", MAKING_ROOM)
 
 
 # A package in small: two shapes in files of their own, what they share, and a loop over points.
@@ -464,9 +459,11 @@ def test_room_and_other_files(tmp_path, monkeypatch):
     assert fresh()(Tag()) == 42
     new = set(folder.iterdir()) - {folder / "mine.kernel", *old}
     assert all(path.exists() for path in old)
-    monkeypatch.setattr(cache, "ROOM", sum(path.stat().st_size for path in new) + 150)
+    code = sum(path.stat().st_size for path in new if path.suffix == ".code")
+    monkeypatch.setattr(cache, "ROOM", code + 150)
     for path in new:
         path.unlink()
+    cache.make_room.cache_clear()  # as in a new process
     assert fresh()(Tag()) == 42
     assert [path.exists() for path in old] == [True, False, False]
     assert all(path.exists() for path in new)

@@ -22,6 +22,7 @@ from karamelo_py.app import catalogue, cli
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.parser import parse
@@ -409,6 +410,8 @@ def _tried(lines, dimension, folder):
         for ID in ("region(disk", "solid(s1"):
             line = line.replace(f"{ID},", f"{ID}x,")
         interpreter.run_text(line)
+    for fix in interpreter.hub.fixes.values():
+        check_fix(interpreter.hub, fix)
 
 
 SCENE_FAMILIES = (

@@ -58,7 +58,7 @@ def test_gravity_in_other_units_is_told(run_interpreted, units, steel, g, right)
     """9.81 m/s^2 are 9810 mm/s^2 and 0.00981 mm/ms^2."""
     script = GRAVITY.format(units=units, rho=steel[0], E=steel[1], g=g)
     err = run_interpreted(script, command="check").err
-    assert (f"hint: gravity is {right} there" in err) == (right is not None)
+    assert (f"fix: gravity is {right} there" in err) == (right is not None)
     assert ("an acceleration of 9.81" in err) == (right is not None)
 
 

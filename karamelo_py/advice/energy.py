@@ -4,7 +4,6 @@ import numpy as np
 
 from karamelo_py.advice import step_size
 from karamelo_py.advice.facts import SceneFacts
-from karamelo_py.kernels.watch import LOOKS
 from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.transfers import flip_coefficient
@@ -102,10 +101,8 @@ def swelling(points: PointTable) -> np.ndarray:
     return points.particle("volume") / points.reference_volume
 
 
-def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
+def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble:
     clock = simulation.control.clock[0]
-    if not simulation.energy_watch.has_grown():
-        return None
     cause, fix = cause_of_gain(hub, simulation)
     gain, since = clock.grown, "since the start"
     if clock.windows >= TOLD:
@@ -128,15 +125,11 @@ def taken_by(hub: Hub) -> list[str]:
     return takers
 
 
-def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | None:
-    """A loss above the fraction `within`, unless chosen damping explains it."""
-    clock = simulation.control.clock[0]
-    if not clock.watch_energy or clock.looks <= LOOKS:
+def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
+    """Describe a loss, unless chosen damping explains it."""
+    if taken_by(hub):
         return None
-    lost = simulation.energy_watch.share_lost()
-    if lost <= within or taken_by(hub):
-        return None
-    cause, fix = cause_of_loss(hub)
+    lost, (cause, fix) = simulation.energy_watch.share_lost(), cause_of_loss(hub)
     message = (
         f"energy balance: spurious loss of {100 * lost:.2g} % of the largest energy since the "
         f"first step ({when(simulation)})"

@@ -21,7 +21,7 @@ from karamelo_py.output.point_table import COMPONENTS, PointTable
 from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import stable_step
-from karamelo_py.run.no_number import refuse_endless_speeds
+from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -201,7 +201,8 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:
     _warn_about_groups(hub, simulation)
-    refuse_endless_speeds(simulation)
+    if not isfinite(simulation.fastest()):
+        raise endless_speed(simulation)
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
     one_step = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.steps.limit)

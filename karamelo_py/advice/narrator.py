@@ -22,7 +22,6 @@ from karamelo_py.run.loop import RunLoop
 from karamelo_py.run.lower.memory import bytes_per_point
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.tiles import DIRECT_UP_TO
-from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import words_of_volumes
 from karamelo_py.script.errors import render_message
@@ -104,13 +103,21 @@ class Narrator(Listener):
 
     def stepped(self, simulation: Simulation) -> None:
         hub, watch = self.hub, simulation.energy_watch
-        if not watch.told_of_growth and (gain := energy.words_of_growth(hub, simulation)):
+        if not watch.told_of_growth and watch.has_grown():
+            gain = energy.words_of_growth(hub, simulation)
             hub.warn(gain.message, hint=gain.fix, code=gain.code, cause=gain.cause)
             watch.growth_was_told()
         self._tell_of_loss(simulation, WITHIN)
         if simulation.step % simulation.states_every == 0 and not simulation.implicit:
             self._tell_of_limit(simulation)
-        boundary.tell_of_bounces(hub, simulation)
+        update = hub.update
+        if update.boundary == "reflect" and not update.warned_of_bounces and simulation.bounces:
+            update.warned_of_bounces = True
+            hub.warn(
+                f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected at "
+                "the edge of the domain; more are only counted",
+                place=update.boundary_place,
+            )
 
     def _tell_of_limit(self, simulation: Simulation) -> None:
         name, limit, before = simulation.steps.ruling_limit, simulation.steps.limit, self.least
@@ -126,8 +133,9 @@ class Narrator(Listener):
 
     def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
         hub, watch = self.hub, simulation.energy_watch
-        loss = None if watch.told_of_loss else energy.words_of_loss(hub, simulation, within)
-        if loss is not None:
+        if watch.told_of_loss or not watch.has_lost(within):
+            return
+        if loss := energy.words_of_loss(hub, simulation):
             hub.warn(loss.message, hint=loss.fix, code=loss.code, cause=loss.cause)
             watch.loss_was_told()
 
@@ -166,8 +174,15 @@ class Narrator(Listener):
                 **({"path": f"{path:.3g} cells at most"} if path < inf else {}),
                 "particle-steps/s": f"{facts['point_steps_per_s']:.3g}",
                 "processor time": f"{worked:.3g} s in steps, of all threads",
-                **boundary.counted(self.hub, simulation),
+                **_counted(simulation),
             },
             [(name, seconds) for name, seconds in stages if seconds > 0],
             title="Run interrupted" if run.interrupted else "Run finished",
         )
+
+
+def _counted(simulation: Simulation) -> dict[str, int]:
+    deleted, boundary = int((~simulation.present).sum()), simulation.hub.update.boundary
+    if deleted or boundary == "delete":
+        return {"deleted points": deleted}
+    return {"reflections": simulation.bounces} if boundary == "reflect" else {}

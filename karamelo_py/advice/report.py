@@ -1,7 +1,7 @@
 """karamelo-py check: what a scene needs before it runs."""
 
 from collections.abc import Callable
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
 from karamelo_py.advice.energy import not_watched
@@ -23,7 +23,7 @@ from karamelo_py.run.energy import unknown_work
 from karamelo_py.run.lower.card import memory_there, refusals
 from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
-from karamelo_py.run.no_number import refuse_endless_speeds
+from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
@@ -37,7 +37,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     program = machine_memory.taken() - known(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
-    refuse_endless_speeds(simulation)
+    if not isfinite(simulation.fastest()):
+        raise endless_speed(simulation)
     simulation.sort_if_due()
     set_up = machine_memory.age()
     say = hub.console.say

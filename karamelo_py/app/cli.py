@@ -26,7 +26,8 @@ from karamelo_py.app.options import (
     threads_option,
 )
 from karamelo_py.output import record
-from karamelo_py.run.mpi.comm import ENDING, MpiComm, handled_signals, launched
+from karamelo_py.run.mpi.comm import MpiComm, launched
+from karamelo_py.scene.comm import ENDING, handled_signals
 from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
 if TYPE_CHECKING:  # slow imports

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 from karamelo_py.app.leaving import INTERRUPTED, SIGNALLED
 from karamelo_py.run.mpi import comm as mpi
+from karamelo_py.scene.comm import ENDING, handled_signals
 from karamelo_py.script.errors import FAILURES, ScriptError, render_message
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ class Launcher:
         self.process: subprocess.Popen | None = None
 
     def run(self) -> int:
-        with socket.socket(socket.AF_UNIX) as self.door, mpi.handled_signals(self._pass_on):
+        with socket.socket(socket.AF_UNIX) as self.door, handled_signals(self._pass_on):
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
@@ -224,7 +225,7 @@ class Launcher:
         who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended{by}"
         if self.over:
             return render_message("error", f"{who} when the runs were over: all files are complete")
-        signalled = sent in mpi.ENDING
+        signalled = sent in ENDING
         hint = None if signalled else "the system does that to who takes too much memory"
         who += ", and the run with it: files are complete up to there"
         return render_message("error", who, hint=hint)

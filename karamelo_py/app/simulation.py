@@ -342,7 +342,8 @@ class Simulation:
             try:
                 with _as_simulation_error():
                     yield
-                self.hub.record.end("finished")
+                if self.hub.record.runs:
+                    self.hub.record.end("finished")
             except Quit:
                 self.hub.record.end("finished")
             except Interrupted:

@@ -5,7 +5,7 @@ from typing import Any, Literal
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
-from karamelo_py.language.unknown import MEANINGS, check_ID
+from karamelo_py.language.unknown import MEANINGS
 from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -37,7 +37,8 @@ def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
     delete_fix, group, compute
     """
     new = _define(hub, "fix", ID, style, arguments)
-    check_fix(hub, new)
+    if registry.is_foreign(type(new)):
+        check_fix(hub, new)
     new.defined()
 
 
@@ -99,7 +100,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
         message = f"'{ID}' is a {others.kind} already (line {others[ID].place.line})"
         expected = f"another ID: {ID}_x and the like would mean two things"
         raise ScriptError(message, argument="ID", expected=expected)
-    check_ID(kind, ID)
+    catalogue.refuse_unnameable(ID)
     _check_names(hub, kind, ID, target)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
     new.style = style

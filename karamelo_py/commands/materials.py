@@ -8,7 +8,7 @@ from karamelo_py.commands.thin import fit_to_domain
 from karamelo_py.language import registry
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
-from karamelo_py.language.unknown import check_ID, longer
+from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.doubts import doubts
@@ -261,7 +261,7 @@ def element(
     --------
     load_path, material
     """
-    check_ID("element", ID)
+    hub.elements.refuse_unnameable(ID)
     if can(material.law, constrained_velocity):
         message = f"material '{material.id}' is rigid: it has no strain and no stress"
         raise ScriptError(message, argument="material", expected="a material that deforms")

@@ -10,11 +10,10 @@ from typing import Any
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import Place, ScriptError, meant, one_of
 from karamelo_py.script.expressions import Expression, Value
-from karamelo_py.script.parser import parse_expression
+from karamelo_py.script.parser import NUMBER, parse_expression
 from karamelo_py.script.syntax import Raw
 
 NULL = "NULL"
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
 _GAP = re.compile(r'[\w)"]\s+["\w.]|\w;')  # two words separated by a blank or ; only

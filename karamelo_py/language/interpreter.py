@@ -10,7 +10,7 @@ from typing import Any
 from karamelo_py.language import registry, signature, unknown
 from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.presets import Presets
-from karamelo_py.language.replay import Record, Replay, spelled
+from karamelo_py.language.replay import Record, Replay
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
@@ -66,6 +66,11 @@ class Interpreter:
     @property
     def waits(self) -> bool:
         return bool(self.frames)
+
+    @property
+    def has_more(self) -> bool:
+        """True if statements follow the present one."""
+        return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:
         """`name` is relative to the present script."""
@@ -221,7 +226,7 @@ class Interpreter:
         differs = getattr(command, "may_differ", ())
         if differs is True:
             return self._execute(statement)
-        text, replay = spelled(statement, differs), self.replay
+        text, replay = statement.spelled(differs), self.replay
         self.record.statements.append(text)
         if replay is None:
             return self._execute(statement)

@@ -6,7 +6,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from karamelo_py.language.replay import spelled
 from karamelo_py.language.unknown import check_name
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.expressions import Value
@@ -85,7 +84,7 @@ class Presets(dict[str, str]):
             if options := ", ".join(f"-var {name} {self[name]}" for name in self._in(marked)):
                 error.hint = f"{marked} comes from {options}"
         for name, number in self._texts.items():
-            if re.search(rf"\b{name}\b", spelled(statement)):
+            if re.search(rf"\b{name}\b", statement.spelled()):
                 self.blamed.add(name)
                 text = f"-var {name} {self[name]} is a text"
                 error.hint = f"{text}, and the script has a number, as in -var {name} {number}"

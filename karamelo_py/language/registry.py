@@ -64,6 +64,11 @@ def names(family: str) -> list[str]:
     return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
 
 
+def is_foreign(kind: type) -> bool:
+    """Return True for a class of a plug-in."""
+    return not kind.__module__.startswith(PREFIX)
+
+
 def knows(family: str, name: str) -> bool:
     """True if `family` has a style of this name, perhaps a broken one."""
     return name in _families().get(family, {}) or _of_module(family, name) is not None

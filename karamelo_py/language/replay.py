@@ -1,23 +1,12 @@
 """Repeat a script up to the state at which an earlier run stopped."""
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from math import nan
 
 from karamelo_py.script.errors import Place, ScriptError
-from karamelo_py.script.syntax import Statement
 
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
-_BLANKS = re.compile(r'"[^"\n]*"|\s+')
-
-
-def spelled(statement: Statement, without: Iterable[str] = ()) -> str:
-    """A statement without blanks, comments, line ends and the keywords `without`."""
-    text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", statement.raw.code)
-    for word in without:
-        text = re.sub(rf",{word}=[^,()]*", "", text)
-    return text
 
 
 @dataclass

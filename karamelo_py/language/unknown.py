@@ -218,16 +218,6 @@ def check_name(name: str) -> None:
     raise ScriptError(message, code="taken-name", name=name, expected=expected, hint=hint)
 
 
-def check_ID(kind: str, ID: str) -> None:
-    if ID.isidentifier() and ID not in ("and", "or", "not"):
-        return
-    better = re.sub(r"\W", "_", ID)
-    better = better if better.isidentifier() and better != ID else f"{kind[0]}{better}"
-    message = f"formulas could not name the values of {kind} '{ID}'"
-    expected = "letters, digits and _, beginning with a letter"
-    raise ScriptError(message, argument="ID", expected=expected, hint=f"such as {better}")
-
-
 def listed(names: Iterable[str]) -> str:
     text = ", ".join(names) or "none so far"
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."

@@ -1,10 +1,12 @@
-"""Files written completely or not at all; pictures and movies."""
+"""Files written completely or not at all, and locks; pictures and movies."""
 
+import errno
 import json
 import os
 import shutil
 import subprocess
 import warnings
+import weakref
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -185,3 +187,41 @@ class Frames:
         if done.returncode != 0:
             last = (done.stderr.decode(errors="replace").strip().splitlines() or ["?"])[-1]
             raise ScriptError(f"ffmpeg could not make {path}: {last}")
+
+
+# ---- locks: two programs never write to one folder or file at once ----
+
+
+class Claim:
+    """Lock until `release` or the end of the program."""
+
+    def __init__(self, handle: int):
+        self.release = weakref.finalize(self, os.close, handle)
+
+
+# By device and inode: simulations of one process share a claim.
+_held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
+
+
+def claim(path: Path) -> Claim | None:
+    """Lock a folder or file, if the system can; None if another program has locked it."""
+    try:
+        import fcntl
+
+        handle = os.open(path, os.O_RDONLY)
+    except (ImportError, OSError):
+        return Claim(os.open(os.devnull, os.O_RDONLY))
+    about = os.fstat(handle)
+    key = about.st_dev, about.st_ino
+    current = _held.get(key)
+    if current is not None and current.release.alive:
+        os.close(handle)
+        return current
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EACCES, errno.EAGAIN):
+            os.close(handle)
+            return None
+    _held[key] = made = Claim(handle)
+    return made

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TextIO
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.output.claims import Claim, claim
-from karamelo_py.output.files import reported
+from karamelo_py.output.files import Claim, claim, reported
 from karamelo_py.output.quantity import LIMIT, Quantity
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.script.errors import ScriptError

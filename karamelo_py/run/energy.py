@@ -10,6 +10,7 @@ from karamelo_py.kernels.watch import (
     BORNE,
     COARSE,
     FEW,
+    LOOKS,
     ROUND_OFF,
     WITHIN,
     begin_to_look,
@@ -134,6 +135,11 @@ class EnergyWatch:
     def has_grown(self) -> bool:
         clock = self.clock
         return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
+
+    def has_lost(self, within: float) -> bool:
+        """Return True if more than this fraction of the largest energy is lost."""
+        clock = self.clock
+        return bool(clock.watch_energy and clock.looks > LOOKS and self.share_lost() > within)
 
     def share_lost(self) -> float:
         """Fraction of the largest energy lost since the first step; negative: a gain."""

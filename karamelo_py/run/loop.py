@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.run.listening import Listener
-from karamelo_py.run.mpi.comm import check_same_run, handled_signals
+from karamelo_py.run.mpi.comm import check_same_run
 from karamelo_py.run.rollback import RollBack, Stopped
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timings import Timings
+from karamelo_py.scene.comm import handled_signals
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import ScriptError, render_message
@@ -59,7 +60,8 @@ class RunLoop:
         hub = self.hub
         hub.in_run = hub.begun
         try:
-            check_same_run(hub)
+            if hub.settings.comm.size > 1:
+                check_same_run(hub)
             with self.timings.telling_of_compilation(), attributed(hub):
                 self._run(hub.simulation)
         finally:

@@ -75,10 +75,9 @@ def no_number(simulation: Backend, message: str, hint: str) -> Trouble:
     )
 
 
-def refuse_endless_speeds(simulation: Backend) -> None:
-    """Refuse initial velocities that are not finite, naming the formula."""
-    if not np.isfinite(simulation.fastest()):
-        message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
-        hint = "look for a formula that gives NaN or infinity, such as a division by zero"
-        trouble = no_number(simulation, message, hint)
-        raise ScriptError(trouble.message, place=trouble.place, hint=trouble.fix, code=trouble.code)
+def endless_speed(simulation: Backend) -> ScriptError:
+    """Make the error for initial velocities that are not finite, naming the formula."""
+    message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
+    hint = "look for a formula that gives NaN or infinity, such as a division by zero"
+    trouble = no_number(simulation, message, hint)
+    return ScriptError(trouble.message, place=trouble.place, hint=trouble.fix, code=trouble.code)

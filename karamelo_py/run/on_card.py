@@ -69,11 +69,7 @@ class SimulationOnCard(Simulation):
             self._fetch()
             self._nodes_ahead = False
             self._steps.fetch_nodes()
-        return self._nodes
-
-    @nodes.setter
-    def nodes(self, nodes: NodesByNumber) -> None:
-        self._nodes = nodes
+        return super().nodes
 
     @property
     def kin(self) -> Tag:

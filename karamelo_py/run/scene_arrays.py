@@ -41,6 +41,7 @@ from karamelo_py.run.step_size import CARRIED
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.plugins import foreign_parts
 
 TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by deleted points
 
@@ -80,7 +81,6 @@ class SceneArrays:
         self.comm: SerialComm = hub.settings.comm
         comm = self.comm
         self.points = Fields(hub, self)
-        self.nodes = NodesByNumber(self.points)
         self.key = scene_key(hub)
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
@@ -92,7 +92,8 @@ class SceneArrays:
             self.setup, self.tiles = lower(hub, state, ids=None if comm.size == 1 else ends)
         except MemoryError as error:
             raise no_room(hub, error) from None
-        try_parts(hub, self.setup)
+        if foreign_parts(hub):
+            try_parts(hub, self.setup)
         self.present = np.ones(self.count, np.bool_)  # by id, False for deleted points
         if state is not None:
             self.present[: state.count] = state.present
@@ -108,6 +109,10 @@ class SceneArrays:
 
     def fits(self, hub: Hub) -> bool:
         return self.key == scene_key(hub)
+
+    @property
+    def nodes(self) -> NodesByNumber:
+        return NodesByNumber(self.points)
 
     @property
     def kin(self) -> NamedTuple:

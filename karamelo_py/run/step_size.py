@@ -14,7 +14,7 @@ from karamelo_py.kernels.clock import STILL, STRIDE, choose_dt
 from karamelo_py.kernels.step import measure
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.backend import Backend
-from karamelo_py.run.no_number import refuse_endless_speeds
+from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.stable_step import (
     common_velocity,
     courant_number,
@@ -103,7 +103,8 @@ class StepSize:
             self._ask(0)
         self._choose()
         if not np.isfinite(simulation.dt):
-            refuse_endless_speeds(simulation)
+            if not np.isfinite(simulation.fastest()):
+                raise endless_speed(simulation)
             raise ScriptError(
                 "cannot choose a time step: all material is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",

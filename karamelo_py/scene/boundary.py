@@ -13,8 +13,6 @@ from karamelo_py.script.errors import Place, ScriptError
 
 def check(hub: Scene) -> None:
     update = hub.update
-    if update.boundary == "error":
-        return
     if not update.method.frame.moves:
         name = registry.name_of("method", type(update.method))
         raise ScriptError(
@@ -73,22 +71,3 @@ def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, 
             hint="a condition that some points do not meet, or another group",
         )
     return simulation.remove(ids)
-
-
-def tell_of_bounces(hub: Scene, simulation: Any) -> None:
-    if hub.update.boundary == "reflect" and not hub.update.warned_of_bounces and simulation.bounces:
-        hub.update.warned_of_bounces = True
-        hub.warn(
-            f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected at the "
-            "edge of the domain; more are only counted",
-            place=hub.update.boundary_place,
-        )
-
-
-def counted(hub: Scene, simulation: Any) -> dict[str, int]:
-    deleted = int(np.count_nonzero(~simulation.present))
-    if deleted or hub.update.boundary == "delete":
-        return {"deleted points": deleted}
-    if hub.update.boundary == "reflect":
-        return {"reflections": simulation.bounces}
-    return {}

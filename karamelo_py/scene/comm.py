@@ -1,7 +1,13 @@
-"""Communication between processes, here of one; :mod:`karamelo_py.run.mpi.comm` has several."""
+"""Signals, and communication between processes, here of one.
 
+:mod:`karamelo_py.run.mpi.comm` has several.
+"""
+
+import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from types import FrameType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -9,6 +15,28 @@ import numpy as np
 from karamelo_py.script.errors import ScriptError
 
 T = TypeVar("T")
+# Ctrl-C; batch systems and kill; a closed terminal (not reported on Windows).
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+
+
+@contextmanager
+def handled_signals(
+    handler: Callable[[int, FrameType | None], None], numbers: Sequence[int] = ENDING
+) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in numbers}
+    # Ignored if the program shall outlive the terminal (nohup).
+    heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
+    for number in heeded:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])
 
 
 class SerialComm:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -48,6 +49,16 @@ class Catalogue(dict):
                 kind=self.kind,
                 expected="another ID",
             )
+
+    def refuse_unnameable(self, ID: str) -> None:
+        """Refuse an ID whose values formulas could not name."""
+        if ID.isidentifier() and ID not in ("and", "or", "not"):
+            return
+        better = re.sub(r"\W", "_", ID)
+        better = better if better.isidentifier() and better != ID else f"{self.kind[0]}{better}"
+        message = f"formulas could not name the values of {self.kind} '{ID}'"
+        expected = "letters, digits and _, beginning with a letter"
+        raise ScriptError(message, argument="ID", expected=expected, hint=f"such as {better}")
 
     def __missing__(self, ID: str) -> NoReturn:
         names = [*["all"] * (self.kind == "group"), *self]
@@ -289,10 +300,11 @@ class Hub:
         """Try the rest of the script once, before the first expensive work."""
         if not self.rehearsed:
             self.rehearsed = True
-            other = self.rehearsal()
+            other = self.rehearsal() if self.interpreter.has_more else self
             other.in_runs = self.lasting()
-            self.interpreter.rehearse(other)
-            self.later = other.later
+            if other is not self:
+                self.interpreter.rehearse(other)
+                self.later = other.later
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:

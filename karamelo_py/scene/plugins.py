@@ -233,7 +233,8 @@ def check_fields(hub: Scene, name: str, owner: object, place: Place | None) -> N
 
 
 def check_law(hub: Scene, name: str, law: NamedTuple) -> None:
-    if is_foreign(type(law)) and (error := _wrong_traits(type(law), law_traits(law), LawTraits)):
+    kind = type(law)
+    if registry.is_foreign(kind) and (error := _wrong_traits(kind, law_traits(law), LawTraits)):
         raise faults.fault(name, error, hub.place)
     for column in laws.columns_of(law):
         if shows := _shows(hub, column, None):
@@ -284,10 +285,6 @@ class PartInUse(NamedTuple):
     place: Place | None
 
 
-def is_foreign(kind: type) -> bool:
-    return not kind.__module__.startswith(registry.PREFIX)
-
-
 def foreign_parts(hub: Scene) -> list[PartInUse]:
     update, method = hub.update, hub.update.method
     parts = [
@@ -296,7 +293,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
         for item in of.values()
     ]
     parts += [
-        PartInUse(f"{of.kind} {item.style}", type(item.law), item.place)
+        PartInUse(f"{of.kind} {item.style}", type(item.laws[of.kind]), item.place)
         for of in (hub.materials, *hub.parts.values())
         for item in of.values()
     ]
@@ -307,9 +304,9 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
     parts += [
         PartInUse(f"{family} {registry.name_of(family, type(tag))}", type(tag), place)
         for family, tag, place in tags
-        if is_foreign(type(tag))
+        if registry.is_foreign(type(tag))
     ]
-    return [part for part in parts if is_foreign(part.kind)]
+    return [part for part in parts if registry.is_foreign(part.kind)]
 
 
 @contextmanager

@@ -34,8 +34,6 @@ def check_characters(text: str) -> None:
             "it is saved as .inp (Abaqus), .bdf (Nastran), .stl or .vtk"
         )
         raise Mistake("this is an input file of LS-DYNA", *first.span(1), "a script", hint)
-    if text.isascii() and text.isprintable():
-        return
     for match in _PUNCTUATION.finditer(text):
         word = match[0]
         if len(word) > 1 or word in '"#()':

@@ -10,6 +10,7 @@ from karamelo_py.script import grammar, mistakes, reading, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import Mistake
 
+NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 # Endings of files that programs write next to scripts.
 _WRITTEN = (
@@ -50,7 +51,8 @@ def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     source = syntax.Source(text, file)
     try:
-        mistakes.check_characters(text)
+        if not (text.isascii() and text.isprintable()):
+            mistakes.check_characters(text)
         spans = grammar.parser_of("script").parse(text)
     except grammar.refused():
         raise mistakes.in_script(text).error(source) from None
@@ -87,11 +89,11 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
 def _tree(code: str) -> syntax.Node:
     """Offsets count from the start of `code`."""
     word = code.strip()
-    # Fast path: most arguments and right-hand sides are one name or integer.
+    # Fast path: most arguments and right-hand sides are one name or number.
     start = code.index(word)
     if word.isascii() and word.isidentifier() and word not in grammar.SPELLINGS:
         return syntax.Name(start, start + len(word), 1, word)
-    if word.isascii() and word.isdigit():
+    if NUMBER.fullmatch(word):
         return syntax.NumberLiteral(start, start + len(word), 1, grammar.literal(word, start))
     if not word:
         raise Mistake("there is nothing here", 0, len(code), expected="an expression")

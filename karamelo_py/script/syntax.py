@@ -2,12 +2,14 @@
 
 import re
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
 from karamelo_py.script.errors import Place, ScriptError
 
 # Quoted text comes first: a # in it starts no comment.
+_BLANKS = re.compile(r'"[^"\n]*"|\s+')
 _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
 
@@ -124,6 +126,13 @@ class Statement:
 
     place: Place
     raw: Raw
+
+    def spelled(self, without: Iterable[str] = ()) -> str:
+        """Return it without blanks, comments, line ends and the keywords `without`."""
+        text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
+        for word in without:
+            text = re.sub(rf",{word}=[^,()]*", "", text)
+        return text
 
 
 @dataclass(frozen=True, slots=True)

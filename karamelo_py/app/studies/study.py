@@ -19,9 +19,8 @@ from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, Row, folder_name, kind_of
 from karamelo_py.app.studies.records import Recorded, recorded, row, write
-from karamelo_py.output.claims import Claim, claim
 from karamelo_py.output.console import duration
-from karamelo_py.output.files import reported, write_whole
+from karamelo_py.output.files import Claim, claim, reported, write_whole
 from karamelo_py.output.record import surroundings
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of

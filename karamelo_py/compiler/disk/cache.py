@@ -265,19 +265,26 @@ def _damaged(path: Path) -> None:
 
 
 def _keep(path: Path, content: bytes) -> None:
-    """Write a file; delete the least recently used above `ROOM` bytes."""
     try:
         files.write(path, content)
-        ages = []
-        for one in files.folder().iterdir():
-            if _OURS.fullmatch(one.name):
-                with contextlib.suppress(FileNotFoundError):
-                    about = one.stat()
-                    ages.append((about.st_mtime, about.st_size, one))
-        room = ROOM
-        for _, size, one in sorted(ages, key=lambda item: item[0], reverse=True):
-            room -= size
-            if room < 0:
-                one.unlink(missing_ok=True)
+        make_room(path.parent)
     except OSError as error:
         files.report_error(error)
+
+
+@functools.cache
+def make_room(folder: Path) -> None:
+    """Delete the least recently used files above `ROOM` bytes, once per process.
+
+    A look at 2000 files takes 13 ms.
+    """
+    ages, room = [], ROOM
+    for one in folder.iterdir():
+        if _OURS.fullmatch(one.name):
+            with contextlib.suppress(FileNotFoundError):
+                about = one.stat()
+                ages.append((about.st_mtime, about.st_size, one))
+    for _, size, one in sorted(ages, key=lambda item: item[0], reverse=True):
+        room -= size
+        if room < 0:
+            one.unlink(missing_ok=True)

@@ -88,7 +88,8 @@ def check_scene(hub: Hub) -> None:
         if error.place is None:
             error.place, error.command = method.place, "method"
         raise
-    boundary.check(hub)
+    if hub.update.boundary != "error":
+        boundary.check(hub)
     if hub.update.scheme.traits.implicit:
         implicit.check(hub)
     # Domains of rigid points would deform.

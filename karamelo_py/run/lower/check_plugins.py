@@ -11,6 +11,7 @@ from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, Member, results
 from karamelo_py.kernels.laws import law_in, law_on
 from karamelo_py.kernels.views import place_at, state_at
+from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error, fault, place_of
 from karamelo_py.points import laws
 from karamelo_py.points.basis import entry, locate, support
@@ -22,7 +23,7 @@ from karamelo_py.points.transfers import updated_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.modify import Fix
-from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts, is_foreign
+from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts
 from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
@@ -35,9 +36,9 @@ def try_parts(hub: Hub, setup: Setup) -> None:
     for solid in hub.solids.values():
         law = law_on(solid.material.law, solid.h, solid.T0)
         try_law(hub, solid.material, setup.kin, law, _one(setup))
-    if is_foreign(type(setup.basis)):
+    if registry.is_foreign(type(setup.basis)):
         _try_basis(hub, setup)
-    if is_foreign(type(setup.transfer)):
+    if registry.is_foreign(type(setup.transfer)):
         part = _part_of(hub, [type(setup.transfer)])
         v = vector(setup.kin, (_one(setup),) * setup.kin.dimension)
         with _trial(hub, part):
@@ -142,7 +143,7 @@ def try_law(
 ) -> None:
     """Try a plug-in's law, as a solid has it or in a cell of size 1 at 293 K."""
     kinds = laws.law_kind(material.law)
-    if not any(map(is_foreign, kinds)):
+    if not any(map(registry.is_foreign, kinds)):
         return
     part = _part_of(hub, kinds) or PartInUse(f"material {material.style}", kinds[0], material.place)
     law = law_in(law or law_on(material.law, 1.0, 293.0), type(one))
@@ -172,7 +173,7 @@ def try_law(
 def _try_flow_stress(part: PartInUse, law: Tag, state: tuple, strain: Number) -> None:
     strength = parameter(law, "strength")
     kind = type(strength)
-    if not (is_foreign(kind) and hardening.flow_stress.defined(kind)):
+    if not (registry.is_foreign(kind) and hardening.flow_stress.defined(kind)):
         return
     memory, heat, dt = state.m.strength, state.m.heat, strain / strain if strain else 1
     before = hardening.before_flow(strength, memory, heat)

@@ -125,7 +125,7 @@ class _Builder:
         early = STAGES[moment] == arrays.POST_PARTICLES_TO_GRID
         rubs = fix.wall_friction is not None
         if early or (late and (not holds or rubs or self.rigid)):
-            self.loaded_nodes = fix.group.total()
+            self.loaded_nodes = self.hub.fields.node_count
 
     def shared_nodes(self) -> int:
         """Return the number of nodes if several hooks hold the same ones; else 0."""
@@ -136,7 +136,7 @@ class _Builder:
             nodes = np.concatenate([fix.nodes for fix in fixes])
             if len(unique(nodes)) == len(nodes):
                 return 0
-        return fixes[0].group.total()
+        return self.hub.fields.node_count
 
     def _members(self, fix: Fix, hook: CompiledHook) -> tuple[int, int]:
         if fix.group.all:

@@ -1,15 +1,11 @@
 """The MPI processes of a scene, through mpi4py."""
 
 import os
-import signal
 import socket
-import threading
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from math import inf
-from types import FrameType
 from typing import Any
 from zlib import crc32
 
@@ -27,32 +23,10 @@ LAUNCHED = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
-# Ctrl-C; batch systems and kill; a closed terminal (not reported on Windows).
-NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
-ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 # Answers of processes besides step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
 RankArray = tuple[int, np.ndarray]
 PAUSE = 0.005  # seconds between checks for the other processes
-
-
-@contextmanager
-def handled_signals(
-    handler: Callable[[int, FrameType | None], None], numbers: Sequence[int] = ENDING
-) -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.getsignal(number) for number in numbers}
-    # Ignored if the program shall outlive the terminal (nohup).
-    heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
-    for number in heeded:
-        signal.signal(number, handler)
-    try:
-        yield
-    finally:
-        for number in heeded:
-            signal.signal(number, before[number])
 
 
 def launched() -> tuple[int, int]:
@@ -186,8 +160,6 @@ class MpiComm(SerialComm):
 def check_same_run(hub: Scene) -> None:
     """Check that all processes begin the same run; one reports, the others quit."""
     comm = hub.settings.comm
-    if comm.size == 1:
-        return
     present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs)]
     words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
     if (words == words[0]).all():

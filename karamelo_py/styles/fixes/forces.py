@@ -69,29 +69,34 @@ class BodyForce(Fix):
         super().__init__(hub, group)
         self.formulas = per_direction(hub, "b", acceleration)
 
-    def defined(self) -> None:
-        if not any(formula is not None and _is_gravity(formula) for formula in self.formulas):
-            return
-        hub = self.hub
-        units = hub.output.units
-        densities = [1 / float(specific_volume(s.material.law)) for s in hub.solids.values()]
-        if units and abs(units.si(ACCELERATION) - 1) > 1e-6:
-            units_line = f"units({', '.join(units[:3])})"
-            evidence, right = units_line, 9.81 / units.si(ACCELERATION)
-        elif not units and densities and TONNES[0] < max(densities) < TONNES[1]:
-            evidence, right = f"a density of {max(densities):.3g}, as in mm, t, s,", 9810.0
-        else:
-            return
-        hub.warn(
-            f"with {evidence} an acceleration of 9.81 is {9.81 / right:.3g} of gravity",
-            hint=f"gravity is {right:.6g} there",
-        )
-
 
 def _is_gravity(formula: Expression) -> bool:
     if formula.is_constant:
         return 9.7 < abs(formula.constant) < 9.9
     return re.search(r"(?<![\d.])9\.8\d*(?![\d.eE])", formula.text) is not None
+
+
+def _gravity_in_other_units(fix: BodyForce, scene: Any) -> dict | None:
+    if not any(formula is not None and _is_gravity(formula) for formula in fix.formulas):
+        return None
+    units = fix.hub.output.units
+    densities = [1 / float(specific_volume(s.material.law)) for s in fix.hub.solids.values()]
+    if units and abs(units.si(ACCELERATION) - 1) > 1e-6:
+        evidence, right = f"units({', '.join(units[:3])})", 9.81 / units.si(ACCELERATION)
+    elif not units and TONNES[0] < max(densities) < TONNES[1]:
+        evidence, right = f"a density of {max(densities):.3g}, as in mm, t, s,", 9810.0
+    else:
+        return None
+    return {"evidence": evidence, "right": right, "fraction": 9.81 / right}
+
+
+known_failure(
+    BodyForce,
+    "units of gravity",
+    when=_gravity_in_other_units,
+    reason="with {evidence} an acceleration of 9.81 is {fraction:.3g} of gravity",
+    cure="gravity is {right:.6g} there",
+)
 
 
 def share_out(mass, v, v_star, force, value, before, dt, share):
