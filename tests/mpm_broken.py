@@ -68,7 +68,7 @@ def at_point(mass, v, x_old, x, value, before, dt, kick):
     return v, x, 1.0
 
 
-def at_node(mass, v, v_star, force, value, before, dt, share):
+def at_node(mass, v, v_star, force, value, before, kick, share):
     return v, v_star, force, 1.0
 
 

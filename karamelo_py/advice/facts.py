@@ -1,8 +1,6 @@
 """Facts of a scene before a run, for rules."""
 
-import re
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cached_property
 from math import pi, sqrt
 from operator import methodcaller
@@ -19,11 +17,8 @@ from karamelo_py.compiler.fields import declared
 from karamelo_py.language import rules
 from karamelo_py.points import transfers
 from karamelo_py.points.laws import can, constrained_velocity, law_parts
-from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.parser import read_script
 
 PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities taken from the grid
 TURN = 0.3  # radians beyond which a scene counts as rotating
@@ -62,7 +57,6 @@ class SceneFacts(BasicFacts):
                 advice = list(rules.advice(kind, piece, owner, self))
             yield from advice
 
-    text = cached_property(lambda self: script_text(self.hub))
     drift, rotation = cached_property(drift_of), cached_property(turn_of)
     lag, crossing = cached_property(lag_of), cached_property(expected)
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
@@ -81,7 +75,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def reads_temperature(self) -> bool:
-        return bool(re.search(r"average_temperature|(\b|_)T(max)?\b", self.text))
+        return any(name == "T" or name.endswith("Tmax") for name in self.hub.asked)
 
     @cached_property
     def turn(self) -> float:
@@ -184,12 +178,3 @@ class SceneFacts(BasicFacts):
         low = -points.largest(lambda some: some.particle("s11"))[0]
         high = points.largest(lambda some: -some.particle("s11"))[0]
         return high / low if low > 0 else 1.0
-
-
-def script_text(hub: Hub) -> str:
-    """The script with its includes, without comments."""
-    lines: list[str] = []
-    for path in dict.fromkeys([*hub.interpreter.files, *hub.interpreter.files_ahead]):
-        with suppress(ScriptError):  # the file may be gone
-            lines += read_script(path).splitlines()
-    return "\n".join(line.partition("#")[0] for line in lines)

@@ -106,7 +106,7 @@ class Narrator(Listener):
         if not watch.told_of_growth and watch.has_grown():
             gain = energy.words_of_growth(hub, simulation)
             hub.warn(gain.message, hint=gain.fix, code=gain.code, cause=gain.cause)
-            watch.growth_was_told()
+            watch.told_of_growth = True
         self._tell_of_loss(simulation, WITHIN)
         if simulation.step % simulation.states_every == 0 and not simulation.implicit:
             self._tell_of_limit(simulation)
@@ -137,7 +137,7 @@ class Narrator(Listener):
             return
         if loss := energy.words_of_loss(hub, simulation):
             hub.warn(loss.message, hint=loss.fix, code=loss.code, cause=loss.cause)
-            watch.loss_was_told()
+            watch.told_of_loss = True
 
     def wrong(self, simulation: Simulation, status: int, too_large: bool) -> Trouble | None:
         if status == DONE:

@@ -1,6 +1,5 @@
 """Suggestions of `check`: needless costs, and what to write instead."""
 
-import re
 from collections.abc import Callable, Iterator
 from math import inf
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.advice.basics import is_zero
-from karamelo_py.advice.facts import SceneFacts, script_text
+from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.points.kinematics import free_from
@@ -47,20 +46,15 @@ def _of_parts(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _unread(hub: Hub, simulation: Simulation) -> Words:
-    text = script_text(hub)
-    for kind, catalogue in (("compute", hub.computes), ("fix", hub.fixes)):
+    for catalogue in (hub.computes, hub.fixes):
         for ID, item in catalogue.items():
-            measures = kind == "compute" or not (item.hooks() or item.for_method)
-            if not measures or "(" in ID or not item.published:
-                continue
-            defined = rf"\b{kind}\s*\(\s*{re.escape(ID)}\s*,"
-            uses = len(re.findall(rf"\b{re.escape(ID)}(?:_\w+)?\b", text))
-            if 0 < uses <= len(re.findall(defined, text)):
-                suffix = item.published[0]
-                name = f"{ID}_{suffix}" if suffix else ID
+            measures = catalogue is hub.computes or not (item.hooks() or item.for_method)
+            names = [f"{ID}_{suffix}" if suffix else ID for suffix in item.published]
+            if measures and "(" not in ID and names and hub.asked.isdisjoint(names):
                 yield (
-                    f"{kind} {ID} ({item.style}) is measured at each output and shown nowhere",
-                    f"leave it out, or name {name} in log_modify",
+                    f"{catalogue.kind} {ID} ({item.style}) is measured at each output and shown "
+                    "nowhere",
+                    f"leave it out, or name {names[0]} in log_modify",
                 )
 
 

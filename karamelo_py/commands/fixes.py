@@ -116,6 +116,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
             hint="fixes that act at the same time need different IDs",
         )
     catalogue.add(ID, new, replace=replaces)
+    hub.asked.update(new.columns)
     hub.values.publish_vector(ID, new.published)
     group = new.group
     if group is not None and not group.all and len(group) == 0:

@@ -55,6 +55,7 @@ def dump(
     except ScriptError as error:
         error.place = arguments[1].place
         raise
+    hub.asked.update(new.columns)
     hub.dumps.add(ID, new)
 
 

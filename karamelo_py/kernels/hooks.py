@@ -4,11 +4,11 @@ A fix is a formula acting on a group, with a tiny function. The loops choose mem
 formula block by block and call the function by address: a new list of fixes compiles only new
 functions.
 
-Node function ``(mass, v, v_star, force, value, before, dt, share) -> (v, v_star, force, total)``:
+Node function ``(mass, v, v_star, force, value, before, kick, share) -> (v, v_star, force, total)``:
 `value` and `before` are the formula at the step's time and one step earlier; `share` is 1 / number
-of members with mass; `dt` is the time forces act, half of the last step plus half of this one.
+of members with mass; `kick` is the time forces act, half of the last step plus half of this one.
 Totals are summed and published, plus the momentum that a change of v before the update adds to
-points, over dt. Of several hooks holding a node, the last to set v_star to its value decides, and
+points, over kick. Of several hooks holding a node, the last to set v_star to its value decides, and
 gets the others' totals there. Of the deforming velocity, if mapped separately from v_star, v is
 set; before the forces (usf, usavg) by the hooks of the update, where those that hold set it to
 their v_star.

@@ -44,8 +44,7 @@ class Interpreter:
         self.hub = hub
         self.variables: dict[str, Value] = {}
         hub.interpreter = self
-        self.files: list[Path] = []  # read
-        self.files_ahead: list[Path] = []  # read by a rehearsal
+        self.files: list[Path] = []  # files read
         self.frames: list[_Frame] = []
         self.by_statement = False  # `next_statement` enters included scripts
         self.statement: syntax.Statement | None = None  # last one started
@@ -114,8 +113,6 @@ class Interpreter:
         except ScriptError as error:
             error.others = further_errors(other, error)
             raise
-        finally:
-            self.files_ahead = other.files
 
     def _copy(self, hub: Any) -> "Interpreter":
         other = Interpreter(hub, self.presets)
@@ -317,6 +314,7 @@ class Interpreter:
         if name in CONSTANTS:
             return CONSTANTS[name]
         if name in self.hub.values:
+            self.hub.asked.add(name)
             return Expression.seed(name)
         raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 

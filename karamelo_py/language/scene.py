@@ -25,6 +25,7 @@ class Scene(Protocol):
     computes: Any
     dumps: Any
     values: Any
+    asked: set[str]
     update: Any
     output: Any
     fields: Any

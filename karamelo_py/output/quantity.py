@@ -26,6 +26,7 @@ class Quantity:
         self.name = name
         self.formula = formula
         self._reported_nan = False
+        hub.asked.add(name)
         self.is_word = self.words and name == LIMIT and name not in self.names(hub)
         if self.is_word:
             return

@@ -20,18 +20,14 @@ class Powers(NamedTuple):
     temperature: int = 0
 
 
-DENSITY, VELOCITY, FORCE, STRESS, ENERGY = (
-    Powers(-3, 1),
-    Powers(1, 0, -1),
-    Powers(1, 1, -2),
-    Powers(-1, 1, -2),
-    Powers(2, 1, -2),
-)
+NUMBER, LENGTH, TEMPERATURE = Powers(), Powers(1), Powers(0, 0, 0, 1)
+DENSITY, VELOCITY, STRESS = Powers(-3, 1), Powers(1, 0, -1), Powers(-1, 1, -2)
+FORCE, ENERGY = Powers(1, 1, -2), Powers(2, 1, -2)
 NAMED = {FORCE: "N", STRESS: "Pa", ENERGY: "J", Powers(2, 1, -3): "W"}
 
 # Columns of dumps and words of the log.
 COLUMNS = {
-    r"[xyz]0?": Powers(1),
+    r"[xyz]0?": LENGTH,
     r"v[xyz](_update)?": VELOCITY,
     r"s[123]{2}|seq|p": STRESS,
     r"[fb][xyz]": FORCE,
@@ -40,21 +36,8 @@ COLUMNS = {
     r"mass": Powers(0, 1),
     r"ienergy": ENERGY,
     r"epdot": Powers(0, 0, -1),
-    r"T": Powers(0, 0, 0, 1),
+    r"T": TEMPERATURE,
     r"time|dt": Powers(0, 0, 1),
-}
-# Values of fixes and computes, by style.
-STYLES = {
-    "kinetic_energy": ENERGY,
-    "strain_energy": ENERGY,
-    "dissipated_energy": ENERGY,
-    "average_velocity": VELOCITY,
-    "average_temperature": Powers(0, 0, 0, 1),
-    "max_position": Powers(1),
-    "angular_momentum": Powers(2, 1, -1),
-    "velocity_nodes": FORCE,
-    "body_force": FORCE,
-    "force_nodes": FORCE,
 }
 
 
@@ -95,7 +78,7 @@ class Units(NamedTuple):
     def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
         for ID, part in parts.items():
             if name in (ID, *(f"{ID}_{end}" for end in part.published)):
-                return self.name(STYLES.get(part.style, Powers()))
+                return self.name(part.unit)
         return self.of_column(name) if name in ("time", "dt") else ""
 
 

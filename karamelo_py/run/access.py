@@ -50,11 +50,8 @@ class NodesByNumber:
                 total[there - first] += of
         return totals
 
-    def counted(self) -> np.ndarray:
-        return self.simulation.domain.counted()
-
     def with_mass(self) -> np.ndarray:
-        nodes = self.counted()
+        nodes = self.simulation.domain.counted()
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
     def mass_of(self, group: NodeGroup) -> np.ndarray:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.kernels.totals import LIMBS, add_all, rounded
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import unique
+from karamelo_py.run.state import SceneState
 
 
 class BodyMotion(NamedTuple):
@@ -60,7 +60,7 @@ class BodyMotion(NamedTuple):
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 
 
-def motions(simulation: Backend) -> list[BodyMotion]:
+def motions(simulation: SceneState) -> list[BodyMotion]:
     """Measure all solids with points, over all processes; sums are exact."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
@@ -86,7 +86,7 @@ def motions(simulation: Backend) -> list[BodyMotion]:
     return bodies
 
 
-def _pieces(simulation: Backend, d: int) -> Iterator[tuple]:
+def _pieces(simulation: SceneState, d: int) -> Iterator[tuple]:
     firsts = [solid.first_id for solid in simulation.hub.solids.values()]
     for block, rows in simulation.points.rows_of(None):
         points = block.points

@@ -22,8 +22,8 @@ from karamelo_py.kernels.watch import (
 )
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.lower.build import warms_by_friction
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 
 TOLD = 2  # consecutive windows of growth before a warning
@@ -63,7 +63,7 @@ class EnergyWatch:
     Besides the kernels, only this class writes them to the clock.
     """
 
-    def __init__(self, simulation: Backend):
+    def __init__(self, simulation: SceneState):
         self.simulation, self.clock = simulation, simulation.control.clock[0]
         self.followed = False  # the balance is up to date
         self.told_of_growth = False  # since tracking began
@@ -125,12 +125,6 @@ class EnergyWatch:
         energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
         clock[:] = present
         return energy
-
-    def growth_was_told(self) -> None:
-        self.told_of_growth = True
-
-    def loss_was_told(self) -> None:
-        self.told_of_loss = True
 
     def has_grown(self) -> bool:
         clock = self.clock

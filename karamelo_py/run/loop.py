@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.listening import Listener
 from karamelo_py.run.mpi.comm import check_same_run
 from karamelo_py.run.rollback import RollBack, Stopped
-from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.timings import Timings
 from karamelo_py.scene.comm import handled_signals
 from karamelo_py.scene.hub import Hub
@@ -44,12 +44,11 @@ class RunLoop:
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
-    signal = 0  # to this process
+    signalled = 0  # number of a signal to this process
     interrupted = 0  # signal that ends all processes
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)
-        self.place = self.hub.place
         self.timings = Timings(self.hub)
 
     def tell(self, event: Callable[[Listener], Any]) -> Any:
@@ -68,7 +67,7 @@ class RunLoop:
             hub.in_run = 0
         hub.runs.append({name: hub.values.get(name) for name in hub.values.names()})
 
-    def _run(self, simulation: Simulation) -> None:
+    def _run(self, simulation: Backend) -> None:
         hub, counted = self.hub, self.timings.counted
         started, simulation.rollback = time.perf_counter(), self.rollback.point
         self.first_step, self.first_time = simulation.step, simulation.time
@@ -108,7 +107,7 @@ class RunLoop:
             simulation.comm.end_together()
             raise Interrupted(self.interrupted)
 
-    def _take_up(self, simulation: Simulation) -> None:
+    def _take_up(self, simulation: Backend) -> None:
         hub, file = self.hub, self.hub.restart.path
         hub.restart.take(hub, self.rollback.point, outputs=True)
         hub.restart = hub.interpreter.replay = None
@@ -123,12 +122,12 @@ class RunLoop:
         if step > last_step or time > self.end_time:
             end = f"step {last_step}" if step > last_step else f"time {self.end_time:.6g}"
             message = f"{holds}, which is beyond the end of this run, {end}: it takes no step"
-            self.hub.warn(message, hint=hint, place=self.place)
+            self.hub.warn(message, hint=hint)
         elif step == last_step or time == self.end_time or not self._condition_allows():
             message = f"{holds}, the end of this run: it takes no further step"
             self.hub.console.say(render_message("note", message, hint=hint))
 
-    def _loop(self, simulation: Simulation) -> None:
+    def _loop(self, simulation: Backend) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings
         rhythms = {fix.every for fix in hub.fixes.values() if fix.every}
         most = simulation.states_every
@@ -136,7 +135,7 @@ class RunLoop:
 
         def between(words: str) -> bool:
             self._show_progress(simulation, words)
-            return bool(self.signal)
+            return bool(self.signalled)
 
         while self._goes_on(simulation):
             rollback.before()
@@ -161,7 +160,7 @@ class RunLoop:
                 anew = timings.passed("compilation") > before["compilation"]
                 self._show_progress(simulation, anew=anew)
 
-    def _goes_on(self, simulation: Simulation) -> bool:
+    def _goes_on(self, simulation: Backend) -> bool:
         if not self._steps_left(simulation):
             return False
         if self._condition_allows():
@@ -174,14 +173,13 @@ class RunLoop:
                 f"the condition {holds} before the first step of this run: it takes none",
                 hint="run_until ends where its condition is anything but 0, run_while where it is "
                 "0; comparisons are 1 or 0",
-                place=self.place,
             )
         return False
 
-    def _agree(self, simulation: Simulation) -> None:
-        self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signal]))[0])
+    def _agree(self, simulation: Backend) -> None:
+        self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signalled]))[0])
 
-    def _steps_left(self, simulation: Simulation) -> bool:
+    def _steps_left(self, simulation: Backend) -> bool:
         # A limit load also ends a run, at the time reached.
         end_time = simulation.control.clock[0].end_time
         return simulation.step < self.last_step and simulation.time < end_time
@@ -198,12 +196,11 @@ class RunLoop:
             raise ScriptError(
                 f"step {self.hub.update.step}: the run condition is not a number: "
                 + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
-                place=self.place,
                 expected="values that are numbers at every step",
             )
         return bool(holds) != self.until
 
-    def _show_progress(self, simulation: Simulation, within: str = "", anew: bool = False) -> None:
+    def _show_progress(self, simulation: Backend, within: str = "", anew: bool = False) -> None:
         console, fraction = self.hub.console, None
         if self.steps:
             fraction = (simulation.step - self.first_step) / self.steps
@@ -216,9 +213,9 @@ class RunLoop:
 
     def _note(self, number: int, _: FrameType | None = None) -> None:
         """End after the present chunk; a second signal ends at once."""
-        if self.signal:
+        if self.signalled:
             raise KeyboardInterrupt
-        self.signal = number
+        self.signalled = number
         self.tell(lambda to: to.signalled(number))
         if signal.Signals(number).name == "SIGHUP":
             self.hub.console.leave()

@@ -5,14 +5,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from karamelo_py.output.node_columns import places_of
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.listening import Trouble, where
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 
-def _first_bad(simulation: Backend) -> tuple | None:
+def _first_bad(simulation: SceneState) -> tuple | None:
     """Return ((fix, formula, point or node), value, position) of the first bad value here."""
     hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):
@@ -39,7 +39,7 @@ def _first_bad(simulation: Backend) -> tuple | None:
 
 
 def _places(
-    simulation: Backend, group: ParticleGroup | NodeGroup, formula: Expression
+    simulation: SceneState, group: ParticleGroup | NodeGroup, formula: Expression
 ) -> Iterator[tuple]:
     """Yield numbers, positions (n, d) and initial positions where a fix evaluates a formula."""
     if not formula.names.intersection(POINT_SEEDS):
@@ -55,7 +55,7 @@ def _places(
             yield some.numbers[finite], some.position[finite], some.reference_position[finite]
 
 
-def no_number(simulation: Backend, message: str, hint: str) -> Trouble:
+def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
     """Describe a NaN, naming the first fix whose formula is not finite."""
     hub = simulation.hub
     candidates = [one for one in simulation.points.seen(_first_bad) if one is not None]
@@ -75,7 +75,7 @@ def no_number(simulation: Backend, message: str, hint: str) -> Trouble:
     )
 
 
-def endless_speed(simulation: Backend) -> ScriptError:
+def endless_speed(simulation: SceneState) -> ScriptError:
     """Make the error for initial velocities that are not finite, naming the formula."""
     message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
     hint = "look for a formula that gives NaN or infinity, such as a division by zero"

@@ -143,7 +143,7 @@ class SimulationOnCard(Simulation):
         return steps
 
     def _advance_to(self, target: int) -> int:
-        if self._first is not None:
+        if self.begins:
             # Fixes of the first step act from Python.
             self._sent = False
             status = super()._advance_to(self.step + 1)

@@ -8,10 +8,10 @@ from typing import NoReturn
 
 from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
 from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
+from karamelo_py.run.backend import Backend
 from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
 from karamelo_py.run.listening import Trouble, when
-from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
@@ -40,10 +40,10 @@ def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
 
 class RollBack:
     def __init__(self, hub: Hub, tell: Callable, *, halve: bool):
-        self.hub, self.tell, self.place = hub, tell, hub.place
+        self.hub, self.tell = hub, tell
         self.point = RollbackPoint(hub, halve)
 
-    def begin(self, simulation: Simulation, first_step: int, ruined: bool, looks: bool) -> None:
+    def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
         """Begin with the present state, or the state of a file, which may be `ruined`.
 
         `looks`: a condition may read parts' values between any two steps.
@@ -110,7 +110,6 @@ class RollBack:
         self.hub.warn(
             f"{trouble.message}. Back to {when(simulation)}, "
             f"with 1/{2**point.halvings} of the step",
-            place=self.place,
             code=trouble.code,
             cause=trouble.cause,
         )
@@ -152,7 +151,7 @@ class RollBack:
             keep = self._keep_start if too_large else self._keep_good
             resume = keep(status, trouble.code)
             kind = Stopped
-        error = kind(trouble.message, place=trouble.place or self.place, hint=trouble.fix)
+        error = kind(trouble.message, place=trouble.place, hint=trouble.fix)
         error.code, error.cause, error.resume = trouble.code, trouble.cause, resume
         error.complete = trouble.place is not None
         raise error

@@ -9,7 +9,7 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks, some_of
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks
 from karamelo_py.kernels.clock import all_well, step_size
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.node_updates import SumsToVelocity
@@ -17,12 +17,10 @@ from karamelo_py.kernels.heat import SHOW, Conducting
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Extent, Visit, sweep, sweep_nodes
 from karamelo_py.kernels.table import SUMS
-from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.access import NodesByNumber
-from karamelo_py.run.backend import WholeDomain
 from karamelo_py.run.checkpoint import arrays as checkpoint
 from karamelo_py.run.checkpoint.parts import RollbackPoint
 from karamelo_py.run.lower.build import (
@@ -38,12 +36,10 @@ from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.run.step_size import CARRIED
+from karamelo_py.run.tiles import WholeDomain
 from karamelo_py.scene.comm import SerialComm
-from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import foreign_parts
-
-TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by deleted points
 
 
 def scene_key(hub: Hub) -> tuple:
@@ -174,26 +170,6 @@ class SceneArrays:
                 finite &= np.isfinite(y)
             outside.append(points.id[beyond & finite])
         return np.sort(np.concatenate(self.comm.allgather(np.concatenate(outside))))
-
-    def taken_along(self, ids: np.ndarray) -> tuple[float, float, float]:
-        """Book the energy of points as work; return their mass, kinetic and stored energy."""
-        group = ParticleGroup(self.hub)
-        group.take([ids])
-        mass, kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG)
-        stored = sum(inner)
-        if self.comm.leads:
-            add_to(self.control.totals, WORK, -(kinetic + stored))
-        return mass, kinetic, stored
-
-    def drop(self, ids: np.ndarray) -> None:
-        self.present[ids] = False
-        blocks = tuple(
-            some_of(block, np.flatnonzero(self.present[block.points.id]))
-            for block in self.setup.blocks
-        )
-        self.setup = self.setup._replace(blocks=blocks)
-        self.tiles.unsort(self.control)
-        self.changed()
 
     def changed(self) -> None:
         self.version += 1

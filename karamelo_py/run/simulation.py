@@ -8,18 +8,22 @@ from functools import cached_property
 import numpy as np
 from numba import config
 
-from karamelo_py.kernels.arrays import Hooks, NoHooks, Setup, Tag
+from karamelo_py.kernels.arrays import Hooks, NoHooks, Setup, Tag, some_of
 from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, StepKind, advance, run_steps
+from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.run.energy import EnergyWatch
 from karamelo_py.run.light_nodes import stable_share
 from karamelo_py.run.lower.hooks import ActingFixes, FixesOfRun, views_of
 from karamelo_py.run.mpi.whole import PointsMoved
 from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.run.step_size import StepSize
+from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import set_columns
+
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by deleted points
 
 
 class Simulation(SceneArrays):
@@ -36,7 +40,6 @@ class Simulation(SceneArrays):
     failure = ""  # why a load step found no equilibrium
     notes_temperatures = True
     between: Callable[[str], bool] | None = None
-    _first: ActingFixes | None = None  # of the next step, if some act only in it
     _called: Tag = None  # Python hooks that compiled steps call
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
@@ -45,7 +48,6 @@ class Simulation(SceneArrays):
         # Fixes of the first step act once, even if the scene is lowered again.
         self.begun: set[Fix] = set(previous.begun) if previous else set()
         self.visits: Staged | Fused = Fused()
-        self.hooks: Hooks | NoHooks = NoHooks()
         self.fixes = FixesOfRun([], [], None, ActingFixes(self, []))
         self.moved_in_step = False
         for solid in hub.solids.values():
@@ -110,12 +112,22 @@ class Simulation(SceneArrays):
 
         The energy balance books their energy as work.
         """
-        mass, kinetic, stored = self.taken_along(ids)
+        group = ParticleGroup(self.hub)
+        group.take([ids])
+        mass, kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG)
+        stored = sum(inner)
+        if self.comm.leads:
+            add_to(self.control.totals, WORK, -(kinetic + stored))
         self.energy_watch.without(stored)
-        followed = self.energy_watch.followed
-        self.drop(ids)
-        self.energy_watch.followed = followed
-        # Retain the rate of the last step: the same whether or not a run begins here.
+        self.present[ids] = False
+        blocks = (
+            some_of(block, np.flatnonzero(self.present[block.points.id]))
+            for block in self.setup.blocks
+        )
+        self.setup = self.setup._replace(blocks=tuple(blocks))
+        self.tiles.unsort(self.control)
+        # Balance and rate stay those of the last step: the same whether or not a run begins here.
+        super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
 
@@ -152,13 +164,14 @@ class Simulation(SceneArrays):
                 return DONE
 
     def _advance(self, count: int) -> int:
-        if self._first is None:
+        first = self.fixes.first
+        if first is None:
             return self._take(self._acting, count)
-        status = self._take(self._first, 1)
+        status = self._take(first, 1)
         if status not in (DONE, SORT):
             return status
-        self.begun |= set(self._first.fixes) & set(self.fixes.new)
-        self._first = None
+        self.begun |= set(first.fixes) & set(self.fixes.new)
+        self.fixes = self.fixes._replace(first=None)
         self.clear_forces()  # later steps may have no hook for it
         return SORT  # unfinished, unless all steps are done
 
@@ -173,12 +186,12 @@ class Simulation(SceneArrays):
         return self._called or self.fixes.lasting.tag
 
     @property
-    def acting(self) -> list[Fix]:
-        return (self._first or self.fixes.lasting).fixes
+    def hooks(self) -> Hooks | NoHooks:
+        return self.fixes.lasting.compiled
 
     @property
     def begins(self) -> bool:
-        return self._first is not None
+        return self.fixes.first is not None
 
     def refuse(self) -> None:
         """Refuse a scene that cannot run here: none."""
@@ -192,18 +205,14 @@ class Simulation(SceneArrays):
     def _make_ready(self) -> None:
         self.fixes = FixesOfRun.of(self)
         lasting = self.fixes.lasting
-        self.hooks, self._called = lasting.compiled, self._hooks_to_call()
+        self._called = None if self.implicit else lasting.called()
         names = {name for fix in lasting.fixes for name in fix.hooks()}
         self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
             # No hook precedes it in a step, so output shows its state from the start.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
-        self._first = self.fixes.first
         self.hub.update.method.begin(self.hub, self.setup.contact)
-
-    def _hooks_to_call(self) -> Tag:
-        return self.fixes.lasting.called()
 
     def _set_initial(self, fix: Fix) -> None:
         def act(_: Setup) -> None:

@@ -22,8 +22,8 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.transfers import flip_coefficient, stores_moment
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.body_motion import motions
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import USUAL
@@ -135,7 +135,7 @@ def own_weight_of_drift(hub: Hub) -> float:
     return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
-def common_velocity(simulation: Backend, weight: float) -> np.ndarray:
+def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
     """Return the reference velocity (3,) that gives the common drift this weight."""
     bodies = motions(simulation) if weight != 1 else []
     common = np.zeros(3)
@@ -189,11 +189,11 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     return min(courant, lone_point(hub)), share
 
 
-def fastest_wave(simulation: Backend) -> float:
+def fastest_wave(simulation: SceneState) -> float:
     return max(elastic_speed(simulation, solid)[0] for solid in simulation.hub.solids.values())
 
 
-def elastic_speed(simulation: Backend, solid: Solid) -> tuple[float, bool]:
+def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
     """Return an undeformed solid's wave speed without viscosity, and if it is viscous."""
     law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
     if not isinstance(parameter(law, "viscosity", Absent()), Absent):

@@ -13,7 +13,6 @@ from karamelo_py.kernels.arrays import DT, TIME, Control, Tag
 from karamelo_py.kernels.clock import STILL, STRIDE, choose_dt
 from karamelo_py.kernels.step import measure
 from karamelo_py.points.transfers import flip_coefficient
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.stable_step import (
     common_velocity,
@@ -25,6 +24,7 @@ from karamelo_py.run.stable_step import (
     own_weight_of_drift,
     stable_conduction,
 )
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.traits import USUAL
 from karamelo_py.script.errors import ScriptError
@@ -82,7 +82,7 @@ class StepSize:
 
     policy: StepPolicy
 
-    def __init__(self, simulation: Backend):
+    def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
         self.clock = simulation.control.clock[0]
         self.measured = False  # clock.rate belongs to the present state

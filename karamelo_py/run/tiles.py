@@ -1,16 +1,32 @@
 """Grids cut into tiles: their points, the nodes these reach, the nodes in use."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
+from typing import Any, Protocol
 
 import numpy as np
 
 from karamelo_py.compiler.fields import SummedField, addresses_of_rows
 from karamelo_py.compiler.lanes import lanes_for
 from karamelo_py.compiler.threads import Serial, Threaded
-from karamelo_py.kernels import arrays as kernel_arrays
 from karamelo_py.kernels import sorting
-from karamelo_py.kernels.arrays import Tag
+from karamelo_py.kernels.arrays import (
+    ADD,
+    CLEAR,
+    TAKE,
+    Block,
+    Buffers,
+    Control,
+    Hooks,
+    Nodes,
+    NoHooks,
+    OnGrids,
+    Points,
+    Setup,
+    Tag,
+    Tiling,
+    arrays_of,
+)
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.sweep import ROUNDING
 from karamelo_py.points.basis import first_node, shape_size
@@ -87,8 +103,8 @@ class Tiles:
         # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
-    def empty_tiling(self) -> kernel_arrays.Tiling:
-        return kernel_arrays.Tiling(
+    def empty_tiling(self) -> Tiling:
+        return Tiling(
             count=np.array([0, 1, 0]),
             share=np.zeros(SHARES + 1, np.int64),
             order=np.arange(self.count + 1),
@@ -101,34 +117,34 @@ class Tiles:
             report=np.zeros((self.count + 1, 14)),
         )
 
-    def empty_buffers(self, nodes: kernel_arrays.Nodes, blocks: int) -> kernel_arrays.Buffers:
+    def empty_buffers(self, nodes: Nodes, blocks: int) -> Buffers:
         most = blocks * self._most_rows
         rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
         summed_fields = tuple(one for one in nodes.fields if isinstance(one, SummedField))
         of = nodes._replace(fields=summed_fields)
         if not self.direct:
-            of = kernel_arrays.Nodes(
+            of = Nodes(
                 *(grid_boxes.room_of(rows, array) for array in of[:-1]),
                 tuple(type(one)(grid_boxes.room_of(rows, one.array)) for one in summed_fields),
             )
         self.sets += 1
-        return kernel_arrays.Buffers(of, *self._layout, self.sets - 1)
+        return Buffers(of, *self._layout, self.sets - 1)
 
-    def empty_nodes(self, s: kernel_arrays.Setup) -> None:
+    def empty_nodes(self, s: Setup) -> None:
         _empty(s, grid_boxes.used(s.spans)[1:])
         if not self.direct:
             for one in grid_boxes.buffers_of(s):
                 for array in grid_boxes.summed(one.nodes):
                     array[: self.rows] = 0
 
-    def unsort(self, control: kernel_arrays.Control, *, limit: float | None = None) -> None:
+    def unsort(self, control: Control, *, limit: float | None = None) -> None:
         """Sort the points before the next step; `limit` replaces the drift limit."""
         clock = control.clock[0]
         clock.drift = np.inf
         if limit is not None:
             clock.drift_limit = limit
 
-    def sort(self, s: kernel_arrays.Setup) -> None:
+    def sort(self, s: Setup) -> None:
         """Sort all points by tile, find the nodes in use, and zero the sums at all others.
 
         The next step zeroes used nodes; boxes are zero between steps.
@@ -146,11 +162,11 @@ class Tiles:
         _empty(s, grid_boxes.without(before, grid_boxes.used(s.spans)[1:]))
         self.sorts += 1
 
-    def _reach(self, s: kernel_arrays.Setup, block: kernel_arrays.Block, x: np.ndarray) -> float:
+    def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
         """Bound the distance in cells from present positions to nodes, until the next sort."""
         far = 0.0
         if len(x) > self.dimension:
-            at = kernel_arrays.OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
+            at = OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
             far = sorting.widest(at)
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
@@ -158,17 +174,17 @@ class Tiles:
         beyond = far + drift + grid_boxes.beyond(s.contact)
         return beyond if far < cells else cells  # also for NaN
 
-    def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
+    def _where(self, s: Setup, points: Points) -> np.ndarray:
         return points.x[s.control.clock[0].now] if points.home is None else points.home
 
-    def tiles_of(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
+    def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)
         tile = np.empty(x.shape[1], np.int64)
-        at = kernel_arrays.OnGrids((), planar(s.kin), s.grids, points.grid, x)
+        at = OnGrids((), planar(s.kin), s.grids, points.grid, x)
         sorting.find_tiles(self.mode, len(ends), at, self._cut, ends, tile)
         return tile
 
-    def _sort_block(self, s: kernel_arrays.Setup, block: kernel_arrays.Block) -> np.ndarray:
+    def _sort_block(self, s: Setup, block: Block) -> np.ndarray:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
@@ -191,9 +207,9 @@ class Tiles:
         top, least = self._nodes - 1, self.least_nodes - 1
         offset = float(first_node(s.basis, s.grids.h[0]))
         around = sorting.Neighbourhood(top, self.per_cell, self.beyond, least, reach, offset)
-        at = kernel_arrays.OnGrids((), planar(s.kin), s.grids, points.grid, x)
+        at = OnGrids((), planar(s.kin), s.grids, points.grid, x)
         by = sorting.SortKeys(self._cut, around, points.id)
-        rows = addresses_of_rows(array for _, array in kernel_arrays.arrays_of(points))
+        rows = addresses_of_rows(array for _, array in arrays_of(points))
         sorting.sort_points(mode, at, by, result, rows)
         ends = result.ends[-1]
         begins = np.append(0, ends[:-1])
@@ -210,7 +226,7 @@ class Tiles:
             sorting.find_rows(mode, parts, at, around, tiling, parts)
         return occupied
 
-    def box_bytes(self, s: kernel_arrays.Setup) -> int:
+    def box_bytes(self, s: Setup) -> int:
         if self.direct:
             return 0
         summed_arrays = [
@@ -218,7 +234,7 @@ class Tiles:
         ]
         return self.rows * sum(array.itemsize * array.shape[1] for array in summed_arrays)
 
-    def lay_out(self, s: kernel_arrays.Setup) -> None:
+    def lay_out(self, s: Setup) -> None:
         spans, *parts = self._rows_to_clear(s) if self.direct else self._parts_to_sum(s)
         s.buffers.count[:] = len(parts[1]) - 1, self.direct
         spans = np.concatenate([[[len(spans), 0]], spans])
@@ -226,7 +242,7 @@ class Tiles:
             grid_boxes.grow(room, len(rows))
             room[: len(rows)] = rows
 
-    def _rows_to_clear(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
+    def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
         """As `_parts_to_sum`, for few points: one set, one part per span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
@@ -234,11 +250,11 @@ class Tiles:
         spans = grid_boxes.joined_spans(self._parts(boxes.grid, boxes.lo, boxes.hi, 0, steps))
         parts = np.ones((len(spans), 10), np.int64)
         parts[:, 0], parts[:, 4] = spans[:, 0], spans[:, 1] - spans[:, 0]
-        parts[:, 9] = kernel_arrays.CLEAR
+        parts[:, 9] = CLEAR
         ranges = grid_boxes.ranges_of_shares(spans, np.zeros(len(spans), np.int64), 1)
         return spans, ranges, np.array([0, len(spans)]), parts
 
-    def _parts_to_sum(self, s: kernel_arrays.Setup) -> tuple[np.ndarray, ...]:
+    def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
 
         Nodes follow the sets of points that reach most of them: a thread finds its contributions in
@@ -261,8 +277,8 @@ class Tiles:
         own_begin, own_end = grid_boxes.extents(starts, begin, end)
         more = ((begin[starts] != own_begin) | (end[starts] != own_end)).any(axis=1)
         parts = self._parts(grid, begin, end, first[box], steps[box])
-        parts[:, 9] = kernel_arrays.ADD
-        parts[starts[~more], 9] = kernel_arrays.TAKE
+        parts[:, 9] = ADD
+        parts[starts[~more], 9] = TAKE
         local = self._parts(grid[starts], own_begin, own_end, 0, 0)
         parts = np.insert(parts, starts[more], local[more], axis=0)
         self._see_nodes(tile[starts], grid[starts], own_begin, own_end)
@@ -288,7 +304,7 @@ class Tiles:
         first, along = self._first_of_nodes[grid], self._tile_steps[grid, -2]
         return tile - (tile - first) % along
 
-    def _shares(self, s: kernel_arrays.Setup) -> np.ndarray:
+    def _shares(self, s: Setup) -> np.ndarray:
         """Return the set of each own tile, of its block's points."""
         sets = []
         for block in s.blocks:
@@ -299,7 +315,7 @@ class Tiles:
             sets.append(share)
         return np.concatenate(sets)
 
-    def _boxes(self, s: kernel_arrays.Setup) -> grid_boxes.Boxes:
+    def _boxes(self, s: Setup) -> grid_boxes.Boxes:
         d, tilings = self.dimension, [block.tiling for block in s.blocks]
         grid = np.concatenate([one.grid[: one.count[0]] for one in tilings])
         box = np.concatenate([one.box[: one.count[0]] for one in tilings])
@@ -326,7 +342,7 @@ class Tiles:
             box, tile, begin, end = box[some], tile[some], begin[some], end[some]
         return boxes, grid_boxes.Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
-    def _number(self, s: kernel_arrays.Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
+    def _number(self, s: Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
         """Assign buffer rows to boxes: return the row of node 0, and strides (k, d)."""
         steps = grid_boxes.steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
@@ -341,7 +357,7 @@ class Tiles:
                 grid_boxes.grow(array, self.rows)
         return first, steps
 
-    def _tell_buffers(self, s: kernel_arrays.Setup, begins, ends, first, steps) -> None:
+    def _tell_buffers(self, s: Setup, begins, ends, first, steps) -> None:
         columns = np.zeros((len(first), 5), np.int64)
         columns[:, 0], columns[:, 1], columns[:, 2] = begins, ends, first
         columns[:, 3 : 2 + self.dimension] = steps[:, :-1]
@@ -363,7 +379,7 @@ class Tiles:
         """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
-        parts[:, 9] = kernel_arrays.CLEAR
+        parts[:, 9] = CLEAR
         parts[:, 0] = self._first_node[grid] + (begin * self._steps[grid]).sum(axis=1)
         parts[:, 1] = first + (begin * steps).sum(axis=1)
         parts[:, 5 - d : 5] = end - begin + 1
@@ -372,7 +388,51 @@ class Tiles:
         return parts
 
 
-def _empty(s: kernel_arrays.Setup, spans: np.ndarray) -> None:
+class HasSetup(Protocol):
+    setup: Setup
+
+
+class WholeDomain:
+    """All tiles on a single process; several share them (`mpi.subdomain`)."""
+
+    parted = False
+
+    def __init__(self, simulation: HasSetup):
+        self.simulation = simulation
+
+    def migrate(self, s: Setup) -> Setup:
+        """Hand over the points that left the own tiles; sort afterwards."""
+        return s
+
+    def share_memory(self) -> None:
+        """Send contact memory and kept fields of the own nodes to all processes."""
+
+    def share_kept(self) -> None:
+        """Send the kept fields of the own nodes to all processes."""
+
+    def counted(self) -> np.ndarray:
+        """Return the used nodes that no other process counts."""
+        return grid_boxes.numbers(self.simulation.setup.spans)
+
+    def act(self, function: Callable[[Setup], None], s: Setup) -> None:
+        function(s)
+
+    def begin(self, hooks: Hooks | NoHooks, *, from_python: bool) -> None:
+        """Prepare for steps."""
+
+    def end(self) -> None:
+        """Finish the last steps."""
+
+    def state(self) -> dict[str, np.ndarray]:
+        """Return arrays of a state besides points and nodes."""
+        return {}
+
+    def own_part(self, state: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Select this process's part of a saved state."""
+        return state
+
+
+def _empty(s: Setup, spans: np.ndarray) -> None:
     of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
     arrays = [array for nodes in of for array in grid_boxes.summed(nodes)]
     for begin, end in spans.tolist():
@@ -394,7 +454,7 @@ def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
     return share[np.cumsum(firsts) - 1]
 
 
-def in_use(tiling: kernel_arrays.Tiling) -> list[tuple[str, int]]:
+def in_use(tiling: Tiling) -> list[tuple[str, int]]:
     tiles = tiling.count[0]
     whole = [(name, len(getattr(tiling, name))) for name in ("count", "share")]
     return [*whole, *((name, tiles) for name in ("range", "grid", "number", "box", "rows"))]

@@ -209,6 +209,7 @@ class Hub:
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
+        self.asked: set[str] = set()  # values and columns that statements read, later ones too
         self.functions: dict[str, Any] = {}  # Python functions passed by a program
         self.in_run = 0  # number of the active run, else 0
         self.listeners: list[Any] = []  # `run.listening.Listener`

@@ -21,6 +21,7 @@ from karamelo_py.kernels.hooks import (
 )
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.scene import Scene
+from karamelo_py.output.units import NUMBER
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import Place
@@ -54,6 +55,7 @@ class Publisher:
     # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
+    unit = NUMBER  # of its values
 
     def publish(self, name: str, value: float) -> None:
         """Publish `value` as ID_`name`, or as ID if `name` is empty."""

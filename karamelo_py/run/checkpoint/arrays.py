@@ -15,9 +15,9 @@ from karamelo_py.kernels.arrays import Nodes, Points, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import numbers, used
 from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling, stripped, work_of
+from karamelo_py.run.state import SceneState
 from karamelo_py.run.tiles import SHARES, Tiles, in_use
 from karamelo_py.script.errors import ScriptError
 
@@ -31,7 +31,7 @@ Index = EllipsisType | slice | tuple
 Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
-def changing(simulation: Backend) -> Iterator[tuple[str, np.ndarray]]:
+def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the used part of every array that a step changes and the next one needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
@@ -49,7 +49,7 @@ def changing(simulation: Backend) -> Iterator[tuple[str, np.ndarray]]:
             yield f"points/{k}/{name}", array[now] if name == "x" else array
 
 
-def copied(simulation: Backend, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Copy the state and the published values, reusing the arrays of `before`."""
     copies = {}
     # One by one: if the number of points changed, no two arrays exist twice.
@@ -63,7 +63,7 @@ def copied(simulation: Backend, before: dict[str, np.ndarray]) -> dict[str, np.n
     return copies | touched(simulation)
 
 
-def touched(simulation: Backend) -> dict[str, np.ndarray]:
+def touched(simulation: SceneState) -> dict[str, np.ndarray]:
     """Return the nodes where contact acted lately, and its memory of them.
 
     Liquids may return to nodes not in use now. Processes list the nodes in use.
@@ -82,12 +82,12 @@ def touched(simulation: Backend) -> dict[str, np.ndarray]:
         found.append((first + indices, np.where(recent[indices], rows[indices], 0)))
     nodes, rows = (np.concatenate(parts) for parts in zip(*found, strict=True))
     if simulation.domain.parted:
-        counted = np.isin(nodes, simulation.nodes.counted())
+        counted = np.isin(nodes, simulation.domain.counted())
         nodes, rows = nodes[counted], rows[counted]
     return {"touched/nodes": nodes, "touched/rows": rows}
 
 
-def stored(simulation: Backend, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
+def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
     """Yield a restart file's content for the present state, or the `kept` one.
 
     Collective; the first process gets the arrays, with the bits and in the order of a serial run.
@@ -103,8 +103,8 @@ def stored(simulation: Backend, kept: dict[str, np.ndarray] | None = None) -> It
     yield from _shown_by_nodes(simulation)
 
 
-def _shown_by_nodes(simulation: Backend) -> Iterator[Stored]:
-    comm, counted = simulation.comm, simulation.nodes.counted()
+def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
+    comm, counted = simulation.comm, simulation.domain.counted()
     nonzero = np.zeros(len(counted), np.bool_)
     for _, array in of_nodes(simulation.setup):
         for first in range(0, len(counted), PIECE):  # avoids a copy of all
@@ -134,7 +134,7 @@ def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
         yield name, array.shape, ..., array
 
 
-def known(simulation: Backend) -> dict[str, np.ndarray]:
+def known(simulation: SceneState) -> dict[str, np.ndarray]:
     return {"present": simulation.present, "shown": np.array(simulation.flags)}
 
 
@@ -191,7 +191,7 @@ def reading() -> Iterator[None]:
         ) from error
 
 
-def restore(simulation: Backend, state: ArraysByName) -> None:
+def restore(simulation: SceneState, state: ArraysByName) -> None:
     s = simulation.setup
     # Nodes not in use in the state must be empty.
     simulation.tiles.empty_nodes(s)
@@ -220,7 +220,7 @@ def restore(simulation: Backend, state: ArraysByName) -> None:
     simulation.changed()
 
 
-def take_snapshot(simulation: Backend, path: Path) -> dict[str, np.ndarray]:
+def take_snapshot(simulation: SceneState, path: Path) -> dict[str, np.ndarray]:
     with opened(path, "good") as arrays:
         check_numbers(simulation, arrays)
         if simulation.domain.parted:
@@ -230,7 +230,7 @@ def take_snapshot(simulation: Backend, path: Path) -> dict[str, np.ndarray]:
         return {name: arrays[name][()] for name in dict.fromkeys(names)}
 
 
-def take_stored(simulation: Backend, path: Path) -> None:
+def take_stored(simulation: SceneState, path: Path) -> None:
     with opened(path) as state, simulation.comm.joint():
         # Check first: arrays must not change if the file belongs to another scene.
         for k, block in enumerate(simulation.setup.blocks):
@@ -243,7 +243,7 @@ def take_stored(simulation: Backend, path: Path) -> None:
         _take_nodes(simulation, state)
 
 
-def _take_nodes(simulation: Backend, state: ArraysByName) -> None:
+def _take_nodes(simulation: SceneState, state: ArraysByName) -> None:
     counted = numbers(simulation.setup.spans)
     used = np.zeros(simulation.hub.fields.node_count, np.bool_)
     used[counted] = True
@@ -277,10 +277,10 @@ def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
 
 
 def rows_at(
-    simulation: Backend, nodes: np.ndarray, gather: Callable
+    simulation: SceneState, nodes: np.ndarray, gather: Callable
 ) -> dict[str, np.ndarray] | None:
     """Gather node rows of all arrays (ascending numbers), zero if not in use; or None."""
-    counted, kinds = simulation.nodes.counted(), dict(of_nodes(simulation.setup))
+    counted, kinds = simulation.domain.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
     here = here[np.isin(here, nodes, assume_unique=True)]
@@ -335,7 +335,7 @@ def check_points(points: Points, arrays: ArraysByName, stem: str) -> None:
             raise _misfit(f"{name} of points")
 
 
-def check_numbers(simulation: Backend, arrays: ArraysByName) -> None:
+def check_numbers(simulation: SceneState, arrays: ArraysByName) -> None:
     s, count = simulation.setup, simulation.hub.fields.node_count
     ends = {"node numbers": count, "touched/nodes": count}
     for k, block in enumerate(s.blocks):
@@ -357,7 +357,7 @@ def check_numbers(simulation: Backend, arrays: ArraysByName) -> None:
                 )
 
 
-def remembered_at(simulation: Backend, spans: np.ndarray) -> list[np.ndarray]:
+def remembered_at(simulation: SceneState, spans: np.ndarray) -> list[np.ndarray]:
     return simulation.hub.update.method.remembered(simulation.setup.contact, spans)
 
 
@@ -375,7 +375,7 @@ def _misfit(what: str) -> ScriptError:
     )
 
 
-def _joined(simulation: Backend, local: dict[str, np.ndarray]) -> Iterator[Stored]:
+def _joined(simulation: SceneState, local: dict[str, np.ndarray]) -> Iterator[Stored]:
     s, comm = simulation.setup, simulation.comm
     state: dict[str, Any] = {
         "tiling": [stripped(local, f"tiling/{k}/") for k in range(len(s.blocks))],
@@ -417,7 +417,7 @@ def points_of_tiles(
 
 
 def _points(
-    simulation: Backend, k: int, tiling: Tiling, local: dict[str, np.ndarray]
+    simulation: SceneState, k: int, tiling: Tiling, local: dict[str, np.ndarray]
 ) -> Iterator[Stored]:
     comm = simulation.comm
     number, ends = (array[: tiling.count[0]] for array in (tiling.number, tiling.range[:, 1]))
@@ -453,7 +453,9 @@ def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
     return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])
 
 
-def own_share(simulation: Backend, state: ArraysByName, costs: np.ndarray) -> dict[str, np.ndarray]:
+def own_share(
+    simulation: SceneState, state: ArraysByName, costs: np.ndarray
+) -> dict[str, np.ndarray]:
     """Divide a file's tiles among the processes, and read the own part of the state."""
     blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
     tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]

@@ -24,7 +24,7 @@ import numpy as np
 
 from karamelo_py.kernels.step import DONE
 from karamelo_py.language.faults import fault
-from karamelo_py.run.backend import Backend
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -227,7 +227,7 @@ class RollbackPoint:
     def parts(self) -> PartStates:
         return self._parts[self.step]
 
-    def keep(self, simulation: Backend, *, forget: bool = True) -> None:
+    def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
         """Make the present state the last good one; `forget` the parts at other states."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
@@ -242,7 +242,7 @@ class RollbackPoint:
         if always or any(part.last_step == step for part in outputs):
             self._parts[step] = PartStates.of(self.hub)
 
-    def return_to(self, simulation: Backend, *, cut: bool = False) -> None:
+    def return_to(self, simulation: SceneState, *, cut: bool = False) -> None:
         """Return to that state; with `cut`, outputs are cut there and continue."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)

@@ -218,7 +218,7 @@ class LoadSteps:
     def _conduct(self, hooks: Tag, dt: float) -> None:
         s, mode = self.simulation.setup, self.simulation.mode
         try:
-            conduct(Equations(s, mode, self.known, False), hooks, self.simulation.acting, dt)
+            conduct(Equations(s, mode, self.known, False), hooks, self.simulation.fixes.acting, dt)
         except Singular:
             raise self._error(
                 "temperatures have no solution: something conducts no finite heat",
@@ -299,7 +299,7 @@ class LoadSteps:
         return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
 
     def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
-        holding = [f for f in self.simulation.acting if "post_update_grid_state" in f.hooks()]
+        holding = [f for f in self.simulation.fixes.acting if "post_update_grid_state" in f.hooks()]
         mask, velocities = equations.prescribed(holding, equations.d)
         self._check_numbers(velocities, "a node gets a velocity that is not a number")
         if equations.s.kin.hoops:
@@ -434,9 +434,6 @@ class ImplicitSimulation(Simulation):
 
     def _take(self, hooks: Tag, count: int) -> int:
         return self.load_steps.advance(hooks, count)
-
-    def _hooks_to_call(self) -> None:
-        return None
 
     def compile(self) -> None:
         """Nothing: Newton's method calls kernels one by one."""

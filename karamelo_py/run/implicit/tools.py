@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.modify import Fix, PointsView
 
 NEAR = 1e-6  # cells, over which forces are compared
@@ -23,7 +23,7 @@ class Displaced:
 
 
 class PushingTool:
-    def __init__(self, fix: Fix, equations: Equations, simulation: Backend):
+    def __init__(self, fix: Fix, equations: Equations, simulation: SceneState):
         self.fix, self.d = fix, equations.d
         self.near = NEAR * float(np.min(equations.s.grids.spacing))
         self.view = PointsView(simulation, simulation.points.members(fix.group), then=False)

@@ -11,9 +11,9 @@ from karamelo_py.kernels.arrays import Setup
 from karamelo_py.kernels.hooks import CompiledHook
 from karamelo_py.kernels.step import untaken
 from karamelo_py.language import registry
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.lower.build import PRECISIONS
 from karamelo_py.run.lower.memory import largest, least_bytes
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import in_words
 from karamelo_py.script.errors import ScriptError, plural
@@ -74,7 +74,7 @@ def _too_large(hub: Hub, least: float) -> ScriptError:
     return error
 
 
-def memory_there(simulation: Backend) -> int:
+def memory_there(simulation: SceneState) -> int:
     simulation.launches()
     return simulation.hub.settings.card.taken
 

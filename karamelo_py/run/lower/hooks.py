@@ -16,8 +16,8 @@ from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.points.laws import can, constrained_velocity
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import unique
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import NodesView, PointsView
@@ -164,7 +164,7 @@ def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
 class ActingFixes:
     """The fixes of a step; also its tag, if some act from Python between rows of the scheme."""
 
-    def __init__(self, simulation: Backend, fixes: list[Fix]):
+    def __init__(self, simulation: SceneState, fixes: list[Fix]):
         self.simulation, self.fixes = simulation, fixes
         self.functions = [hook.function for _, _, hook in compiled_hooks(fixes)]
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
@@ -202,7 +202,7 @@ class ActingFixes:
             self.simulation.domain.act(lambda whole: function(self, whole, stage, *arguments), s)
 
 
-def _call(simulation: Backend, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
+def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
     """Call a hook; if each process calls it for its own points, check that all agree.
 
     Collective calls must match, else processes deadlock; published values must be equal, else they
@@ -217,7 +217,7 @@ def _call(simulation: Backend, fix: Fix, hook: Callable, view: PointsView | Node
         raise
 
 
-def _agree(simulation: Backend, fix: Fix) -> None:
+def _agree(simulation: SceneState, fix: Fix) -> None:
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
     own = {name: values.get(name) for name in names if name in values}
@@ -289,14 +289,14 @@ def _at_heated_points_acting_fixes(hooks, s):
     hooks.act(_on_points, s, SUPPLY_HEAT, 0)
 
 
-def view_of(simulation: Backend, fix: Fix, *, then: bool) -> PointsView:
+def view_of(simulation: SceneState, fix: Fix, *, then: bool) -> PointsView:
     if fix.point_by_point:
         pieces = list(simulation.points.rows_of(fix.group))
         return PointsView(simulation, then=then, pieces=pieces)
     return PointsView(simulation, simulation.points.members(fix.group), then=then)
 
 
-def views_of(simulation: Backend, fix: Fix) -> Iterator[PointsView]:
+def views_of(simulation: SceneState, fix: Fix) -> Iterator[PointsView]:
     if not fix.point_by_point:
         yield view_of(simulation, fix, then=False)
         return
@@ -317,8 +317,12 @@ class FixesOfRun(NamedTuple):
     first: ActingFixes | None  # of the first step, if some act only in it
     lasting: ActingFixes  # of all later steps
 
+    @property
+    def acting(self) -> list[Fix]:
+        return (self.first or self.lasting).fixes
+
     @classmethod
-    def of(cls, simulation: Backend) -> "FixesOfRun":
+    def of(cls, simulation: SceneState) -> "FixesOfRun":
         fixes = sorted(simulation.hub.fixes.values(), key=lambda fix: fix.order)
         new = [fix for fix in fixes if fix.first_step_only and fix not in simulation.begun]
         once = [fix for fix in new if _sets_initial_state(fix)]

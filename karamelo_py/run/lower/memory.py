@@ -11,11 +11,11 @@ import numpy as np
 
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Block, Hooks
-from karamelo_py.run.backend import Backend
 from karamelo_py.run.boxes import used
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import PRECISIONS, lower_points, part_of, point_kinds
 from karamelo_py.run.mpi.partition import occupied
+from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import in_words, machine_memory
 from karamelo_py.scene.solid import Solid, own_grids
@@ -31,7 +31,7 @@ class MemoryTaken(NamedTuple):
     known: int  # of the whole scene, to each process
 
 
-def memory_of(simulation: Backend, s: arrays.Setup, boxes: int) -> MemoryTaken:
+def memory_of(simulation: SceneState, s: arrays.Setup, boxes: int) -> MemoryTaken:
     """Return the memory of the points in the tiles of `s`, used nodes, and `boxes` bytes."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
@@ -91,7 +91,7 @@ def point_fields(block: Block) -> list[tuple[str, str, int]]:
     return [(name, str(size), size * array.itemsize) for name, size, array in sizes]
 
 
-def bytes_per_point(simulation: Backend) -> int:
+def bytes_per_point(simulation: SceneState) -> int:
     blocks = simulation.setup.blocks
     local = np.array([len(block.points.id) for block in blocks])
     counts = simulation.comm.allreduce(local).tolist()

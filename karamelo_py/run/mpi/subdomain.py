@@ -13,10 +13,11 @@ from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, NoHooks, Setup
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.kernels.totals import WORK, rounded
-from karamelo_py.run.backend import Backend, WholeDomain
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, own_share, remembered_at, take_points
 from karamelo_py.run.mpi import partition
 from karamelo_py.run.mpi.whole import Whole
+from karamelo_py.run.state import SceneState
+from karamelo_py.run.tiles import WholeDomain
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.formula import GLOBAL, UNIFORM
 
@@ -65,7 +66,7 @@ class Subdomain(WholeDomain):
 
     parted = True
 
-    def __init__(self, simulation: Backend):
+    def __init__(self, simulation: SceneState):
         super().__init__(simulation)
         self.comm = simulation.comm
         assert isinstance(simulation.tiles, partition.SharedTiles)

@@ -10,12 +10,12 @@ import numpy as np
 
 from karamelo_py.kernels.arrays import Setup, arrays_of
 from karamelo_py.kernels.totals import WORK
-from karamelo_py.run.backend import Backend, WholeDomain
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import lower
 from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of, sized, work_of
-from karamelo_py.run.tiles import SHARES, in_use
+from karamelo_py.run.state import SceneState
+from karamelo_py.run.tiles import SHARES, WholeDomain, in_use
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.errors import Quit
 
@@ -27,7 +27,7 @@ class PointsMoved(Exception):
 class Whole:
     """Arrays of a whole scene, gathered from the processes and handed out again."""
 
-    def __init__(self, simulation: Backend, subdomain: Any):
+    def __init__(self, simulation: SceneState, subdomain: Any):
         self.simulation, self.subdomain = simulation, subdomain
         # With arrays of nodes, and one point.
         s, self.tiles = lower(simulation.hub, ids=(0, 1), comm=SerialComm())

@@ -3,6 +3,7 @@
 import numpy as np
 
 from karamelo_py.output.point_table import PointTable
+from karamelo_py.output.units import ENERGY, Powers
 from karamelo_py.points.kinematics import total
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -12,6 +13,7 @@ from karamelo_py.script.expressions import Expression
 
 class Energy(Compute):
     published: tuple[str, ...] = ("", "s")
+    unit = ENERGY
     measured = ""
 
     def refresh(self) -> None:
@@ -226,6 +228,8 @@ class AngularMomentum(Momentum):
     --------
     linear_momentum
     """
+
+    unit = Powers(2, 1, -1)
 
     def __init__(
         self, hub: Hub, group: ParticleGroup, cx: float = 0.0, cy: float = 0.0, cz: float = 0.0

@@ -8,6 +8,7 @@ import numpy as np
 from karamelo_py.language.signature import In, Positive
 from karamelo_py.output.fields import check_columns
 from karamelo_py.output.point_table import COMPONENTS, PointTable
+from karamelo_py.output.units import LENGTH, TEMPERATURE, VELOCITY
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -40,6 +41,7 @@ class AverageVelocity(Mean):
     """
 
     published = ("x", "y", "z")
+    unit = VELOCITY
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         return [np.ones(points.count), *points.velocity.T]
@@ -86,6 +88,8 @@ class AverageTemperature(Mean):
     """
 
     published = ("",)
+    columns = ("T",)
+    unit = TEMPERATURE
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -171,6 +175,7 @@ class MaxPosition(Compute):
     """
 
     published = ("x", "y", "z")
+    unit = LENGTH
     extreme = staticmethod(np.max)
 
     def refresh(self) -> None:

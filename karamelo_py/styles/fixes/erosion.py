@@ -54,7 +54,7 @@ class Erosion(Fix):
         every: Annotated[int, Positive] = 10,
     ):
         super().__init__(hub, group)
-        self.condition, self.every = condition, every
+        self.condition, self.every, self.columns = condition, every, condition.columns
         if empty := [name for name in condition.columns if name in hub.fields.absent_at_points()]:
             hub.warn(f"{', '.join(empty)} will be 0: points have no such field")
 

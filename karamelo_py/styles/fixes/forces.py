@@ -9,7 +9,7 @@ from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.laws import elastic_law, law_on
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
-from karamelo_py.output.units import Powers
+from karamelo_py.output.units import FORCE, Powers
 from karamelo_py.points.kinematics import Space, nothing, tr, zero
 from karamelo_py.points.laws import (
     advance,
@@ -32,7 +32,7 @@ ACCELERATION = Powers(1, 0, -2)
 TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium: unique to this unit system
 
 
-def accelerate(mass, v, v_star, force, value, before, dt, share):
+def accelerate(mass, v, v_star, force, value, before, kick, share):
     return v, v_star, force + mass * value, mass * value
 
 
@@ -61,6 +61,7 @@ class BodyForce(Fix):
 
     syntax = "group, bx[, by[, bz]]"
     published = ("x", "y", "z")
+    unit = FORCE
     accelerates = True
 
     post_particles_to_grid = node_hook(accelerate)
@@ -99,7 +100,7 @@ known_failure(
 )
 
 
-def share_out(mass, v, v_star, force, value, before, dt, share):
+def share_out(mass, v, v_star, force, value, before, kick, share):
     return v, v_star, force + value * share, value * share
 
 
@@ -127,6 +128,7 @@ class ForceNodes(Fix):
 
     syntax = "group, fx[, fy[, fz]]"
     published = ("x", "y", "z")
+    unit = FORCE
 
     post_particles_to_grid = node_hook(share_out, shares=True)
 
@@ -202,18 +204,18 @@ class ForceParticles(PointForces):
         return share[:, None] * vector(self.force, self.hub, x, lambda: points.reference_position)
 
 
-def brake(mass, v, v_star, force, value, before, dt, share):
+def brake(mass, v, v_star, force, value, before, kick, share):
     """Remove a fraction of the change of v* by forces, against v; the total is its force.
 
     No effect if the step reverses the node's motion, or a wall has stopped it.
     """
     against = 0.0
     if v * v_star > 0:
-        change = min(abs(v_star - v), abs(force) * dt / mass)
+        change = min(abs(v_star - v), abs(force) * kick / mass)
         against = min(value * change, abs(v_star))
         if v > 0:
             against = -against
-    return v, v_star + against, force, mass * against / dt
+    return v, v_star + against, force, mass * against / kick
 
 
 class LocalDamping(Fix):

@@ -10,7 +10,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction
 
 
-def force_of_nodes(mass, v, v_star, force, value, before, dt, share):
+def force_of_nodes(mass, v, v_star, force, value, before, kick, share):
     return v, v_star, force, force
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from karamelo_py.language.signature import Argument, NonNegative
+from karamelo_py.output.units import FORCE
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute, Fix, NodesView, node_hook
@@ -14,33 +15,33 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_direction, unlike
 
 
-def prescribe(mass, v, v_star, force, value, before, dt, share):
+def prescribe(mass, v, v_star, force, value, before, kick, share):
     """Set v* to the present value, and v to the value one step earlier, as at a symmetry plane.
 
     The total is the reaction.
     """
-    return before, value, force, mass * (value - v_star) / dt
+    return before, value, force, mass * (value - v_star) / kick
 
 
-def prescribe_motion(mass, v, v_star, force, value, before, dt, share):
+def prescribe_motion(mass, v, v_star, force, value, before, kick, share):
     """Set v* to the present value, and leave v, so that FLIP points acquire the value.
 
     The total is the reaction.
     """
-    return v, value, force, mass * (value - v_star) / dt
+    return v, value, force, mass * (value - v_star) / kick
 
 
-def prescribe_mapped(mass, v, v_star, force, value, before, dt, share):
+def prescribe_mapped(mass, v, v_star, force, value, before, kick, share):
     return value, value, force, 0.0
 
 
-def prescribe_at_most(mass, v, v_star, force, value, before, dt, share):
+def prescribe_at_most(mass, v, v_star, force, value, before, kick, share):
     """The total is the reaction, which pushes backwards."""
     allowed = min(v_star, value)
-    return v, allowed, force, mass * (allowed - v_star) / dt
+    return v, allowed, force, mass * (allowed - v_star) / kick
 
 
-def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
+def prescribe_mapped_at_most(mass, v, v_star, force, value, before, kick, share):
     """Limit the re-mapped velocity likewise, and leave it on the bound if v* was limited.
 
     Otherwise stress would do spurious work: a rebound would gain half of the energy.
@@ -49,13 +50,13 @@ def prescribe_mapped_at_most(mass, v, v_star, force, value, before, dt, share):
     return allowed, allowed, force, 0.0
 
 
-def prescribe_at_least(mass, v, v_star, force, value, before, dt, share):
+def prescribe_at_least(mass, v, v_star, force, value, before, kick, share):
     """The total is the reaction, which pushes forwards."""
     allowed = max(v_star, value)
-    return v, allowed, force, mass * (allowed - v_star) / dt
+    return v, allowed, force, mass * (allowed - v_star) / kick
 
 
-def prescribe_mapped_at_least(mass, v, v_star, force, value, before, dt, share):
+def prescribe_mapped_at_least(mass, v, v_star, force, value, before, kick, share):
     """See `prescribe_mapped_at_most`."""
     allowed = value if v_star == value else max(v, value)
     return allowed, allowed, force, 0.0
@@ -133,6 +134,7 @@ class VelocityNodes(Fix):
 
     syntax = "group, vx[, vy[, vz]][, mu=mu]"
     published = ("x", "y", "z")
+    unit = FORCE
     prescribes_velocity = True
 
     def __init__(

@@ -6,7 +6,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction
 
 
-def damp(mass, v, v_star, force, value, before, dt, share):
+def damp(mass, v, v_star, force, value, before, kick, share):
     """A force against the velocity; its total is published."""
     drag = -mass * value * v
     return v, v_star, force + drag, drag
