@@ -47,7 +47,6 @@ class SceneFacts(BasicFacts):
         yield from ((kind, None) for kind in dict.fromkeys(kinds))
 
     def advice(self, kind: str, *, of_laws: bool = False) -> Iterator[rules.Advice]:
-        """Yield the advice of one kind; `of_laws`: of laws, weights, initial states."""
         foreign = {piece.kind: piece for piece in foreign_parts(self.hub)}
         for piece, owner in self.parts():
             early = isinstance(piece, Fix) and (piece.first_step_only or piece.accelerates)

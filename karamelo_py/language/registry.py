@@ -65,7 +65,6 @@ def names(family: str) -> list[str]:
 
 
 def is_foreign(kind: type) -> bool:
-    """Return True for a class of a plug-in."""
     return not kind.__module__.startswith(PREFIX)
 
 

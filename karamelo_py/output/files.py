@@ -189,11 +189,8 @@ class Frames:
             raise ScriptError(f"ffmpeg could not make {path}: {last}")
 
 
-# ---- locks: two programs never write to one folder or file at once ----
-
-
 class Claim:
-    """Lock until `release` or the end of the program."""
+    """Lock of a folder or file that one program writes, until `release` or its end."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)

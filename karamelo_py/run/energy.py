@@ -131,7 +131,6 @@ class EnergyWatch:
         return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
 
     def has_lost(self, within: float) -> bool:
-        """Return True if more than this fraction of the largest energy is lost."""
         clock = self.clock
         return bool(clock.watch_energy and clock.looks > LOOKS and self.share_lost() > within)
 

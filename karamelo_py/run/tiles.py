@@ -424,11 +424,9 @@ class WholeDomain:
         """Finish the last steps."""
 
     def state(self) -> dict[str, np.ndarray]:
-        """Return arrays of a state besides points and nodes."""
         return {}
 
     def own_part(self, state: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Select this process's part of a saved state."""
         return state
 
 

@@ -1,7 +1,4 @@
-"""Signals, and communication between processes, here of one.
-
-:mod:`karamelo_py.run.mpi.comm` has several.
-"""
+"""Signals, and communication of one process (:mod:`karamelo_py.run.mpi.comm`: several)."""
 
 import signal
 import threading

@@ -51,7 +51,6 @@ class Catalogue(dict):
             )
 
     def refuse_unnameable(self, ID: str) -> None:
-        """Refuse an ID whose values formulas could not name."""
         if ID.isidentifier() and ID not in ("and", "or", "not"):
             return
         better = re.sub(r"\W", "_", ID)

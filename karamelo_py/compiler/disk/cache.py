@@ -274,10 +274,7 @@ def _keep(path: Path, content: bytes) -> None:
 
 @functools.cache
 def make_room(folder: Path) -> None:
-    """Delete the least recently used files above `ROOM` bytes, once per process.
-
-    A look at 2000 files takes 13 ms.
-    """
+    """Delete the least recently used files above `ROOM` bytes: 13 ms with 2000 files."""
     ages, room = [], ROOM
     for one in folder.iterdir():
         if _OURS.fullmatch(one.name):
