@@ -27,7 +27,7 @@ class Noise(NamedTuple):
     share: float  # of the tolerable amount
     speed: float  # of the body or its rim, over the wave speed
     cells: float  # path of the body, or of its rim
-    angle: float = 0.0  # radians
+    angle: float = 0.0
     noisy: bool = True
     torn: bool = False  # the rim separates
 

@@ -29,8 +29,8 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 
 LOOK = 100  # steps: shorter runs only inspect a scene
-ENDLESS = 1e8  # steps
-MIXED = 300  # step over the stable one, above which units are likelier wrong than the step
+ENDLESS = 1e8
+MIXED = 300  # step over the stable one; above, units are likelier wrong
 DENSITIES = 10.0, 1e5  # kg/m^3: foams to beyond osmium; gases excluded
 IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
 SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to beyond diamond
@@ -211,7 +211,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
         words = f"one step covers the whole run, where one of {limit:.3g} is stable"
         hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS, code="one-step")
     if scene.waves > 0 and step_size.blows_up(simulation):
-        scene.duration = 0.0  # the run ends before
+        scene.duration = 0.0
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
     warn_about_rest(hub, simulation, duration)

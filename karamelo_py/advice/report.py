@@ -30,7 +30,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.solid import words_of_volumes
 
-LOADED = 24 << 20  # bytes of compiled loops and imported modules
+LOADED = 24 << 20  # bytes: compiled loops, imported modules
 
 
 def report(hub: Hub, end_time: float = inf) -> None:

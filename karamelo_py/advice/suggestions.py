@@ -19,14 +19,14 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import plural
 
-Words = Iterator[tuple[str, str]]  # cost; replacement
+Words = Iterator[tuple[str, str]]
 
 AXES = "xyz"
 NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio above which a linear basis locks
 LARGE = 100_000  # points that no longer fit in caches
 RESOLVED = 1000  # least motion per step over the spacing of single-precision numbers
-# Core seconds (Intel Xeon): a point per step with a linear basis, a log line, a picture, the first
-# picture, a file of points, and a number in it.
+# Core seconds (Intel Xeon): a point per step (linear), log line, picture, first picture, file of
+# points, number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 LONG = 10.0  # seconds of output worth a suggestion
 

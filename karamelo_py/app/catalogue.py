@@ -87,7 +87,6 @@ def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
         return print_styles([name])
     if name in codes():
         return _explain_code(name, codes()[name]["title"], codes()[name]["text"])
-    # One of three or more words may be superfluous.
     fewer = [" ".join(words[:k] + words[k + 1 :]) for k in range(len(words) * (len(words) > 2))]
     said = next(filter(_about, [name, *fewer]), name)
     arguments, related = _arguments(name), _about(said)
@@ -192,7 +191,7 @@ def _about(word: str) -> list[tuple[str, str]]:
     """By a part of the name, then by summary, else by text."""
     topics = {synonym: topic for topic, alike in table()["topics"].items() for synonym in alike}
     word = topics.get(word.lower(), word)
-    words = [term for term in word.split() if len(term) > 2] or [word]  # without a, of, ...
+    words = [term for term in word.split() if len(term) > 2] or [word]
     sought = [re.escape(topics.get(term.lower(), term)) for term in words]
     begins = [re.compile(rf"(?<![^\W_]){term}", re.IGNORECASE) for term in sought]
     matches: list[list[tuple[str, str]]] = [[], [], [], []]

@@ -68,7 +68,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _end(number: int, _: object) -> NoReturn:
-    # All open files are consistent.
     os.write(2, f"error: ended by {signal.Signals(number).name}\n".encode())
     os._exit(SIGNALLED + number)
 
@@ -133,7 +132,7 @@ def _dispatch(arguments: list[str]) -> int:
         raise _surplus(arguments, short[:1], choice)
     try:
         options, surplus = parser.parse_known_args(arguments)
-    except SystemExit:  # after help
+    except SystemExit:
         return 0
     except ScriptError as error:
         # A missing option may be misspelt.
@@ -188,7 +187,7 @@ def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
 
     def is_value(k: int) -> bool:
         if re.match(r"-\.?\d", arguments[k]):
-            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])  # argparse knows these
+            return not re.fullmatch(r"-\d+|-\d*\.\d+", arguments[k])
         return (
             k > 1
             and arguments[k][:1] == "-" != arguments[k][1:2]
@@ -370,7 +369,6 @@ def _carry_out(options: argparse.Namespace, script: str, comm: MpiComm | None = 
         from karamelo_py.run.lower.card import use_card
         from karamelo_py.scene.hub import Hub
     begun()
-    # Errors are reported by the program, not by NumPy.
     np.seterr(over="ignore", invalid="ignore", divide="ignore")
     hub = Hub(Console(quiet=options.quiet, terminal=launch.has_terminal()))
     hub.settings.threads = options.threads

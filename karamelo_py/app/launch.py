@@ -31,7 +31,7 @@ from karamelo_py.script.errors import FAILURES, ScriptError, render_message
 if TYPE_CHECKING:
     from karamelo_py.scene.hub import Hub
 
-Message = dict[str, Any]  # a JSON object
+Message = dict[str, Any]
 ERROR = 1
 # Errors of disks and permissions, not of the program.
 OF_THE_SYSTEM = tuple(
@@ -41,7 +41,7 @@ OF_THE_SYSTEM = tuple(
     if hasattr(errno, name)
 )  # fmt: skip
 SOCKET = "KARAMELO_PY_LAUNCHER"
-# Open MPI: more processes than cores, own threads, waiting processes yield, root in a container.
+# Own threads; more processes than cores, waiting ones yield, root in a container.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -49,16 +49,16 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-# Large pages on Linux: NumPy requests them for new arrays, not for growing ones. Four processes of
-# a million points run 10 % faster.
+# Four processes of a million points run 10 % faster: NumPy requests large pages only for new
+# arrays.
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
-PAUSE = 0.05  # seconds between polls of mpiexec
+PAUSE = 0.05  # seconds between polls
 GRACE = 2.0  # seconds for processes to end after mpiexec
-AT_ONCE = 3  # signals that end all at once
-LONGEST_FOLDER = 70  # characters; names of sockets must be short
+AT_ONCE = 3  # signals
+LONGEST_FOLDER = 70  # characters: names of sockets must be short
 A_CORE = 16  # processes per core; more is a mistake
-# Seconds that a failed process waits before it ends the others: rank 0 reports the error, others
-# what only they know.
+# Seconds until a failed process ends the others: rank 0 reports the error, others what only they
+# know.
 PATIENCE, LONGER = 2.0, 6.0
 
 
@@ -73,9 +73,7 @@ def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int,
 def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED, render_message("error", "interrupted")
-    # Rich makes it a SystemExit.
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):
-        # The reader of our output is gone.
         sys.stderr.close()
         return ERROR, ""
     if debugging:
@@ -134,7 +132,7 @@ class Launcher:
         self.links: dict[socket.socket, Message] = {}  # empty until the rank is known
         self.reports: dict[int, Message] = {}
         self.lost: list[Message] = []  # ended without a report, in order
-        self.over = False  # rank 0 has finished
+        self.over = False
         self.signals: list[int] = []
         self.process: subprocess.Popen | None = None
 
@@ -153,7 +151,7 @@ class Launcher:
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
-            for one in filter(None, self.links.values()):  # left over by mpiexec
+            for one in filter(None, self.links.values()):  # left over
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
         status = self._outcome()
@@ -250,7 +248,7 @@ def _received(link: socket.socket) -> bytes:
     return data
 
 
-_link: socket.socket | None = None  # to the launcher
+_link: socket.socket | None = None
 
 
 def keep_to_oneself() -> None:
@@ -276,7 +274,7 @@ def _report_to_launcher(rank: int) -> None:
             out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
             sys.stdout = sys.__stdout__ = out
             sys.stderr = sys.__stderr__ = err
-    except OSError:  # on another machine
+    except OSError:
         return
     _link = link
     if rank == 0:

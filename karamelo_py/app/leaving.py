@@ -21,7 +21,7 @@ except KeyboardInterrupt:
     _leave()
 
 
-STUDY = "KARAMELO_PY_STUDY"  # pid of the study
+STUDY = "KARAMELO_PY_STUDY"  # pid
 _DEATH_SIGNAL = 1  # of prctl: signal at the parent's end
 
 
@@ -35,7 +35,7 @@ def end_with(study: int) -> None:
     ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     try:
         os.kill(study, 0)
-    except ProcessLookupError:  # ended
+    except ProcessLookupError:
         os._exit(SIGNALLED + signal.SIGKILL)
     except OSError:
         pass

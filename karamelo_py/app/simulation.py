@@ -297,7 +297,7 @@ class Simulation:
         folder = Path(out).absolute()
         make_folder(folder, 'out="{}"')
         if folder in _folders:
-            gc.collect()  # closes unused simulations
+            gc.collect()
         if folder in _folders:
             raise ScriptError(
                 f"another simulation writes to {folder}",

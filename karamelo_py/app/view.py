@@ -39,7 +39,7 @@ Draw pictures or a movie of dumps of points.
 Files are from dump particle, particle/gz, hdf5 and vtk (its .pvd). Pictures and their options are
 as in dump pyplot."""
 DPI = 100
-Look = dict[str, Any]  # options of dump pyplot
+Look = dict[str, Any]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -179,7 +179,7 @@ def _log_beside(
         with suppress(ScriptError):
             rows += [row for row in read_rows(file.parent / name) if "Step" in row]
     for name in filter(str.isidentifier, dict.fromkeys(name for row in rows for name in row)):
-        scene.interpreter.variables.pop(name, None)  # the log has its values
+        scene.interpreter.variables.pop(name, None)
         if name not in scene.values and name not in KEYWORDS.values():
             scene.values.publish(name)
     return {int(row["Step"]): row for row in rows}

@@ -94,7 +94,6 @@ def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
     if hub.rehearsing or hub.interpreter.replay is not None:
         return
     numbers, fields = {solid.index for solid in solids}, hub.fields
-    # Deleted points do not meet the condition.
     meet = np.zeros(fields.count, np.bool_)
     meet[fields.present] = condition.holds(fields)
     _take_away(hub, np.flatnonzero(meet & np.isin(fields.solid, list(numbers))))

@@ -156,7 +156,7 @@ class Named:
 
     id: str = ""
     place: Place | None = None
-    catalogue = ""  # attribute of the scene
+    catalogue = ""
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:

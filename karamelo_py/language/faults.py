@@ -39,7 +39,7 @@ def fault(name: str, message: str, place: Place | None, more: str = "") -> Scrip
     origin = registry.origin(family, style) if registry.knows(family, style) else ""
     package = f" (of {origin})" if origin else ""
     hint = f"tell the author of {style}{more}"
-    if origin.startswith("the module "):  # it is the user's
+    if origin.startswith("the module "):
         hint = f"mend it in {origin.removeprefix('the ')}{more}"
     error = ScriptError(f"{name}{package}: {message}", place=place, hint=hint, code="plug-in")
     error.complete = True

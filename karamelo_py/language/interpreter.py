@@ -47,9 +47,8 @@ class Interpreter:
         self.files: list[Path] = []  # files read
         self.frames: list[_Frame] = []
         self.by_statement = False  # `next_statement` enters included scripts
-        self.statement: syntax.Statement | None = None  # last one started
+        self.statement: syntax.Statement | None = None
         self.record = Record()  # executed statements, for restart files
-        # Until the script reaches the state of an earlier run.
         self.replay: Replay | None = None
         # Command-line variables override assignments.
         self.presets = Presets(self, presets or {})

@@ -39,7 +39,7 @@ class Advice(NamedTuple):
 
 def code_of(name: str) -> str:
     """Code of a known failure: ``shocks of material 'm'`` is shocks-of-material."""
-    words = re.sub(r"'[^']*'( and '[^']*')*", "", name)  # names of the script
+    words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
     return "-".join(re.findall(r"\w+", words.lower()))
 
 

@@ -247,7 +247,7 @@ def in_own_words(script: Any, name: str) -> str | None:
     if name == "method_modify" and rest:
         if registry.knows("method", rest[0]):
             before, rest = [rest[0], *before[1:]], rest[1:] or before[1:] or ["FLIP"]
-        elif not registry.knows("transfer", rest[0]):  # only a FLIP coefficient
+        elif not registry.knows("transfer", rest[0]):
             rest = [*(before[1:3] if len(before) > 2 else ("FLIP", "linear")), *rest]
         if len(rest) == 1 or not registry.knows("basis", rest[1]):
             rest.insert(1, before[2] if len(before) > 2 else "linear")

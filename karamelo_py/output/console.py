@@ -38,7 +38,7 @@ class Console:
         self.quiet = quiet
         self._broken = self._running = False
         self._progress: Any = None
-        self._begin = 0.0, 0, 0.0  # clock, step, fraction
+        self._begin = 0.0, 0, 0.0
         self._shown = 0.0
         self._waiting: list[str] = []
         self._burst = 0
@@ -64,7 +64,6 @@ class Console:
             return
         self._release()
         if self._progress is not None:
-            # above the bar
             self._progress.console.out(text, highlight=False)
         elif style and self.terminal:
             self._rich.out(text, style=style, highlight=False)
@@ -182,8 +181,8 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe; the run still finishes its files. Without
-            # this, flushing at exit would fail.
+            # The reader (head, less) has closed the pipe; the run still finishes, and flushing at
+            # exit must not fail.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())

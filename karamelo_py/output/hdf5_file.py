@@ -45,7 +45,7 @@ class _Closed(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        if whence == os.SEEK_END:  # may have grown
+        if whence == os.SEEK_END:
             offset, whence = self._size + offset, os.SEEK_SET
         return self._raw.seek(offset, whence)
 

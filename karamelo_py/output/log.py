@@ -32,16 +32,16 @@ class Log(Rhythmic):
         self.hub = hub
         self.every: int | ByTime = 1
         self.file = Path(FILE)
-        self.is_asked_for = False  # by the user
+        self.is_asked_for = False
         self.columns: list[Quantity] = []  # empty: step, dt, time
         self.last_step: int | None = None
         self._file: TextIO | None = None
-        self._claims: list[Claim] = []  # on the folder, and on the file
+        self._claims: list[Claim] = []
         self._is_kept = True
         # Headings and numbers of each row, if a program wants them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
-        self._end = 0  # bytes written
+        self._end = 0
         self._widths: list[int] = []
 
     @property

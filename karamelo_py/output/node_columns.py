@@ -170,7 +170,7 @@ def _force(axis: int, _: object, block: Block) -> np.ndarray | None:
 # Values (n,) of a block's points, or None.
 BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
     "vol": _volume,
-    "rigid": lambda simulation, block: (  # 1: rigid
+    "rigid": lambda simulation, block: (
         np.ones(len(block.points.id)) if can(block.laws, constrained_velocity) else None
     ),
     **{f"b{axis}": partial(_force, k) for k, axis in enumerate(AXES)},

@@ -176,7 +176,7 @@ def _sections(
         inset = 0.0 if cut_off else inset_of.get(height, 0.0)
         for flat in zeros(partial(_section, depth, axis, height + inset), lo, hi, SECTION):
             line = np.insert(flat, axis, height + inset, axis=1)
-            if inset:  # other faces meet the face at the end?
+            if inset:
                 offset = inset / 2 * np.eye(3)[axis]
                 slope = (depth(line + offset) - depth(line - offset)) / inset
                 shows = abs(inset) < step or np.median(np.abs(slope)) < 0.7

@@ -39,9 +39,9 @@ from karamelo_py.output.units import LENGTHS, labelled, suited
 # Colour-blind safe (Okabe and Ito 2008).
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
 MOST_IN_LEGEND = 16
-MARGIN = 4  # pixels next to a long title
-MARKS = 1 << 16  # points per batch
-MOST_CELLS = 1 << 23  # for finding hidden points
+MARGIN = 4
+MARKS = 1 << 16
+MOST_CELLS = 1 << 23
 HIDDEN = (0.0, 0.0, 0.0, 0.25)
 # Diameter of the circle with the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
@@ -56,13 +56,13 @@ Window = Sequence[tuple[float | None, float | None]]
 
 
 class Options(NamedTuple):
-    column: str  # colours the points; in 1D the ordinate
-    label: str  # of the colour bar or ordinate
-    solids: tuple[str, ...] = ()  # solids that colour the points, instead of `column`
+    column: str
+    label: str
+    solids: tuple[str, ...] = ()
     limits: tuple[float | None, float | None] = (None, None)  # None: grow
     symmetric: bool = False  # about 0
     cmap: str = "viridis"
-    azimuth: float = -60.0  # degrees
+    azimuth: float = -60.0
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # unit
@@ -72,14 +72,14 @@ class Options(NamedTuple):
     quantile: float = 0.0  # fraction of values at each end beyond the limits
     fontsize: float = 9.0
     pointsize: float = 1.0  # diameter relative to the size of a point
-    outlines: bool = False  # of solids and tools
+    outlines: bool = False
 
 
 class DrawnPoints(Artist):
     def __init__(self, picture: Picture):
         super().__init__()
         self.picture = picture
-        self.rows = np.empty((3, 0))  # projected positions, value; in 3D also light
+        self.rows = np.empty((3, 0))
         self.lines = LineCollection(
             [], colors="black", capstyle="round", linewidths=0.1 * picture.options.fontsize
         )
@@ -115,7 +115,7 @@ class Picture:
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
         self.domain = _zoomed(domain, options.window, mirror=options.mirror)
         self.options = options
-        self.small = options.fontsize - 1  # tick labels
+        self.small = options.fontsize - 1
         self.figure = Figure(figsize=size, dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_subplot()
@@ -124,7 +124,7 @@ class Picture:
         # Axis with labels that follow the limits.
         self.scale: Any = None
         self._laid_out = False
-        self._widest = 0.0  # title, in pixels
+        self._widest = 0.0
         self._background: Any = None
         self.axes.tick_params(labelsize=self.small)
         self.title = self.axes.set_title("step 0, time 0", fontsize=options.fontsize)
@@ -396,7 +396,6 @@ class PlanePicture(Picture):
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
-        # The bar checks each end when set, and swaps ends in wrong order.
         if hi > self.norm.vmin:
             self.norm.vmax, self.norm.vmin = hi, lo
         else:
@@ -466,7 +465,7 @@ class SpacePicture(PlanePicture):
         ends, seen = min(edges, key=lambda edge: edge[1][:, 0 if axis == 2 else 1].sum())
         along = seen[1] - seen[0]
         if np.hypot(*along) < 0.1 * reach:
-            return  # seen end-on
+            return
         outward = np.array([along[1], -along[0]]) / np.hypot(*along)
         outward *= np.sign(outward @ seen.mean(axis=0)) or 1.0
         aligned = {

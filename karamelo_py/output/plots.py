@@ -41,7 +41,7 @@ class Plots(dict[str, PlottedCurve]):
         self.hub = hub
         self.file: Path | None = None
         self.style = ""
-        self.place: Place | None = None  # of save_plot
+        self.place: Place | None = None
 
     def add(self, ID: str, curve: PlottedCurve) -> None:
         curve.id = ID
@@ -70,7 +70,6 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
         lines = []
         for side in ("left", "right"):
             chosen = [curve for curve in over_x if curve.side == side]
-            # Colours continue from left to right.
             lines += _over_one_axis(axes, side, chosen, len(lines), labelled) if chosen else []
         above = {"loc": "lower left", "bbox_to_anchor": (0, 1), "ncols": 4}
         axes.legend(handles=lines, **above, frameon=False, fontsize="small")
@@ -140,7 +139,7 @@ def real_ticks(axis: Any) -> None:
         whole = WholeNumbers(useOffset=False)
         whole.set_scientific(False)
         axis.set_major_formatter(whole)
-        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))  # few digits
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10]))
 
 
 def tidy(axes: Any) -> None:

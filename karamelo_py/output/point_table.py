@@ -27,7 +27,6 @@ from karamelo_py.points.transfers import Moment
 
 AXES = "xyz"
 COMPONENTS = ("11", "22", "33", "12", "13", "23")
-# Columns: vector and direction.
 VECTORS = {
     f"{before}{axis}{after}": (vector, k)
     for before, after, vector in (

@@ -10,7 +10,7 @@ from karamelo_py.script.expressions import POINT_SEEDS, Expression, Value
 from karamelo_py.script.syntax import Raw, Source
 
 KEYWORDS = {"step": "Step", "dt": "dt", "time": "Time"}
-LIMIT = "limit"  # what limits the step
+LIMIT = "limit"
 PER_POINT = frozenset(POINT_SEEDS)
 
 

@@ -32,7 +32,6 @@ class Output:
         self.units: Units | None = None
         # False if a program reads the log and no file is requested.
         self.writes = True
-        # Written after everything else of a state.
         self.last: list[Rhythmic] = []
         self.pages: list[Rhythmic] = []
         self.files: dict[Path, str] = {}

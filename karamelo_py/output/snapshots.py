@@ -23,7 +23,7 @@ class Snapshot(NamedTuple):
     columns: dict[str, np.ndarray]  # (n,) by name, with x, y, z
     lo: np.ndarray  # (3,) corners of the domain, or bounds of the points
     hi: np.ndarray
-    units: Mapping[str, str] = {}  # by column, and of time
+    units: Mapping[str, str] = {}
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
@@ -94,7 +94,7 @@ def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: 
             columns[axis] = columns[f"{axis}u"]
         elif axis not in columns and scaled is not None and not tilted:
             columns[axis] = lo + scaled * (hi - lo)
-        elif axis == "z":  # in 2D
+        elif axis == "z":
             columns.setdefault(axis, np.zeros(count))
         elif axis not in columns:
             raise ScriptError(

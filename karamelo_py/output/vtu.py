@@ -22,7 +22,6 @@ IN_MEMORY = 1 << 16  # bytes of an array
 PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in between
 
 
-# Vectors, and symmetric tensors in VTK's order, by columns.
 ARRAYS = {
     "velocity": "vx vy vz", "force": "fx fy fz",
     "stress": "s11 s22 s33 s12 s23 s13", "strain": "e11 e22 e33 e12 e23 e13",

@@ -15,9 +15,9 @@ class Grid(NamedTuple):
     x0: Length  # lower corner
     y0: Length
     z0: Length
-    h: Length  # cell size
-    inv_h: Length  # 1 / h
-    spacing: Length  # between nodes
+    h: Length
+    inv_h: Length
+    spacing: Length
     nx: Count  # cells
     ny: Count
     nz: Count
@@ -28,7 +28,7 @@ class Grid(NamedTuple):
     step_x: Count  # difference of node numbers
     step_y: Count
     first: Count  # number of the first node
-    first_cell: Count  # number of the first cell
+    first_cell: Count
 
 
 def renumbered(grid, first, step_x, step_y):

@@ -13,7 +13,7 @@ import numpy as np
 from karamelo_py.scene.region import Region
 
 HALVED = 5  # per direction
-PLANE = 0.01  # deviation of a surface from a plane, relative to the box
+PLANE = 0.01  # from a plane, relative to the box
 EDGE = 0.05  # for a part of a box, whose edge would otherwise be sharp
 SHEET = 0.01  # for a surface that may belong to a thin sheet
 LEAST = 0.1  # of a box: smaller pieces are merged with a neighbour
@@ -23,7 +23,7 @@ NOTHING = 1e-9  # round-off, relative to the box
 ROUGH = 0.025
 MOSTLY = 0.1
 FACE = 2  # parts of a face per direction
-SLOPE = 1e-3  # smaller slopes, relative to the largest, are zero: sums would lose their digits
+SLOPE = 1e-3  # relative to the largest; smaller slopes are zero, as sums would lose their digits
 
 
 class Pieces(NamedTuple):

@@ -42,7 +42,7 @@ class SerialComm:
     rank, size = 0, 1
     beside = 1  # processes on this one's cores, including it
     on_machine = 1
-    waited = 0.0  # seconds of steps spent waiting
+    waited = 0.0  # seconds
     failed_within = False
     at_end = False  # all processes have ended the run alike
 

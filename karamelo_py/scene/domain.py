@@ -19,7 +19,7 @@ class Domain:
     `hi` (3,) are 0 in unused directions. Without `h` the first solid sets the cell size.
     """
 
-    thin = False  # plane stress, or uniaxial stress in 1D
+    thin = False
     thickness = 1.0  # in 2D; cross-section in 1D
     place: Place | None = None
 

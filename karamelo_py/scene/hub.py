@@ -101,7 +101,7 @@ class Settings:
         self.precision = "double"
         self.engine = "processor"
         self.card: Any = None
-        self.ranks = 1  # processes requested
+        self.ranks = 1
         self.comm = SerialComm()
         self.debug = False
         self.trusts = False  # .geo files may run programs
@@ -113,20 +113,20 @@ class Update:
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
-        self.transfer: Any = None  # NamedTuple: PIC, FLIP, APIC ...
+        self.transfer: Any = None
         self.scheme: Any = MUSL()
         self.scheme_place: Place | None = None
         self.scheme_behind = 0  # runs before it was chosen
-        self.thermal = False  # heat conduction
+        self.thermal = False
         self.anti_locking = False  # F-bar
         self.half_start = False  # the first kick lasts half a step
         self.fixed_dt: float | None = None  # set_dt; None: adaptive
         self.dt_factor: float | None = None  # of the stable step; None: automatic
         self.dt_place: Place | None = None
-        self.boundary = "error"  # or delete, reflect
+        self.boundary = "error"
         self.boundary_place: Place | None = None
         self.warned_of_bounces = False
-        self.warned_of: list[str] = []  # known failures already reported
+        self.warned_of: list[str] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and its start
 
     def first_time(self, name: str) -> bool:
@@ -179,7 +179,7 @@ class Hub:
         self.console = console or Console()
         self.settings = Settings()
         self.folder = Path.cwd()
-        self.place: Place | None = None  # of the current statement
+        self.place: Place | None = None
         # Nothing runs and nothing is written in a rehearsal.
         self.rehearsing = False
         self.rehearsed = False
@@ -210,12 +210,12 @@ class Hub:
         self.fields = Fields(self)
         self.asked: set[str] = set()  # values and columns that statements read, later ones too
         self.functions: dict[str, Any] = {}  # Python functions passed by a program
-        self.in_run = 0  # number of the active run, else 0
+        self.in_run = 0
         self.listeners: list[Any] = []  # `run.listening.Listener`
         self._fits_run = 0  # last run whose arrays fit the scene
-        self.runs: list[dict[str, float]] = []  # values at each end
+        self.runs: list[dict[str, float]] = []
         self.record = RunRecord()
-        self.warned: list[tuple[float, str]] = []  # times and messages, for live pages
+        self.warned: list[tuple[float, str]] = []
         self.later: list[Any] = []  # `known_failures.Step` of later runs, from the rehearsal
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None

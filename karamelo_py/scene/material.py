@@ -33,7 +33,7 @@ class MaterialPart(Named):
 class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
-    thin = False  # plane stress, or uniaxial stress in 1D
+    thin = False
 
     @property
     def whole(self) -> NamedTuple:

@@ -113,12 +113,12 @@ class Fix(Publisher):
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
     body: Any = None  # rigid solid that moves by the forces on it
-    ignites = False  # lights explosives
+    ignites = False
     follows_points = False  # force depends on positions of points (tools)
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
     faces_of: Any = None  # present faces (m, d, d) of a tool
     accelerates = False  # formulas are forces per mass
-    brakes = False  # dissipates energy
+    brakes = False
     order = USUAL  # FIRST or LAST at each stage, wherever it is defined
     # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not
     # monitored.

@@ -16,7 +16,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
-SAMPLE = 4096  # positions
+SAMPLE = 4096
 LOOKS = 9  # doublings of the sample, to a million
 FEW = 1_000_000  # points that any machine can store
 # Above, points outside the domain are not counted.
@@ -31,7 +31,7 @@ class Placement(NamedTuple):
     half_size: np.ndarray  # (n, d) half edges of initial domains
     lo: np.ndarray  # (d,) of the solid
     hi: np.ndarray
-    outside: float = 0  # points outside the domain; inf: unknown
+    outside: float = 0
     shape: str = "box"  # or a meshio cell type
     corners: np.ndarray | None = None  # (n, c, d) of domains other than boxes
     missed: float = 0  # see `Pieces.missed`
@@ -192,7 +192,7 @@ def fill(
         )
     # Past an axis or plane of symmetry is the region's mirror image.
     ends = domain.lo[used], domain.hi[used]
-    with np.errstate(invalid="ignore"):  # open sides
+    with np.errstate(invalid="ignore"):
         at_side = [np.abs((lo + hi) / 2 - end) <= domain.tolerance for end in ends]
     at_side[0] |= np.arange(dimension) < free_from(domain.kin)
     reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
@@ -214,7 +214,7 @@ def fill(
     places, sizes = (of_unit * h for of_unit in cell_pattern(ppc, dimension, rule))
     even = sizes.ndim == 1
     x0 = Filled([int(i) for i in first], [int(i) for i in last], corner, h, places)
-    numbers: list[np.ndarray] = []  # in the pattern
+    numbers: list[np.ndarray] = []
     left: list[tuple[np.ndarray, Pieces]] = []
     outside = 0.0
     for begin, end in x0.chunks:

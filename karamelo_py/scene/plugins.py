@@ -40,7 +40,6 @@ from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import FAILURES, Place
 from karamelo_py.script.values import in_a_row
 
-# Required class attributes.
 SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "traits")}
 TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
 COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
@@ -128,7 +127,7 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):
             try:
                 result = function(*[1.0] * takes)
-            except (ArithmeticError, ValueError):  # the values do not matter here
+            except (ArithmeticError, ValueError):
                 continue
         if not isinstance(result, tuple) or len(result) != gives:
             yield f"{moment}: {function.__name__} has to return {gives} numbers, not {result!r}"

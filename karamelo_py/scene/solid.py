@@ -19,7 +19,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
-COLD, WARM = 60.0, 200.0  # temperatures below COLD, WARM below others, are probably in Celsius
+COLD, WARM = 60.0, 200.0  # below COLD, WARM below others: probably in Celsius
 
 
 class Solid(Named):
@@ -149,9 +149,9 @@ class Solid(Named):
                 hint=f"make the domain larger or the {self.described().split()[0]} smaller",
             )
 
-    described: Callable[[], str]  # source of the points: ``region 'disk'``
-    why_empty: Callable[[], str]  # why no point lies in the source
-    wanted: Callable[[], str]  # a source that has points
+    described: Callable[[], str]
+    why_empty: Callable[[], str]
+    wanted: Callable[[], str]
 
     @property
     def count(self) -> int:

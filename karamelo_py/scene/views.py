@@ -301,8 +301,8 @@ class PointsView(View):
         self._stored: Rows | None = None
         if numbers is None:
             numbers = self._take_local(pieces or [(simulation.setup.blocks[0], np.empty(0, int))])
-        self._numbers = numbers  # from 0
-        self.ids = numbers + 1  # as in dumps
+        self._numbers = numbers
+        self.ids = numbers + 1
 
     def _take_local(self, pieces: Sequence[tuple[arrays.Block, np.ndarray]]) -> np.ndarray:
         ids = [block.points.id[rows] for block, rows in pieces]

@@ -67,9 +67,7 @@ class ScriptError(Exception):
     hint: str | None = None
     # Prepended to the message.
     command: str | None = None
-    # Includes of the script, nearest first.
     included: list[Place] = field(default_factory=list)
-    # Independent further mistakes.
     others: "list[ScriptError]" = field(default_factory=list)
     # Of syntax errors: the correct statements.
     statements: list = field(default_factory=list)

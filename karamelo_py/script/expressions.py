@@ -16,7 +16,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.values import Values
 
 POINT_SEEDS = ("x", "y", "z", "x0", "y0", "z0")
-FIRST = frozenset(POINT_SEEDS[3:])  # initial positions
+FIRST = frozenset(POINT_SEEDS[3:])
 GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 

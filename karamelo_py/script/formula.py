@@ -30,7 +30,7 @@ KEEP, KEPT = 150, 151
 
 class Program(NamedTuple):
     code: np.ndarray  # (n, 2) int64: operation and operand of each instruction
-    constants: np.ndarray  # for CONSTANT instructions
+    constants: np.ndarray
 
 
 @noinline

@@ -9,9 +9,7 @@ from typing import NamedTuple
 
 from karamelo_py.script.operations import BINARY, UNARY, quietly
 
-# Pi, golden ratio, Euler's constant.
 CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}
-# Words that look like names, with a meaning for some commands.
 WORDS = frozenset({"NULL", "INF", "EDGE"})
 # Functions that cannot name variables; other names were free in Karamelo.
 RESERVED = frozenset({"exp", "sqrt", "cos", "sin", "tan", "atan2", "log", "if"})

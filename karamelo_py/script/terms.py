@@ -11,12 +11,10 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import TAIL, compute_quietly
 from karamelo_py.script.operations import OPERATIONS
 
-# Largest number of operations, and of those shown in messages.
 _MAX_SIZE = 20000
 _MAX_SHOWN = 1000
 _MAX_LEVELS = 100
 
-# Functions that the evaluator lacks.
 REWRITTEN = {
     "pow": lambda a, b: applied("^", a, b),
     "mod": lambda a, b: applied("%", a, b),

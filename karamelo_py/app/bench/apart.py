@@ -45,7 +45,7 @@ class Measurement(NamedTuple):
     debug: bool = False
     ranks: int = 1
     scaling: bool = False  # measure a `Scaled`
-    file: str = ""  # of results
+    file: str = ""
 
 
 def measured(job: Measurement) -> Measured | Solved:
@@ -82,7 +82,7 @@ def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
 class Scaled(NamedTuple):
     ranks: int
     threads: int
-    weak: bool  # the scene grows with `ranks`
+    weak: bool
     points: int
     best: float  # particle-steps per second
     exchange: float  # fraction of time that the process with the least waits

@@ -30,8 +30,8 @@ from karamelo_py.script.errors import ScriptError
 MOST_STEPS = 2500  # within which nothing leaves the domain
 ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
-ALONE = 0.5  # fraction of a step that limits it
-APART = 1.5  # largest trusted ratio of separate sweeps to a compiled step
+ALONE = 0.5  # limits a step above this fraction
+APART = 1.5  # trusted ratio of separate sweeps to a compiled step
 
 
 class Workload(NamedTuple):
@@ -72,11 +72,11 @@ class Timed(NamedTuple):
 
 class Measured(NamedTuple):
     points: int
-    speeds: list[float]  # particle-steps per second
+    speeds: list[float]
     bytes_per_particle: int
     bytes_per_particle_step: float  # without caches
     roofline: float  # fraction of the memory bandwidth at the best speed
-    roofline_in_place: float  # of arrays as large as the scene, which may be cached
+    roofline_in_place: float  # of arrays as large as the scene
     # Seconds per step, without call overhead.
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
@@ -137,10 +137,10 @@ class Measured(NamedTuple):
 
 class Solved(NamedTuple):
     points: int
-    speeds: list[float]  # particle-steps per second
+    speeds: list[float]
     unknowns: int
     corrections: float  # Newton iterations per step
-    stages: dict[str, float]  # fractions of a step
+    stages: dict[str, float]
     precision: str
 
     best = Measured.best
@@ -219,7 +219,7 @@ def measured(simulation: Simulation, seconds: float, triad: float, lead: int) ->
 
 
 def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
-    timed_steps(simulation, lead)  # includes compilation
+    timed_steps(simulation, lead)
     steps, before = simulation.load_steps, simulation.step
     steps.seconds.clear()
     steps.corrections = 0
@@ -310,7 +310,7 @@ class _Recorder(NamedTuple):
     points: list
     nodes: list
     sums: list
-    regions: list  # parallel regions
+    regions: list
 
 
 @sweep_points.on(_Recorder)

@@ -23,11 +23,11 @@ SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
 
 class OnCard(NamedTuple):
     points: int
-    speeds: list[float]  # particle-steps per second
+    speeds: list[float]
     bytes_per_particle_step: float  # without caches
-    roofline: float  # fraction of the memory bandwidth at the best speed
+    roofline: float  # of the memory bandwidth at the best speed
     bytes_on_card: int
-    stages: dict[str, float]  # seconds per step
+    stages: dict[str, float]
     made: float  # seconds to compile a step
     precision: str
 

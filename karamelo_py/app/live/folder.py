@@ -17,8 +17,8 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
-PAUSE = 0.5  # seconds between polls once all files are read
-FILES = 8  # per poll, so that the first are shown early
+PAUSE = 0.5  # seconds between polls
+FILES = 8  # per poll: the first are shown early
 WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 
 
@@ -32,9 +32,9 @@ class FolderPage:
         if not folder.is_dir():
             raise ScriptError(f"{folder} is no folder", expected="the folder of a run")
         self.folder = folder
-        self._states: list[tuple[Path, int, int, float, int]] = []  # file, index, step, time, count
+        self._states: list[tuple[Path, int, int, float, int]] = []
         self._seen: dict[Path, float] = {}
-        self._read: dict[Path, int] = {}  # states read of each file
+        self._read: dict[Path, int] = {}
         self._widths: dict[str, int] = {}  # columns by dump name
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
@@ -72,7 +72,7 @@ class FolderPage:
                     self._add(path, index, snapshot)
                     self._read[path] = index + 1
                 self._seen[path], files = changed, files + 1
-            except (ScriptError, OSError):  # being written, or deleted
+            except (ScriptError, OSError):
                 continue
         self._more = files == FILES
         return grown or len(self._states) > before

@@ -25,14 +25,14 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
 
 WINDOW = 2000  # rows of the log sent to a new page
-GRACE = 10.0  # seconds that a paused run waits for its page to be reloaded
+GRACE = 10.0  # seconds for a page to be reloaded
 
 
 class Row(NamedTuple):
     step: int
     time: float
     dt: float
-    limit: str  # what limits the step
+    limit: str
     gain: float | None  # energy gain in %, if monitored
     log: dict[str, float]
 
@@ -49,7 +49,7 @@ class RunPage(Rhythmic, Listener):
         self._rows: list[Row] = []
         self._paused = self._once = False
         self._column, self._unwatched = "seq", ""
-        self._ended, self._failed = "", ""  # status, and message of an error
+        self._ended, self._failed = "", ""
         self.server = Server(
             frames.PAGE, self._news, {"frame": self.frames.answer},
             {"pause": self._pause, "go": self._go, "step": self._step, "stop": self._stop,
@@ -132,7 +132,7 @@ class RunPage(Rhythmic, Listener):
 
     def _news(self, seen: int) -> tuple[int, dict]:
         rows = new = self._rows[seen:]
-        if len(rows) > WINDOW:  # enough for the curves of a new page
+        if len(rows) > WINDOW:
             rows = [rows[k] for k in np.linspace(0, len(rows) - 1, WINDOW).astype(int)]
         news = {
             "rows": [

@@ -17,14 +17,13 @@ from urllib.parse import parse_qsl, urlsplit
 from karamelo_py.script.errors import ScriptError
 
 PATIENCE = 1.0  # seconds for the last news at the end
-BEAT = 2.0  # seconds between messages that reveal closed pages
-STUCK = 30.0  # seconds until a page that receives nothing counts as closed
+BEAT = 2.0  # seconds between messages, to notice closed pages
+STUCK = 30.0  # seconds without receipt: the page counts as closed
 UNKNOWN = 5.0  # seconds to send the secret word
 MOST = 64  # connections; leaves file descriptors for the run
 LARGEST = 1 << 16  # bytes of a request's body, which is ignored
 # A site could resolve another name to this machine.
 HERE = ("127.0.0.1", "localhost", "::1")
-# Plotly creates styles and functions while drawing.
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; connect-src 'self'; "
@@ -59,7 +58,7 @@ class Server:
         self.actions = actions
         self.version = 0
         self._changed = threading.Condition()
-        self._shown: dict[int, int] = {}  # version sent to each open page
+        self._shown: dict[int, int] = {}
         self.opened = False  # a page has been open
         self.framed = False  # in a notebook
         self.token = secrets.token_urlsafe(16)
@@ -104,7 +103,7 @@ class Server:
                 with self._changed:
                     self._shown[key], self.opened = version, True
                     self._changed.notify_all()
-                time.sleep(0.1)  # more is not visible
+                time.sleep(0.1)
         finally:
             with self._changed:
                 self._shown.pop(key, None)
@@ -173,7 +172,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 self.end_headers()
                 try:
                     server.events(self._write)
-                except OSError:  # the page is closed
+                except OSError:
                     self.close_connection = True
             elif name in server.answers and (answer := server.answers[name](words)) is not None:
                 if isinstance(answer, bytes):

@@ -16,7 +16,7 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies.case import COLUMNS, Row, command_of, said_in, worded
 
 MOST = 400  # rows of a log drawn on a page
-LINES = 12  # last lines of a run's output
+LINES = 12
 
 
 class StudyPage:

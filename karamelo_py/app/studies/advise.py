@@ -96,7 +96,6 @@ def forecast(
         return None
     expected = -fall[-1]
     rates = [-f for f in fall if f < 0]
-    # A falling order may fall further.
     drop = max(-fall[-2] - expected, 0.0) if len(fall) > 1 else 0.0
     slow = max(min(*rates, expected / 2, expected - drop), 0.0)
     fast = max(*rates, 4 / 3 * expected, min(highest, SECOND) if drop == 0 else 0.0)
@@ -129,7 +128,7 @@ def _power(x: float, xs: np.ndarray, values: np.ndarray) -> float:
 class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
-    words: frozenset[str] = frozenset()  # of its method
+    words: frozenset[str] = frozenset()
     warnings: tuple[str, ...] = ()  # of its finest run
 
     @property
@@ -159,7 +158,7 @@ class Candidate:
     cost: float
     error: float
     forecast: Forecast | None = None
-    chance: str = ""  # why it may be chance
+    chance: str = ""
 
 
 class Adviser:
@@ -344,7 +343,6 @@ def run(options: Namespace) -> int:
         raise ScriptError(f"-cost {options.cost}", expected="one of " + ", ".join(records.COLUMNS))
     numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
     name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
-    # Words may be compared at one size.
     compared = name in numeric and len(values[name]) == 1 < prod(map(len, values.values()))
     if name not in numeric or (len(values[name]) < 3 and not compared):
         wrong = "no variable makes the scene finer"

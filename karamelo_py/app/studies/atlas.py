@@ -55,12 +55,12 @@ PICTURES = (".png", ".svg")
 @dataclass
 class Entry:
     name: str  # folder; the part before a slash is its group
-    text: str = ""  # what it shows
+    text: str = ""
     commands: list[str] = field(default_factory=list)  # without the word karamelo-py
     whole: dict[str, str] = field(default_factory=dict)  # values of words in braces
     small: dict[str, str] = field(default_factory=dict)
     interpreted: bool = False  # its scenes are too small to be worth compiling
-    page: bool = True  # is on the page
+    page: bool = True
     ends_early: bool = False  # shows runs that do not end well
 
     @property
@@ -167,7 +167,7 @@ def make(entry: Entry, folder: Path, inputs: Path, *, small: bool, again: bool) 
         folder.mkdir(parents=True, exist_ok=True)
     record.unlink(missing_ok=True)
     for path in [*folder.glob("*.png"), *folder.glob("*.svg")]:
-        path.unlink()  # may be of other commands
+        path.unlink()
     more = {"NUMBA_DISABLE_JIT": "1"} if entry.interpreted else {}
     transcript, printed = [], ""
     for line in lines:

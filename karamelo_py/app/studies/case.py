@@ -25,8 +25,8 @@ from karamelo_py.output.record import NAME
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.terms import number_of
 
-Row = Mapping[str, Any]  # of a table of runs
-Record = Mapping[str, Any]  # a JSON object
+Row = Mapping[str, Any]
+Record = Mapping[str, Any]
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
@@ -45,8 +45,8 @@ class CaseOutcome:
     """
 
     status: str
-    reason: str = ""  # message of the program, unless done
-    facts: dict[str, float] = field(default_factory=dict)  # see `COLUMNS`
+    reason: str = ""  # unless done
+    facts: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
     code: str = ""  # of the error that ended it
 
@@ -55,7 +55,7 @@ class CaseOutcome:
         return said_in(self.folder / "err.txt")
 
 
-# Measured for every run, in addition to the log; with titles of axes.
+# Measured for every run; with titles of axes.
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
     "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
@@ -106,9 +106,9 @@ class Launch:
     script: Path
     threads: int = 1  # of each run
     repeat: int = 1  # runs of each case; the time is their median
-    limit: float | None = None  # seconds after which a run is stopped
+    limit: float | None = None  # seconds
     texts: tuple[str, ...] = ()  # of the script and its includes
-    stop: threading.Event = field(default_factory=threading.Event)  # set to end the study
+    stop: threading.Event = field(default_factory=threading.Event)
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
     def key(self, case: Mapping[str, str]) -> str:
@@ -122,10 +122,8 @@ class Launch:
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
-        # These outcomes may change.
         if stored["status"] in ("killed", "refused") or stored.get("code") in _NOT_OF_RUN:
             return None
-        # Repeat a stopped run if it may take longer now.
         if stored["status"] == "too long" and (self.limit or 1e300) > stored["facts"]["wall_s"]:
             return None
         status, reason, facts = (stored[name] for name in ("status", "reason", "facts"))

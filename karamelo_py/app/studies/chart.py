@@ -244,7 +244,6 @@ def tell(family: Family, *, costs: bool) -> None:
             fits = []
             for x, y in pairs.values():
                 fit = order(getattr(line, x), getattr(line, y))
-                # Errors fall as costs grow.
                 turned = line.rises or x == "cost" if y == "error" else not line.rises
                 fits.append(fit.of_fall if turned else fit)
             orders.add_row(line.label, *map(str, fits))
@@ -258,8 +257,8 @@ def tell(family: Family, *, costs: bool) -> None:
         )
 
 
-_WIDEST = 480  # pixels of a picture in the page
-_MOST = 60  # pictures in a page
+_WIDEST = 480
+_MOST = 60
 
 
 def write_page(family: Family, sheet: pictures.Sheet) -> None:

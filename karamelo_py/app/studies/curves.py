@@ -64,7 +64,7 @@ CHANCES = {
     "coarser": "a coarser run is better",
     "finer": "a finer run is worse",
 }
-BEYOND = 0.5  # margin of an order before a fall is too steep
+BEYOND = 0.5  # margin of an order
 WORSE = 1.1  # ratio of a worse error
 
 
@@ -133,14 +133,14 @@ class Table(NamedTuple):
 class GroupedRuns:
     """Runs that differ in one variable, in its order."""
 
-    choice: dict[str, str]  # values of the other variables that differ between lines
+    choice: dict[str, str]  # variables that differ between lines
     rows: list[Mapping[str, str]]
     # NaN where missing.
     x: np.ndarray
     cost: np.ndarray
     error: np.ndarray
-    across: np.ndarray  # `x` or `cost`: the abscissa of errors
-    linear: bool = False  # on a linear axis
+    across: np.ndarray
+    linear: bool = False
     chance: Sequence[str] = ()  # why errors are small by chance (`by_chance`)
 
     @property
@@ -196,7 +196,7 @@ class Family:
         self.along = along or max(numbers, key=lambda name: len(values[name]), default=None)
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
         ends = values[along] if along else []
-        self.words = ends if any(number_of(v) is None for v in ends) else []  # drawn side by side
+        self.words = ends if any(number_of(v) is None for v in ends) else []
         # A logarithmic axis has no zero.
         self.linear = bool(self.words or any(number_of(v) <= 0 for v in ends))
         groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}

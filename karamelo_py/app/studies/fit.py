@@ -34,11 +34,11 @@ differences that remain are independent. There is no +- where the three searches
 value at the end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # of each range
-# Fraction of a range, for derivatives and around an end. Waves and points that cross cells make
-# curves rough: derivatives over 0.01 of a range end in a local minimum.
+# Fraction of a range. Waves and points that cross cells make curves rough: derivatives over 0.01
+# end in a local minimum.
 STEP = 0.04
-NEAR = 0.01  # fraction of a range: at its end; distance of equal ends
-ENOUGH = 1e-3  # relative change of the misfit or of the values that ends a search
+NEAR = 0.01  # of a range: at its end, or equal ends
+ENOUGH = 1e-3  # relative change of misfit or values that ends a search
 AGAIN = 3  # searches from a lower point near the end
 ALIKE = 0.99  # correlation of indistinguishable variables
 
@@ -99,7 +99,7 @@ class End:
 class Search:
     def __init__(self, study: Study, values: Mapping[str, list[str]], measured: list[Observation]):
         self.study, self.measured = study, measured
-        self.failed: dict[str, ScriptError] = {}  # by folder
+        self.failed: dict[str, ScriptError] = {}
         self.fixed = {name: words[0] for name, words in values.items()}
         self.names = [name for name, words in values.items() if words[1:]]
         numbers: list[Any] = [[number_of(word) for word in values[name]] for name in self.names]

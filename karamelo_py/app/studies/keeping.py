@@ -25,7 +25,7 @@ class Kept(NamedTuple):
     """
 
     word: str
-    number: float  # mean of the last part over the first; for a run that breaks, its end
+    number: float  # mean of the last part over the first; if stopped, its end
     said: tuple[str, ...]  # causes or titles of warnings and of the error
     warned: bool  # or its error names a cause
 

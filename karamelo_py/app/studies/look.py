@@ -193,7 +193,7 @@ def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.nd
 def direct_labels(axes: "Axes", ends: Sequence[tuple[float, float, str, str]]) -> None:
     if not ends:
         return
-    axes.autoscale_view()  # limits are final from here on
+    axes.autoscale_view()
     to_axes = axes.transData + axes.transAxes.inverted()
     names: dict[tuple[str, str, int, int], list[str]] = {}
     positions: dict[tuple[str, str, int, int], Any] = {}

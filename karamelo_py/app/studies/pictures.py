@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")
-Curve = tuple[float, float, str, str]  # x and y of its end, name, colour
+Curve = tuple[float, float, str, str]
 
 
 class Sheet(NamedTuple):
     path: Path
-    x: str = ""  # labels of the axes
+    x: str = ""
     y: str = ""
     title: str = ""
 
@@ -208,7 +208,7 @@ def _sorted(rows: Sequence[Mapping[str, str]], name: str) -> list[str]:
 class History(NamedTuple):
     x: np.ndarray
     y: np.ndarray
-    label: str  # choice of the run
+    label: str
     stopped: bool = False  # before its end
 
 
@@ -281,7 +281,7 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
 class Pair:
     """Numbers of a scene for two values of one variable; NaN where missing."""
 
-    label: str  # the scene, and other choices
+    label: str
     error: tuple[float, float]
     cost: tuple[float, float]
     bytes: tuple[float, float]

@@ -76,7 +76,7 @@ class Recorded:
     def __init__(self, word: str):
         name, equals, formula = (piece.strip() for piece in word.partition("="))
         self.text, self.raw = word, None
-        self.parts: dict[str, Reduction] = {}  # by name in the formula
+        self.parts: dict[str, Reduction] = {}
         if not equals:
             self.word = word
             reduction, colon, rest = word.partition(":")
@@ -112,7 +112,7 @@ class Recorded:
             return numbers[""]
         value = None
         if None not in numbers.values():
-            with suppress(ScriptError):  # such as a division by zero
+            with suppress(ScriptError):
                 value = evaluate(self.node, self.raw, NamesOfCase("-record", numbers))
         if not isinstance(value, float):
             raise ScriptError(f"'{self.text}' has no value")

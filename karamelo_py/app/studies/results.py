@@ -17,7 +17,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.parser import parse_text
 
-LAW = 200  # points on the curve of a law
+LAW = 200
 
 
 def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:

@@ -48,10 +48,10 @@ UNKNOWN = -1
 GAINED = "spurious energy gain"
 LOST = "spurious energy loss"
 CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
-BORNE = ("stable", "damped")  # classes of stable steps
+BORNE = ("stable", "damped")
 UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
-FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the program measures energies often enough
+FEWEST = watch.FEW * watch.LOOK + 1  # steps for enough energies
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
 FIRST = 0.1  # fraction of the rows of a log over which energies are averaged
 FEW = 9  # up to as many values of a variable all get a tick
@@ -94,11 +94,11 @@ def run(options: Namespace) -> int:
     plan = variables.family(options)
     values, script = plan.values, plan.script
     together = variables.zipped(options)
-    variables.cases(values, together)  # raises for lists that do not fit
+    variables.cases(values, together)
     leaders = {name: group[0] for group in together for name in group}
     axes = [n for n in values if len(values[n]) > 1 and leaders.get(n, n) == n]
     worded = [name for name in axes if any(number_of(value) is None for value in values[name])]
-    axes.sort(key=worded.__contains__)  # words are the second axis
+    axes.sort(key=worded.__contains__)
     if not 1 <= len(axes) <= 2:
         raise ScriptError(
             f"{len(axes)} variables have several values",
@@ -131,7 +131,7 @@ def run(options: Namespace) -> int:
     try:
         _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart)
     finally:
-        if chart.results:  # also if interrupted
+        if chart.results:
             records.write(table, chart.rows())
             chart.draw(out, options.script.name, words)
     chart.tell()
@@ -191,7 +191,6 @@ class Map:
         self.leaders = leaders or {}
         self.study, self.values, self.axes = study, values, axes
         self.energy, self.bound, self.error = energy, bound, error
-        # Words are drawn side by side.
         self.words = [
             [] if all(number_of(v) is not None for v in values[name]) else values[name]
             for name in axes
@@ -202,8 +201,8 @@ class Map:
         )
         self.y = more[0] if more else [0.0]
         self.shape = len(self.x), len(self.y)
-        self.results: dict[Cell, Row] = {}  # cells that were run
-        self.inferred: dict[Cell, Hashable] = {}  # classes of other cells
+        self.results: dict[Cell, Row] = {}
+        self.inferred: dict[Cell, Hashable] = {}
 
     @property
     def classes(self) -> dict[Cell, Hashable]:
@@ -460,7 +459,7 @@ def explore(
     longest gaps first. Along an edge, one in three cells is run, so that no bow is cut off. Islands
     between runs are missed. Nothing is inferred along a direction of words (`apart`).
     """
-    classes: list[Hashable] = []  # of the numbers in planes
+    classes: list[Hashable] = []
     plane = np.full(shape, UNKNOWN)
     first = [_cuts(n, 1 if words else stride) for n, words in zip(shape, apart, strict=True)]
     cells = [(i, j) for i in first[0] for j in first[1]]

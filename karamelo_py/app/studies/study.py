@@ -47,20 +47,19 @@ _STATUS = 24  # least width of the status while facts are shown
 @dataclass
 class Study:
     launch: Launch
-    out: Path  # table or picture; runs have folders in a folder of that name
-    names: list[str]  # variables
-    items: Sequence[Recorded]  # values recorded from the logs
+    out: Path  # table or picture, next to the folder of the runs
+    names: list[str]
+    items: Sequence[Recorded]
     jobs: int  # runs at once
-    again: bool = False  # repeat earlier runs
-    title: str = ""  # heading of the table
+    again: bool = False
+    title: str = ""
     strict: bool = False  # a refused variant ends the study
-    most: int = 0  # upper bound of an adaptive study; 0: `run` gets all cases
+    most: int = 0  # 0: `run` gets all cases
     writes: bool = True  # write the table after each run
     page: StudyPage | None = None  # with --live
-    # Finished runs, by the values of the case.
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
     claim: Claim | None = None  # of the folder
-    ran: int = 0  # made by this study
+    ran: int = 0
     begun: float = field(default_factory=time.perf_counter)
 
     def __post_init__(self) -> None:

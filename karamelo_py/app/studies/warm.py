@@ -24,10 +24,10 @@ from typing import Any, BinaryIO, NoReturn
 
 from karamelo_py.app.leaving import STUDY
 
-MOST = 8  # kinds with a process
-TRIES = 3  # to start the first process
-PATIENCE = 20.0  # seconds for an answer: a start takes about 0.01, the import 2
-SUBREAPER = 36  # of Linux's prctl: adopt processes whose parents have ended
+MOST = 8
+TRIES = 3
+PATIENCE = 20.0  # seconds: a start takes about 0.01, the import 2
+SUBREAPER = 36  # prctl: adopt processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
 # Functions of a script in Python may affect the next run.
@@ -54,8 +54,8 @@ class WarmProcess:
         self.link.close()
         if self.pid is not None:
             with suppress(OSError):
-                os.kill(self.pid, signal.SIGKILL)  # nothing is open
-                for _ in range(100):  # at most a second: the system may delay it
+                os.kill(self.pid, signal.SIGKILL)
+                for _ in range(100):  # at most a second
                     if os.waitpid(self.pid, os.WNOHANG)[0]:
                         break
                     time.sleep(0.01)

@@ -13,7 +13,6 @@ from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 
-# Bounds of half sizes for weights, in cells.
 LEAST = 1e-3
 MOST = 1.0
 STRETCHED = "half_size", "half_size", "deformation"  # present and initial, F

@@ -13,8 +13,8 @@ from karamelo_py.points.kinematics import gradient, product, vector
 class Along(NamedTuple):
     first: int  # number of the first node
     r: float  # distance from it, in cells
-    weights: tuple[float, ...]  # N
-    gradients: tuple[float, ...]  # dN/dx
+    weights: tuple[float, ...]
+    gradients: tuple[float, ...]
     affine: tuple[float, ...]  # N D^-1 (X_I - x), D the mean of (X_I - x)^2 under N
     ends: tuple[tuple[int, float], ...] = ()  # box ends: cell from `first`, position in it
 

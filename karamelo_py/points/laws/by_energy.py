@@ -304,7 +304,7 @@ def first_instability(law: NamedTuple) -> tuple[str, float] | None:
                 try:
                     least = min(directional_stiffness(law, at, a) for a in range(3))
                 except (ValueError, ZeroDivisionError, OverflowError):
-                    least = -1.0  # the formula has no value
+                    least = -1.0
                 if not least > 0:
                     unstable.append((abs(np.log(x)), path, float(x)))
                     break

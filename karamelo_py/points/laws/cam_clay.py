@@ -110,7 +110,7 @@ class CamClay(NamedTuple):
 
 
 class State(NamedTuple):
-    J: Any  # det F
+    J: Any
     e: Any  # logarithmic elastic strain
     pc: Any
     ep: Any  # equivalent plastic strain
@@ -149,7 +149,7 @@ def _advance_cam_clay(law, kin, state, dl, dt):
 
 
 class ClayStress(NamedTuple):
-    q: Any  # von Mises stress
+    q: Any
     p: Any
     pc: Any
 
@@ -209,7 +209,7 @@ def plastic_flow(law, q, p, pc):
         )
         low, high = where(far, low, y), where(far, y, high)
         y = 0.5 * (low + high)
-    w = max(w, 0)  # against rounding
+    w = max(w, 0)
     for _ in range(_NEWTON):
         dy, dw = newton_step(law, trial, y, w, residuals(law, trial, y, w))
         y, w = y + dy, w + dw

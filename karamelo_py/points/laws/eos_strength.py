@@ -136,7 +136,7 @@ class EosStrength(NamedTuple):
     damage: Any = Absent()
     temperature: Any = Absent()
     strain: Any = Absent()  # default: rates
-    further: Any = Absent()  # other kinds
+    further: Any = Absent()
 
     syntax = "eos, strength[, damage][, temperature][, strain=logarithmic]"
 
@@ -277,7 +277,7 @@ class Memory(NamedTuple):
     """States of the parts of a law; () for parts without a state."""
 
     energy: Any  # of the equation of state
-    viscous: Any  # pressure
+    viscous: Any
     damage: Any
     heat: Any
     loss: Any  # dissipated energy per reference volume
@@ -286,7 +286,7 @@ class Memory(NamedTuple):
 
 
 class State(NamedTuple):
-    J: Any  # det F
+    J: Any
     s: Any  # deviatoric stress of the intact material
     m: Memory
 

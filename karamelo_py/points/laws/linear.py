@@ -77,7 +77,7 @@ class FixedFrame(LinearElastic):
 
 
 class State(NamedTuple):
-    J: Any  # det F
+    J: Any
     sigma: Any  # Cauchy stress
 
 

@@ -12,7 +12,7 @@ from karamelo_py.compiler import real, where
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, nothing
 
-WHOLE = Axisymmetric()  # of the wrapped law
+WHOLE = Axisymmetric()
 ENOUGH = 10  # trials of q for increments of any size
 UNROLLED = 9  # for laws of F, whose trials are short enough to be code without a loop
 FURTHEST = 0.3  # change of the stretch across in a trial
@@ -26,7 +26,7 @@ class Thin(NamedTuple):
 
     in_lanes = True
     traits = laws.LawTraits(wraps=True)
-    trials = 3  # of q in a step: increments are small
+    trials = 3  # small increments
 
 
 class ThinInLargeIncrements(Thin):

@@ -66,9 +66,9 @@ class Branch(NamedTuple):
     in_lanes = True
 
     g: float  # fraction of the stiffness that relaxes
-    tau: float  # relaxation time
+    tau: float
     softness: float  # 1/(4 g G): stored energy over stress squared
-    rest: Any  # further branches
+    rest: Any
 
 
 class Viscoelastic(NamedTuple):

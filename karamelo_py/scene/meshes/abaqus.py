@@ -57,7 +57,7 @@ class _Keyword(NamedTuple):
 
 
 class _Elements(NamedTuple):
-    type: str  # Abaqus type
+    type: str
     numbers: np.ndarray  # (n,)
     nodes: np.ndarray  # (n, c) deck's node numbers
 
@@ -68,7 +68,6 @@ class _Part:
         self.places: list[np.ndarray] = []
         self.elements: list[_Elements] = []
         self.skipped: list[tuple[str, int]] = []
-        # Sets: numbers, or names of sets.
         self.nodes: dict[str, list[np.ndarray | str]] = {}
         self.groups: dict[str, list[np.ndarray | str]] = {}
         self.surfaces: dict[str, list[tuple[str, str]]] = {}

@@ -34,7 +34,7 @@ class Mesh(NamedTuple):
     cells: list[CellBlock]
     sets: dict[str, list[np.ndarray]]  # masks (n,), one per block of `cells`
     node_sets: dict[str, np.ndarray]  # masks (N,)
-    left_out: dict[str, int]  # counts of elements that are no solids, such as springs
+    left_out: dict[str, int]  # no solids, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
         """Cells of an element set, outer faces of a node set, or all; ScriptError if unknown or

@@ -14,12 +14,12 @@ from karamelo_py.script.errors import ScriptError
 _FLAT = 1e-12
 # Distance from the plane of a 2D mesh, relative to its size, within which nodes lie in it.
 _PLANE = 1e-9
-_CHUNK = 4096  # integrated at once
+_CHUNK = 4096
 
 
 class Shape(NamedTuple):
     name: str
-    words: str  # plural
+    words: str
     dimension: int
     # Corner order of the reversed orientation.
     mirrored: tuple[int, ...]
@@ -68,7 +68,7 @@ _MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
 class MeshElements(NamedTuple):
     shape: Shape
     numbers: np.ndarray  # (n, c) of the corners
-    corners: np.ndarray  # (n, c, d) positions
+    corners: np.ndarray
     nodes: np.ndarray | None = None  # (n, k, d) all nodes, if more than corners
     reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
     bulge: float = 0.0  # distance of `nodes` from the straight shape, relative to the size
@@ -231,7 +231,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
         weights, x = _integrated(shape, reference, local)
         volume[batch] = weights.sum(axis=1)
         twisted[batch] = (weights * np.sign(volume[batch])[:, None] <= 0).any(axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):  # refused below
+        with np.errstate(divide="ignore", invalid="ignore"):
             moment = (weights[:, :, None] * x).sum(axis=1) / volume[batch, None]
         centroid[batch] = nodes[batch, 0] + moment
     flat = np.abs(volume) <= _FLAT * np.ptp(nodes, axis=1).max(axis=1) ** shape.dimension

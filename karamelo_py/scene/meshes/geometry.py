@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 from karamelo_py.script.errors import ScriptError
 
-# Gmsh's comments, strings, numbers, words and signs.
 _TOKEN = re.compile(
     r"""//[^\n]*|/\*.*?(?:\*/|\Z)|"[^"]*"|'[^']*'|(?:\d+\.?\d*|\.\d+)(?:[Ee][+-]?\d+)?"""
     r"""|[A-Za-z_][A-Za-z0-9_]*|\S""",

@@ -59,7 +59,6 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
         )
     if path.suffix.lower() in GEOMETRIES:
         refuse_commands(path, trusted=trusted)
-    # Cached: regions and solids often use the same file.
     cad = path.suffix.lower() in CAD
     return _read(
         path.resolve(), dimension, size if cad else None, (status.st_mtime_ns, status.st_size)
@@ -68,7 +67,7 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
 
 @lru_cache(maxsize=2)
 def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int]) -> Mesh:
-    if path.suffix.lower() in GEOMETRIES:  # it may include other files
+    if path.suffix.lower() in GEOMETRIES:
         mesh = mesh_geometry(path, dimension, size)
     elif path.suffix.lower() in CAD:
         _refuse_what_is_no_cad(path)
@@ -179,7 +178,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
         unknown = "Could not deduce" in str(error)
         reason = "its ending tells no format" if unknown else _reason(error)
         raise _unreadable(path, (why or "") + reason) from None
-    if np.ndim(mesh.points) != 2:  # meshio found no nodes
+    if np.ndim(mesh.points) != 2:
         raise _unreadable(path, "its content does not fit its ending")
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points

@@ -79,7 +79,7 @@ class Norm:
         self._time: float | None = None
         self.history = 0.0
         self.largest = 0.0
-        self._exact = 0.0  # the largest norm of the exact values
+        self._exact = 0.0
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Terms of a norm from the magnitudes (2, n) of differences and exact values."""

@@ -239,7 +239,7 @@ class PositionQuantile(Compute):
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
-            if not mass.any():  # no points
+            if not mass.any():
                 self.publish_components(np.zeros(d))
                 return
             if shift == 64 - BITS:

@@ -19,11 +19,11 @@ from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
 
 # 33 % of the time of level 6, for 4 % more bytes.
 COMPRESSION = 4
-PIECE = 1 << 20  # bytes
+PIECE = 1 << 20
 # For the binary format (LAMMPS manual, dump, second revision).
 MAGIC = b"DUMPCUSTOM"
 ENDIAN, REVISION = 1, 2
-ELEMENT = "element"  # the column with the names of types
+ELEMENT = "element"
 # Style of the box sides: shrink-wrapped, with a minimum extent.
 SHRUNK, AT_LEAST = 2, 3
 
@@ -62,8 +62,8 @@ class LammpsDump(TableDump):
                     file.write(encoder.compress(text))
                 file.write(encoder.flush())
             return
-        # The file is complete after every snapshot: the next one overwrites its last bytes. (gunzip
-        # would read separately compressed snapshots, but OVITO reads only the first.)
+        # The file is complete after every snapshot: the next one overwrites its last bytes. (OVITO
+        # reads only the first of separately compressed snapshots.)
         start, before = self._end, self._encoder or self.encoder()
         encoder = before.copy()
         tail = before.copy().flush() if start else b""
@@ -162,7 +162,7 @@ class BinaryRows:
         yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *np.ravel(box(self.hub)))
         yield struct.pack("<iibd", len(names), 0, 1, update.time)  # no units, but a time
         yield struct.pack("<i", len(line)) + line
-        yield struct.pack("<ii", 1, count * len(names))  # in one piece
+        yield struct.pack("<ii", 1, count * len(names))
         for ids, types, columns in self.tables():
             yield np.column_stack([ids, types, *columns]).astype("<f8", copy=False).tobytes()
 

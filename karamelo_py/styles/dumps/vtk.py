@@ -102,7 +102,6 @@ class Vtk(OfPoints, VtkDump):
 
 
 KINDS = {1: "line", 2: "quad", 3: "hexahedron"}
-# Corners of a cell in the order of VTK.
 CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
 

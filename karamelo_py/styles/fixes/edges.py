@@ -63,7 +63,7 @@ class EdgePieces(NamedTuple):
     point: np.ndarray  # (m,)
     area: np.ndarray  # (m, d) times the outward normal
     length: np.ndarray  # (m,) area of a piece, with both sides of an edge
-    middle: np.ndarray  # (m, d)
+    middle: np.ndarray
 
 
 Columns = TypeVar("Columns", Faces, EdgePieces)

@@ -252,7 +252,7 @@ class Keeper:
 def _sum_of(value: Any) -> int:
     try:
         return zlib.crc32(pickle.dumps(value))
-    except Exception:  # items may raise anything
+    except Exception:
         return 0
 
 

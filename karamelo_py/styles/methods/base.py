@@ -16,7 +16,6 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Place, ScriptError
 
-# Published names of the force and torque on a solid.
 LOADS = ("ContactForce", "ContactTorque")
 
 

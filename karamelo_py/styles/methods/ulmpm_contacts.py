@@ -200,7 +200,6 @@ class ULMPMContacts(Method):
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
         contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
-        # Memory pages cost nothing until written.
         prescribed: np.ndarray = contact.prescribed
         if self._prescribed is prescribed:
             prescribed[:] = 0

@@ -27,7 +27,7 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 
 
 class Element(NamedTuple):
-    kind: str  # in meshes
+    kind: str
     corners: int
     edges: tuple[tuple[int, int], ...]  # pairs of corners, with positive determinant
     mirrored: tuple[int, ...]  # order of corners if the determinant is negative

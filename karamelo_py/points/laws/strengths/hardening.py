@@ -86,7 +86,7 @@ def _shear_response_linear_hardening(strength, kin, step, memory, heat):
 
 
 class FlowState(NamedTuple):
-    memory: Any  # of the strength
+    memory: Any
     heat: Any  # `Warm` or ()
     known: Any  # result of `precompute`
 

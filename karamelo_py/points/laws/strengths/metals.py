@@ -66,8 +66,8 @@ class JohnsonCook(NamedTuple):
     A: float
     B: float
     n: float
-    rate: Any  # `RateFactor` or `Absent`
-    softening: Any  # `Softening` or `Absent`
+    rate: Any
+    softening: Any
 
     @classmethod
     def given(

@@ -57,7 +57,7 @@ class CuttingTool(ToolFix):
         self.K = K
         self.tip = self.of_time("", (x_tip, y_tip, z_tip))
         self.ends = (xA, yA), (xB, yB)
-        if not hub.rehearsing:  # a rehearsal lacks some values
+        if not hub.rehearsing:
             self._faces()
 
     def _faces(self) -> tuple[np.ndarray, np.ndarray]:
