@@ -38,8 +38,8 @@ def final_hub(
 def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
     """Columns of all points by id, in full precision; `work` and `balance` are the watch's."""
     hub = final_hub(script)
-    clock = hub.simulation.control.clock[0]
-    watched = {"work": clock.work, "balance": clock.balance}
+    energy = hub.simulation.control.energy[0]
+    watched = {"work": energy.work, "balance": energy.balance}
     return {n: watched[n] if n in watched else hub.fields.particle(n) for n in names}
 
 

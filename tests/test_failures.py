@@ -344,7 +344,7 @@ GROWN = """
 from karamelo_py import Simulation, SimulationError
 sim = Simulation(SCENE, out="files")
 sim.run(250)
-sim.hub.simulation.setup.control.clock[0].first_mean -= 1e6
+sim.hub.simulation.setup.control.energy[0].first_mean -= 1e6
 try:
     sim.run(200)
 except SimulationError as error:

@@ -131,10 +131,10 @@ def test_fixes(monkeypatch, own_cache, method):
         value = other_hub.values.get(name)
         assert hub.values.get(name) == pytest.approx(value, rel=1e-10, abs=1e-9), name
     assert method != "ulmpm" or hub.values.get("base_y") > 100  # it bears the column by now
-    clocks = one.control.clock[0], other.control.clock[0]
-    assert clocks[0].looks == clocks[1].looks == 5
+    watches = one.control.energy[0], other.control.energy[0]
+    assert watches[0].looks == watches[1].looks == 5
     for name in ("kinetic", "stored", "work", "balance", "of_drift", "elastic", "lost", "crossed"):
-        assert clocks[0][name] == pytest.approx(clocks[1][name], rel=1e-9, abs=1e-12), name
+        assert watches[0][name] == pytest.approx(watches[1][name], rel=1e-9, abs=1e-12), name
 
 
 def test_order_in_memory_changes_nothing():

@@ -134,7 +134,7 @@ def test_a_step_that_is_done_in_part_can_be_left(run_script, monkeypatch):
     def places(self):
         block = self.simulation.setup.blocks[0]
         order = np.argsort(block.points.id)
-        return block.points.x[self.simulation.control.clock[0].now][:, order].copy()
+        return block.points.x[self.simulation.control.motion[0].now][:, order].copy()
 
     def stepping(self, hooks):
         before = places(self)

@@ -24,7 +24,7 @@ from karamelo_py.compiler.trace.functions import PointFunction, forget, outdate_
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
-from karamelo_py.kernels.table import take
+from karamelo_py.kernels.table import in_scene, take
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.implicit.load_steps import LoadSteps
@@ -157,7 +157,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     words, find = set(), PointFunction.find
 
     def noted(self, classes):
-        if self is not take:
+        if self not in (take, in_scene):
             words.update(one.__name__ for one in classes if one)
         return find(self, classes)
 
@@ -291,8 +291,11 @@ def advice(lowered):
     def say(script, dt=1.0, limit=1.0, **variables) -> str:
         hub = lowered(script, **variables)
         weight = own_weight_of_drift(hub)
-        clock = SimpleNamespace(spacing=limit, rate=1, heat_limit=inf, weight=weight, end_time=inf)
-        control = SimpleNamespace(clock=[clock])
+        control = SimpleNamespace(
+            step=[SimpleNamespace(spacing=limit, end_time=inf)],
+            motion=[SimpleNamespace(rate=1, weight=weight)],
+            heat=[SimpleNamespace(heat_limit=inf)],
+        )
         known = {"dt": dt, "limit": limit, "control": control, "implicit": False}
         found = suggestions(hub, SimpleNamespace(**known, fastest=lambda: 0.0))
         return "\n".join(f"{suggestion.reason} / {suggestion.cure}" for suggestion in found)
@@ -603,8 +606,8 @@ def test_double_precision_of_a_large_scene(lowered):
 def test_output_that_takes_longer_than_the_steps(lowered):
     """35 000 steps of 416 points take 1.5 s; a line of the log 0.5 ms."""
     hub = lowered(INPUTS / "in.two_disks")
-    clock = SimpleNamespace(end_time=35.0)
-    simulation = SimpleNamespace(dt=0.001, control=SimpleNamespace(clock=[clock]))
+    step = SimpleNamespace(end_time=35.0)
+    simulation = SimpleNamespace(dt=0.001, control=SimpleNamespace(step=[step]))
     assert not [*output(hub, simulation)]
     hub.output.log.every = 1
     ((said, _),) = output(hub, simulation)

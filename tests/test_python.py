@@ -178,7 +178,7 @@ def test_a_run_does_not_end_by_what_went_wrong_in_one_before(interpreted):
     interpreted("""
         sim = Simulation(SCENE)
         sim.run(1)
-        sim.hub.simulation.control.clock[0].wrong = 1
+        sim.hub.simulation.control.motion[0].wrong = 1
         sim.run(2)
         assert sim.step == 3
     """)

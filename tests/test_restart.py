@@ -138,7 +138,7 @@ def begun():
     sim.run(1)
     return sim
 def grows(sim):
-    sim.hub.simulation.setup.control.clock[0].windows = 2
+    sim.hub.simulation.setup.control.energy[0].windows = 2
 def told(sim):
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
@@ -155,7 +155,7 @@ fresh = begun()
 grows(fresh)
 fresh.command("read_restart(w.h5)")
 fresh.command("dt_factor(0.3)")
-print(told(fresh), fresh.hub.simulation.setup.control.clock[0].dt_factor)
+print(told(fresh), fresh.hub.simulation.setup.control.step[0].dt_factor)
 fresh.command("fix(v, initial_velocity_particles, all, 1, 0)")
 fresh.run(1)
 grows(fresh)

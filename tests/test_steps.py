@@ -135,8 +135,8 @@ def test_set_dt(run_interpreted):
 def test_as_many_steps_as_fit():
     """17500 additions of 2e-4 are not quite 3.5; there is no step more for that."""
     control = new_control(np.zeros(3))
-    clock = control.clock[0]
-    clock.fixed_dt, clock.end_time = 2e-4, 3.5
+    step = control.step[0]
+    step.fixed_dt, step.end_time = 2e-4, 3.5
     choose_dt(control)
     while control.values[TIME] < 3.5:
         finish(control)

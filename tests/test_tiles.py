@@ -225,7 +225,7 @@ def test_long_tiles_reach_no_more_nodes_than_their_points():
     simulation = hub.simulation
     simulation.begin(inf)
     simulation.sort()
-    drift = simulation.control.clock[0].drift_limit + ROUNDING
+    drift = simulation.control.motion[0].drift_limit + ROUNDING
     assert 0 < drift < 1
     ends = list(product((-drift, drift), repeat=3))
     cells = np.concatenate(

@@ -23,17 +23,17 @@ TRAVEL = "fix(v, initial_velocity_particles, all, 0.05*sin(40*x0), 0.03*cos(30*y
 
 
 def watched(balances, work=None):
-    """The clock after looks at these balances; whether the last is within its bound."""
+    """The record after looks at these balances; whether the last is within its bound."""
     control = new_control(np.zeros(3))
-    clock = control.clock[0]
-    clock.level, clock.energy_floor = 0.25, 1e-12
+    energy = control.energy[0]
+    energy.level, energy.energy_floor = 0.25, 1e-12
     within = True
     for k, balance in enumerate(balances):
-        clock.work = work[k] if work is not None else 0.0
-        clock.kinetic = balance + clock.work
-        clock.moving_before = balance
+        energy.work = work[k] if work is not None else 0.0
+        energy.kinetic = balance + energy.work
+        energy.moving_before = balance
         within = judge(control)
-    return clock, within
+    return energy, within
 
 
 def test_windows_that_grow_are_counted():
@@ -57,13 +57,15 @@ def test_a_wave_of_a_coarse_body_is_no_growth(before):
     """
     theta, found = 0.8, []
     control = new_control(np.zeros(3))
-    clock = control.clock[0]
-    clock.level, clock.energy_floor = 0.25 + 0.5 * before, 1e-12
+    energy = control.energy[0]
+    energy.level, energy.energy_floor = 0.25 + 0.5 * before, 1e-12
     for n in range(1, 200):
-        clock.moving_before, clock.kinetic = (np.sin((n + k - 0.5) * theta) ** 2 for k in (0, 1))
-        clock.stored_before, clock.stored = (np.cos((n + k - before) * theta) ** 2 for k in (0, 1))
+        energy.moving_before, energy.kinetic = (np.sin((n + k - 0.5) * theta) ** 2 for k in (0, 1))
+        energy.stored_before, energy.stored = (
+            np.cos((n + k - before) * theta) ** 2 for k in (0, 1)
+        )
         judge(control)
-        found.append(clock.balance)
+        found.append(energy.balance)
     bound = (1 - np.cos(theta)) / 2 * np.sin(theta / 2)
     assert 0.9 * bound < np.abs(np.array(found) - 1).max() <= bound * (1 + 1e-12)
 
@@ -83,8 +85,8 @@ def test_growth_is_one_thing_in_a_run_and_in_logs(gain, tells):
     """Energy that swings by a fifth, and goes to 1 + gain in the middle of a run."""
     looks = np.arange(10 * LOOKS)
     energy = (1 + gain * (looks > looks[-1] / 2)) * (1 + 0.2 * (-1.0) ** looks)
-    clock, _ = watched(energy)
-    assert (clock.grown > WITHIN) == tells
+    watch, _ = watched(energy)
+    assert (watch.grown > WITHIN) == tells
     assert (keeping.judge(looks, energy)[0] == "gains") == tells
     assert (stability.growth(energy) > 1 + WITHIN) == tells
 

@@ -48,7 +48,7 @@ class BasicFacts:
         self.sparse = bool(self.single)
 
     motions = cached_property(lambda self: motions(self.simulation))
-    spacing = property(lambda self: float(self.simulation.control.clock[0].spacing))
+    spacing = property(lambda self: float(self.simulation.control.step[0].spacing))
 
     @cached_property
     def bodies(self) -> list[Body]:
@@ -57,8 +57,8 @@ class BasicFacts:
 
     @cached_property
     def waves(self) -> float:
-        clock = self.simulation.control.clock[0]
-        return float(clock.rate) - self.simulation.fastest(clock.common[0])
+        motion = self.simulation.control.motion[0]
+        return float(motion.rate) - self.simulation.fastest(motion.common[0])
 
     @cached_property
     def weights(self) -> list[np.ndarray]:

@@ -124,10 +124,10 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 def measured(facts: BasicFacts) -> Crossing:
     """Path so far, as a mean over stressed material; 0 if loads maintain the stress."""
-    clock = facts.simulation.control.clock[0]
-    matters = clock.watch_energy and clock.lost > OF_ENERGY and loses(facts)
-    loaded = clock.supplied > LOADED * clock.largest_energy
-    return Crossing(float(clock.crossed) if matters and not loaded else 0.0, 0.0)
+    energy = facts.simulation.control.energy[0]
+    matters = energy.watch_energy and energy.lost > OF_ENERGY and loses(facts)
+    loaded = energy.supplied > LOADED * energy.largest_energy
+    return Crossing(float(energy.crossed) if matters and not loaded else 0.0, 0.0)
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:

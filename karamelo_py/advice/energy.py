@@ -43,7 +43,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     courant, _ = stable_step.own_step_of_waves(hub, still=False)
     # Of undeformed bodies, which may soften later.
     fastest = stable_step.fastest_wave(simulation)
-    across = float(simulation.control.clock[0].spacing) / fastest if fastest > 0 else np.inf
+    across = float(simulation.control.step[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
     if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
         alone = " of an isolated point" * (courant == stable_step.lone_point(hub))
@@ -101,12 +101,14 @@ def swelling(points: PointTable) -> np.ndarray:
     return points.particle("volume") / points.reference_volume
 
 
-def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble:
-    clock = simulation.control.clock[0]
+def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
+    energy = simulation.control.energy[0]
+    if not simulation.energy_watch.has_grown():
+        return None
     cause, fix = cause_of_gain(hub, simulation)
-    gain, since = clock.grown, "since the start"
-    if clock.windows >= TOLD:
-        gain, since = clock.growth, f"in the last {10 if simulation.implicit else 100} steps"
+    gain, since = energy.grown, "since the start"
+    if energy.windows >= TOLD:
+        gain, since = energy.growth, f"in the last {10 if simulation.implicit else 100} steps"
     message = (
         f"energy balance: spurious gain of {100 * gain:.2g} % of the largest energy {since} "
         f"({when(simulation)})"
@@ -125,9 +127,10 @@ def taken_by(hub: Hub) -> list[str]:
     return takers
 
 
-def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
+def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | None:
     """Describe a loss, unless chosen damping explains it."""
-    if taken_by(hub):
+    energy = simulation.control.energy[0]
+    if not energy.watch_energy or energy.looks <= LOOKS:
         return None
     lost, (cause, fix) = simulation.energy_watch.share_lost(), cause_of_loss(hub)
     message = (

@@ -78,8 +78,8 @@ def _speeds(points: PointTable) -> np.ndarray:
 
 
 def _gained(hub: Hub, simulation: Simulation) -> Trouble:
-    clock = simulation.control.clock[0]
-    if not np.isfinite(clock.balance):
+    watch = simulation.control.energy[0]
+    if not np.isfinite(watch.balance):
         _, first = simulation.points.largest(
             lambda points: 1.0 * ~np.isfinite(points.particle("ienergy"))
         )
@@ -89,9 +89,9 @@ def _gained(hub: Hub, simulation: Simulation) -> Trouble:
         )
         fix = "check the parameters of its material, and fixes in Python that act on it"
         return Trouble(message, fix, "not-a-number")
-    supplied = abs(clock.first_balance) + clock.supplied
+    supplied = abs(watch.first_balance) + watch.supplied
     cause, fix = energy.cause_of_gain(hub, simulation)
-    gain = clock.balance - clock.first_balance
+    gain = watch.balance - watch.first_balance
     much = f"{gain / supplied:.3g} x" if supplied > 0 else f"{gain:.3g} more than"
     message = (
         f"energy balance: {much} the initial energy and applied work has appeared "
@@ -101,11 +101,11 @@ def _gained(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _heated(hub: Hub, simulation: Simulation) -> Trouble:
-    clock = simulation.control.clock[0]
-    share = clock.last_dt / clock.heat_limit
+    step, heat = simulation.control.step[0], simulation.control.heat[0]
+    share = step.last_dt / heat.heat_limit
     message = (
-        f"temperatures are between {clock.T_low:.6g} and {clock.T_high:.6g}; initial state, fixes "
-        f"and sources allow {clock.coldest:.6g} to {clock.hottest + clock.own_heat:.6g} "
+        f"temperatures are between {heat.T_low:.6g} and {heat.T_high:.6g}; initial state, fixes "
+        f"and sources allow {heat.coldest:.6g} to {heat.hottest + heat.own_heat:.6g} "
         f"({when(simulation)})"
     )
     if share > 1:

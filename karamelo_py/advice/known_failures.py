@@ -132,7 +132,7 @@ def warn_about_steps(
 ) -> None:
     """Warn once (or `again`) of a step above the limit, in this or a later run."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
-    of_heat = float(simulation.control.clock[0].heat_limit)
+    of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
     for step in (present, *later_steps(hub)):
         asked = step.fixed_dt or (step.dt_factor or 0) * limit

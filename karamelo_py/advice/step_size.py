@@ -13,20 +13,21 @@ NO_LIMITS = ("set_dt", "end")  # of stability
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
     """The default step now: at rest, or as if points had moved."""
-    clock, steps = simulation.control.clock[0], simulation.steps
+    control, steps = simulation.control, simulation.steps
+    motion, spacing = control.motion[0], control.step[0].spacing
     courant, share = own_step_of_waves(simulation.hub, still=still)
     weight = own_weight_of_drift(simulation.hub)
-    rate = clock.rate if weight == clock.weight else steps.rate_with(weight)
-    limit = courant * clock.spacing / rate if rate > 0 else inf
-    step = min(share * limit, USUAL * clock.heat_limit)
+    rate = motion.rate if weight == motion.weight else steps.rate_with(weight)
+    limit = courant * spacing / rate if rate > 0 else inf
+    step = min(share * limit, USUAL * control.heat[0].heat_limit)
     speed = simulation.fastest() if weight != 1 else 0.0
-    return float(min(step, STRIDE * clock.spacing / speed) if speed > 0 else step)
+    return float(min(step, STRIDE * spacing / speed) if speed > 0 else step)
 
 
 def _stable_in_place(simulation: Simulation) -> float:
-    clock = simulation.control.clock[0]
-    courant, _ = own_step_of_waves(simulation.hub, still=clock.path <= STILL)
-    return courant * clock.spacing / clock.rate
+    step, motion = simulation.control.step[0], simulation.control.motion[0]
+    courant, _ = own_step_of_waves(simulation.hub, still=motion.path <= STILL)
+    return courant * step.spacing / motion.rate
 
 
 def blows_up(simulation: Simulation) -> bool:
@@ -50,7 +51,7 @@ def own_step_instead_of(simulation: Simulation) -> float | None:
     update = simulation.hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return None
-    return own_step(simulation, still=simulation.control.clock[0].path <= STILL)
+    return own_step(simulation, still=simulation.control.motion[0].path <= STILL)
 
 
 def words_of_own_step(simulation: Simulation, step: float) -> str:
@@ -60,10 +61,10 @@ def words_of_own_step(simulation: Simulation, step: float) -> str:
 
 
 def step_after_motion(simulation: Simulation) -> float:
-    update, clock = simulation.hub.update, simulation.control.clock[0]
+    update, step = simulation.hub.update, simulation.control.step[0]
     if update.fixed_dt is not None or update.dt_factor is not None:
         return 1.0
-    return clock.dt_factor_moving * clock.courant_moving / (clock.dt_factor * clock.courant)
+    return step.dt_factor_moving * step.courant_moving / (step.dt_factor * step.courant)
 
 
 def stable_step(simulation: Simulation, limit: float) -> float:
@@ -90,9 +91,9 @@ def words_of_share(simulation: Simulation) -> str:
         share = hub.update.fixed_dt / stable_step(simulation, steps.limit)
         words = f"{share:.3g} of the stable step"
     elif asked is None:
-        clock = simulation.control.clock[0]
+        step = simulation.control.step[0]
         of_heat = steps.ruling_limit == "conduction"
-        words = f"{USUAL if of_heat else float(clock.dt_factor):g} of the stable step, "
+        words = f"{USUAL if of_heat else float(step.dt_factor):g} of the stable step, "
         words += "the program's own"
         after = step_after_motion(simulation)
         far = f"; {after:.2g} of that once points have gone a quarter of a cell"

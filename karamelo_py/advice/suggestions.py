@@ -289,7 +289,7 @@ def _precision(hub: Hub, simulation: Simulation) -> Words:
 
 def _output(hub: Hub, simulation: Simulation) -> Words:
     """Output that takes seconds, and longer than the steps."""
-    span = simulation.control.clock[0].end_time - hub.update.time
+    span = simulation.control.step[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):
         return

@@ -64,7 +64,7 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 class Points(NamedTuple):
     """Points of one law, by tile. A place (w numbers) is a position, then a stored domain shape."""
 
-    x: np.ndarray  # (2, w, n): places now and after the move; `clock.now` is the index
+    x: np.ndarray  # (2, w, n): places now and after the move; `motion.now` is the index
     home: np.ndarray | None  # (w, n) reference places (total frame)
     v: np.ndarray  # (d, n) velocity
     mass: np.ndarray  # (n,)
@@ -218,7 +218,8 @@ class Apart(NamedTuple):
     scratch: np.ndarray  # (A, 9 + depth, BLOCK)
     values: np.ndarray  # (A, ...): see Control
     totals: np.ndarray  # (A, rows, LIMBS), zero between two loops
-    clock: np.ndarray  # (A, 1) CLOCK; only the entries for hooks are used
+    step: np.ndarray  # (A, 1) STEP; only the entries for hooks are used
+    heat: np.ndarray  # (A, 1) HEAT; likewise
 
 
 class Hooks(NamedTuple):
@@ -260,7 +261,9 @@ POST_CONTACT = 10  # damping, of the forces of contact as well
 # Where in the node arrays a hook acts.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
-CLOCK = np.dtype(
+# The step size: written by `kernels.clock` and `run.step_size`. Times are in the unit of time, all
+# other numbers are fractions, counts or lengths of cells.
+STEP = np.dtype(
     [
         ("fixed_dt", np.float64),  # step of set_dt, or 0
         ("dt_factor", np.float64),  # fraction of the stable step of waves
@@ -273,12 +276,27 @@ CLOCK = np.dtype(
         ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock
         ("contact_kick", np.float64),  # time that forces would act in such steps
         ("last_contact_dt", np.float64),
+        ("spacing", np.float64),  # smallest cell size
+        ("courant", np.float64),  # stable step over cell size / rate
+        ("courant_moving", np.float64),  # the same once points have moved
+        ("kept", np.float64),  # FLIP coefficient
+        ("kept_by_time", np.float64),  # the same per stable step if it depends on time, or 0
+        ("first_limit", np.float64),  # stable step at the start
+        ("limit", np.float64),  # stable step now
+        ("over_limit", np.int64),  # consecutive steps above the stable limit
+        ("watch_limit", np.int64),  # whether to stop because of them
+    ]
+)
+# The motion of points, as sweeps report it: written by `kernels.clock` and `run.tiles`. Lengths are
+# in cells, speeds in lengths per time (`speed`: cells per time).
+MOTION = np.dtype(
+    [
         ("rate", np.float64),  # max over points of c + max |v_i - common_i|
+        ("new_rate", np.float64),  # of the last sweep
         ("common", np.float64, (1, 3)),  # reference velocity for speeds
         ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
         ("wave", np.float64),  # wave speed when `common` was measured
         ("speed", np.float64),  # of the fastest point, in cells
-        ("new_rate", np.float64),  # of the last sweep
         ("move", np.float64),  # largest move of a point in this step, in cells
         ("new_move", np.float64),
         ("stride", np.float64),  # cells that a point may move in a step
@@ -286,19 +304,14 @@ CLOCK = np.dtype(
         ("drift_limit", np.float64),
         ("pace", np.float64),  # largest move in a step since then
         ("path", np.float64),  # largest path of a point, in cells
-        ("spacing", np.float64),  # smallest cell size
-        ("courant", np.float64),  # stable step over cell size / rate
-        ("courant_moving", np.float64),  # the same once points have moved
-        ("heat_limit", np.float64),  # stable step of conduction, infinite without
-        ("heat_reference", np.float64),  # the same in undeformed bodies
-        ("kept", np.float64),  # FLIP coefficient
-        ("kept_by_time", np.float64),  # the same per stable step if it depends on time, or 0
-        ("first_limit", np.float64),  # stable step at the start
-        ("limit", np.float64),  # stable step now
         ("now", np.int64),  # index of the present array of places
         ("wrong", np.int64),  # 1 when a point went wrong
-        ("over_limit", np.int64),  # consecutive steps above the stable limit
-        ("watch_limit", np.int64),  # whether to stop because of them
+    ]
+)
+# The watch over energy: written by `kernels.watch` and `run.energy`. In the unit of energy, but for
+# counts, fractions and steps.
+ENERGY = np.dtype(
+    [
         ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
         ("level", np.float64),  # fraction of the present stored energy in the balance
         ("work", np.float64),  # of the fixes so far
@@ -332,6 +345,14 @@ CLOCK = np.dtype(
         ("windows", np.int64),  # consecutive windows in which the balance has grown
         ("growth", np.float64),  # in the last window, relative to the largest energy
         ("grown", np.float64),  # largest growth since the first looks
+    ]
+)
+# Conduction and temperatures: written by `kernels.heat`, hooks that heat, `kernels.watch` and
+# `run.energy`. In the units of time and temperature.
+HEAT = np.dtype(
+    [
+        ("heat_limit", np.float64),  # stable step of conduction, infinite without
+        ("heat_reference", np.float64),  # the same in undeformed bodies
         ("watch_heat", np.int64),  # whether all sources of heat are known
         ("coldest", np.float64),  # lower bound from initial state, fixes and sources
         ("hottest", np.float64),
@@ -344,6 +365,7 @@ CLOCK = np.dtype(
         ("fall", np.float64),
     ]
 )
+CLOCK = np.dtype([("step", STEP), ("motion", MOTION), ("energy", ENERGY), ("heat", HEAT)])
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
 LAST = 2**62  # above any id of a point
 
@@ -352,7 +374,11 @@ class Control(NamedTuple):
     """Clock, published values and totals."""
 
     values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
-    clock: np.ndarray  # (1,) CLOCK
+    clock: np.ndarray  # (1,) CLOCK, for copies and files; the next four are its parts
+    step: np.ndarray  # (1,) STEP
+    motion: np.ndarray  # (1,) MOTION
+    energy: np.ndarray  # (1,) ENERGY
+    heat: np.ndarray  # (1,) HEAT
     totals: np.ndarray  # sums of LIMBS numbers (kernels.totals): of the published values; of mass
     #                     and momentum of each solid (1 + d); of elastic energy and this times
     #                     velocity
@@ -364,13 +390,14 @@ class Control(NamedTuple):
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
     """Make a control with a zero clock; `firsts`: ids of the first points of solids."""
-    clock = np.zeros(1, CLOCK).view(np.recarray)
-    clock[0].weight = clock[0].stride = 1.0
+    clock: Any = np.zeros(1, CLOCK).view(np.recarray)
+    parts = clock.step, clock.motion, clock.energy, clock.heat
+    clock.motion.weight = clock.motion.stride = 1.0
     more = (1 + d) * (len(firsts) + 1)
     totals = np.zeros((len(values) + more, LIMBS), np.int64)
     digits, answer = np.zeros(LIMBS, np.int64), np.zeros(max(16, more))
     ids = np.array([*firsts, LAST], np.int64)
-    return Control(values, clock, totals, digits, answer, ids, Alone())
+    return Control(values, clock, *parts, totals, digits, answer, ids, Alone())
 
 
 class Setup(NamedTuple):

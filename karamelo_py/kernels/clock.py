@@ -20,7 +20,7 @@ def step_size(s: Setup) -> Number:
 
 def last_step_size(s: Setup) -> Number:
     """Return dt of the previous step; tiny, not 0, if there is none: laws divide by it."""
-    last = s.control.clock[0].last_dt
+    last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
@@ -32,12 +32,12 @@ def kick(s: Setup) -> Number:
     middle of this one. In the first step they act for all of it, since initial velocities belong to
     half a step earlier, unless the script requests half.
     """
-    return real(s.control.clock[0].kick, s.nodes.sums[0, MASS])
+    return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 
 
-def common_velocity(kin: Tag, clock: Any, like: Number) -> tuple:
+def common_velocity(kin: Tag, motion: Any, like: Number) -> tuple:
     """Return the reference velocity (d,) for speeds, in the type of `like`."""
-    return vector(kin, [real(clock.common[0, k], like) for k in range(kin.dimension)])
+    return vector(kin, [real(motion.common[0, k], like) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step
@@ -63,96 +63,96 @@ def choose_dt(control: Control) -> None:
     m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back. The first step after
     load steps begins as in a new scene.
     """
-    clock = control.clock[0]
-    if clock.weight > 1:
+    step, motion, heat = control.step[0], control.motion[0], control.heat[0]
+    if motion.weight > 1:
         # The common drift may have rotated since it was measured: bounded by the speeds.
-        clock.rate = max(clock.rate, clock.wave + clock.speed * clock.spacing)
-    limit = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
-    dt = min(clock.dt_factor * limit, clock.heat_factor * clock.heat_limit)
-    if clock.weight != 1 and clock.speed * dt > STRIDE:
-        dt = STRIDE / clock.speed
-    dt = clock.fixed_dt if clock.fixed_dt > 0 else dt
+        motion.rate = max(motion.rate, motion.wave + motion.speed * step.spacing)
+    limit = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
+    dt = min(step.dt_factor * limit, step.heat_factor * heat.heat_limit)
+    if motion.weight != 1 and motion.speed * dt > STRIDE:
+        dt = STRIDE / motion.speed
+    dt = step.fixed_dt if step.fixed_dt > 0 else dt
     whole = dt
-    limit = min(limit, clock.heat_limit)
-    clock.limit = limit
-    clock.over_limit = clock.over_limit + 1 if dt > limit else 0
-    remaining = clock.end_time - control.values[TIME]
+    limit = min(limit, heat.heat_limit)
+    step.limit = limit
+    step.over_limit = step.over_limit + 1 if dt > limit else 0
+    remaining = step.end_time - control.values[TIME]
     # Tolerance for rounding in many additions of dt: no final step of 1e-16.
     if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
         dt = 0.5 * remaining
     control.values[DT] = dt
-    anew = clock.last_dt == 0
-    last, last_contact = (dt, whole) if anew else (clock.last_dt, clock.last_contact_dt)
-    clock.kick = 0.5 * (last + dt)
-    clock.contact_dt = max(whole, last_contact - FOLLOWING * dt)
-    clock.contact_kick = 0.5 * (last_contact + clock.contact_dt)
+    anew = step.last_dt == 0
+    last, last_contact = (dt, whole) if anew else (step.last_dt, step.last_contact_dt)
+    step.kick = 0.5 * (last + dt)
+    step.contact_dt = max(whole, last_contact - FOLLOWING * dt)
+    step.contact_kick = 0.5 * (last_contact + step.contact_dt)
     if anew:
-        clock.kick *= clock.first_kick
-        clock.contact_kick *= clock.first_kick
-    if clock.kept_by_time > 0:
-        clock.kept = clock.kept_by_time ** (dt / clock.limit)
+        step.kick *= step.first_kick
+        step.contact_kick *= step.first_kick
+    if step.kept_by_time > 0:
+        step.kept = step.kept_by_time ** (dt / step.limit)
 
 
 @kernel
 def finish(control: Control) -> None:
     """End a step: advance time, swap the arrays of places, choose the next dt."""
-    clock = control.clock[0]
-    clock.now = 1 - clock.now
+    step, motion = control.step[0], control.motion[0]
+    motion.now = 1 - motion.now
     dt = control.values[DT]
-    clock.last_dt = dt
-    clock.last_contact_dt = clock.contact_dt
+    step.last_dt = dt
+    step.last_contact_dt = step.contact_dt
     time = control.values[TIME] + dt
-    control.values[TIME] = clock.end_time if clock.end_time - control.values[TIME] == dt else time
+    control.values[TIME] = step.end_time if step.end_time - control.values[TIME] == dt else time
     control.values[TIMESTEP] += 1
-    clock.drift += clock.move
-    clock.path += clock.move
-    clock.pace = max(clock.pace, clock.move)
-    clock.speed = clock.move / dt if dt > 0 else 0.0
-    clock.move = 0.0
-    if clock.path > STILL:
-        clock.courant, clock.dt_factor = clock.courant_moving, clock.dt_factor_moving
+    motion.drift += motion.move
+    motion.path += motion.move
+    motion.pace = max(motion.pace, motion.move)
+    motion.speed = motion.move / dt if dt > 0 else 0.0
+    motion.move = 0.0
+    if motion.path > STILL:
+        step.courant, step.dt_factor = step.courant_moving, step.dt_factor_moving
     choose_dt(control)
 
 
 @kernel
 def _read_reports(tiling, control):
-    clock = control.clock[0]
+    motion = control.motion[0]
     rate = 0.0
     moved = 0.0
     for t in range(tiling.count[0]):
         moved = max(moved, tiling.report[t, 0])
         rate = max(rate, tiling.report[t, 1])
         if tiling.report[t, 2] > 0:
-            clock.wrong = 1
-    clock.new_move = max(clock.new_move, moved)
-    clock.new_rate = max(clock.new_rate, rate)
+            motion.wrong = 1
+    motion.new_move = max(motion.new_move, moved)
+    motion.new_rate = max(motion.new_rate, rate)
 
 
 def read_reports(s: Setup) -> None:
     """Put the largest rate and move of all tiles, and any failure, in the clock."""
-    clock = s.control.clock[0]
-    clock.new_rate = 0.0
-    clock.new_move = 0.0
+    motion = s.control.motion[0]
+    motion.new_rate = 0.0
+    motion.new_move = 0.0
     for block in s.blocks:
         _read_reports(block.tiling, s.control)
     agree_on_reports(s.control.ranks, s.control)
 
 
-def take_reports(clock: Any) -> None:
+def take_reports(control: Control) -> None:
+    motion = control.motion[0]
     # Points move in one sweep of a step; domains may grow in another.
-    clock.move += clock.new_move
-    if clock.new_rate > 0:
-        clock.rate = clock.new_rate
+    motion.move += motion.new_move
+    if motion.new_rate > 0:
+        motion.rate = motion.new_rate
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
     """Read and accept the reports of a sweep; return whether no point failed."""
-    clock = s.control.clock[0]
     read_reports(s)
-    take(clock)
-    return clock.wrong == 0
+    take(s.control)
+    return s.control.motion[0].wrong == 0
 
 
 class MoveCheck(NamedTuple):
@@ -164,8 +164,8 @@ class MoveCheck(NamedTuple):
 
 
 def move_check(s: Setup) -> MoveCheck:
-    clock = s.control.clock[0]
-    return MoveCheck(s.frame, s.kin, s.grids, clock.now, clock.stride)
+    motion = s.control.motion[0]
+    return MoveCheck(s.frame, s.kin, s.grids, motion.now, motion.stride)
 
 
 def checked_move(check, points, p):
@@ -195,9 +195,9 @@ def _check_points(check, points, tiling, k):
 
 def check_moves(s: Setup, mode: Tag) -> bool:
     """Check the new positions again, after hooks on them."""
-    clock = s.control.clock[0]
+    motion = s.control.motion[0]
     for block in s.blocks:
         _check_points(mode, block.tiling.count[1], move_check(s), block.points, block.tiling)
     read_reports(s)
-    clock.move = max(clock.move, clock.new_move)
-    return clock.wrong == 0
+    motion.move = max(motion.move, motion.new_move)
+    return motion.wrong == 0

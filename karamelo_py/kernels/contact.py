@@ -473,7 +473,7 @@ def _take(contact, control, side, k, impulse):
         contact.change[i, k] += impulse * per_mass
     if not counts(control.ranks, n):
         return
-    force = impulse / control.clock[0].kick
+    force = impulse / control.step[0].kick
     add_to(control.totals, contact.slot[field_] + k, force)
     add_to(control.totals, contact.torque[field_] + (k + 1) % 3, x[(k + 2) % 3] * force)
     add_to(control.totals, contact.torque[field_] + (k + 2) % 3, -x[(k + 1) % 3] * force)
@@ -532,7 +532,7 @@ def _touch_pair(bodies, control, i, j, where):
             work -= impulse * nodes.update[m, k]
         for slot, sign in ((contact.pair[a, b], -1.0), (contact.pair[b, a], 1.0)):
             if slot >= 0 and counts(control.ranks, n):
-                add_to(control.totals, slot + k, sign * impulse / control.clock[0].kick)
+                add_to(control.totals, slot + k, sign * impulse / control.step[0].kick)
     if counts(control.ranks, n):
         add_to(control.totals, WORK, float(work))
 

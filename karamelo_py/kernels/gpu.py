@@ -109,7 +109,7 @@ def _report(fate, number, moved, rate, stride):
 def is_last(s):
     """Return True in the last step: nothing is summed for a next one."""
     values = s.control.values
-    return values[TIME] + values[DT] >= s.control.clock[0].end_time
+    return values[TIME] + values[DT] >= s.control.step[0].end_time
 
 
 class Stage:
@@ -454,28 +454,28 @@ def take_reports(take: Callable) -> Callable:
     """Return the function that passes a visit's reports to the clock."""
 
     def take_all_reports(i, fate, s):
-        clock = s.control.clock[0]
-        clock.new_move, clock.new_rate = fate[MOVED], fate[RATE]
-        take(clock)
+        motion = s.control.motion[0]
+        motion.new_move, motion.new_rate = fate[MOVED], fate[RATE]
+        take(s.control)
         fate[MOVED] = 0.0
         fate[RATE] = 0.0
         if fate[WRONG] > 0:
-            clock.wrong = 1
+            motion.wrong = 1
             fate[STATUS] = 1.0 + STOPPED
 
     return take_all_reports
 
 
 def finish_step(i, fate, s):
-    fate[DRIFT] += s.control.clock[0].move
+    fate[DRIFT] += s.control.motion[0].move
     finish(s.control)
 
 
 def end_step(i, fate, s):
-    clock = s.control.clock[0]
-    if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
+    step = s.control.step[0]
+    if step.watch_limit > 0 and step.over_limit >= PATIENCE:
         fate[STATUS] = 1.0 + ABOVE_LIMIT
-    elif clock.limit < SMALLEST * clock.first_limit:
+    elif step.limit < SMALLEST * step.first_limit:
         fate[STATUS] = 1.0 + SHRUNK
-    elif s.control.values[TIME] >= clock.end_time:
+    elif s.control.values[TIME] >= step.end_time:
         fate[STATUS] = 1.0 + DONE

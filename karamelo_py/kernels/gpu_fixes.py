@@ -79,7 +79,7 @@ def count_node(i, fate, s, about):
 
 def hooked_nodes(target: int, of_heat: bool = False) -> Callable:
     """Return the `nodes_of` of hooks on node components; temperatures as in FLIP."""
-    return lambda s: hook_loop.hooked_nodes(s, target, 1.0 if of_heat else s.control.clock[0].kept)
+    return lambda s: hook_loop.hooked_nodes(s, target, 1.0 if of_heat else s.control.step[0].kept)
 
 
 def whole_nodes(target: int, stage: int) -> Callable:
@@ -157,8 +157,8 @@ def check_point(i, fate, s, block):
 
 
 def take_moves(i, fate, s):
-    clock = s.control.clock[0]
-    clock.move = max(clock.move, fate[MOVED])
+    motion = s.control.motion[0]
+    motion.move = max(motion.move, fate[MOVED])
     fate[MOVED] = 0.0
 
 
@@ -286,13 +286,13 @@ def look_before(i, fate, s):
     """Store the energies for a look at the next step."""
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)
-    watch.note_before(s.control.clock[0], int(s.control.values[TIMESTEP]))
+    watch.note_before(s.control.energy[0], int(s.control.values[TIMESTEP]))
 
 
 def look_behind(i, fate, s):
     """Check the energy; spurious gain ends the run."""
-    clock = s.control.clock[0]
-    if clock.stored_at != int(s.control.values[TIMESTEP]) - 1:
+    energy = s.control.energy[0]
+    if energy.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)

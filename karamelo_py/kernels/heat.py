@@ -31,21 +31,21 @@ def at_heat_nodes(hooks, stage, target, s):
 @at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
     # Temperatures always as in FLIP.
-    clock = s.control.clock[0]
-    clock.set_low, clock.set_high = np.inf, -np.inf
+    heat = s.control.heat[0]
+    heat.set_low, heat.set_high = np.inf, -np.inf
     here = at_its_nodes(s)
     hook_loop.node_hooks(
         stage, hook_loop.hooked_nodes(here, target, 1.0), hooks, here, step_size(s)
     )
     agree_on_heat(s.control.ranks, s.control)
-    clock.coldest = min(clock.coldest, clock.set_low)
-    clock.hottest = max(clock.hottest, clock.set_high)
+    heat.coldest = min(heat.coldest, heat.set_low)
+    heat.hottest = max(heat.hottest, heat.set_high)
 
 
 def heated(s, block, then):
     points = block.points
     fields = [field(points.fields, kind) for kind in of_heat.HEATED]
-    return hook_loop.HeatedPoints(points.id, s.kin, *fields, points.x[s.control.clock[0].now])
+    return hook_loop.HeatedPoints(points.id, s.kin, *fields, points.x[s.control.motion[0].now])
 
 
 def heat_of(points):
@@ -59,12 +59,12 @@ def at_heated_points(hooks, s):
 
 @at_heated_points.on(arrays.Hooks)
 def _at_heated_points_hooks(hooks, s):
-    clock = s.control.clock[0]
-    clock.rise = clock.fall = 0.0
+    heat = s.control.heat[0]
+    heat.rise = heat.fall = 0.0
     hook_loop.point_hooks(arrays.SUPPLY_HEAT, 0, hooks, s, (heated, heat_of))
     agree_on_heat(s.control.ranks, s.control)
-    clock.hottest += step_size(s) * clock.rise
-    clock.coldest += step_size(s) * clock.fall
+    heat.hottest += step_size(s) * heat.rise
+    heat.coldest += step_size(s) * heat.fall
 
 
 def _of_heat(s):
@@ -76,9 +76,10 @@ def at_its_nodes(s):
     return _of_heat(s)._replace(kin=Line())
 
 
-def _take_factor(clock):
+def _take_factor(control):
     # Reported by `Warming`: how much faster conduction has become.
-    clock.heat_limit = clock.heat_reference / clock.new_rate
+    heat = control.heat[0]
+    heat.heat_limit = heat.heat_reference / control.motion[0].new_rate
 
 
 class AtHeatNodes(NamedTuple):

@@ -155,18 +155,19 @@ def _act_on_parts(members, task, call, k):
     private = record(hooks.apart, k)
     for i in range(control.values.size):
         private.values[i] = control.values[i]
-    clock, private_clock = control.clock[0], private.clock[0]
-    private_clock.last_dt, private_clock.kick = clock.last_dt, clock.kick
-    private_clock.contact_dt, private_clock.contact_kick = clock.contact_dt, clock.contact_kick
-    private_clock.set_low, private_clock.set_high = clock.set_low, clock.set_high
-    private_clock.rise, private_clock.fall = clock.rise, clock.fall
-    private_clock.coldest, private_clock.hottest = clock.coldest, clock.hottest
+    step, heat = control.step[0], control.heat[0]
+    my_step, my_heat = private.step[0], private.heat[0]
+    my_step.last_dt, my_step.kick = step.last_dt, step.kick
+    my_step.contact_dt, my_step.contact_kick = step.contact_dt, step.contact_kick
+    my_heat.set_low, my_heat.set_high = heat.set_low, heat.set_high
+    my_heat.rise, my_heat.fall = heat.rise, heat.fall
+    my_heat.coldest, my_heat.hottest = heat.coldest, heat.hottest
     here = hold(arrays.with_items(hooks, chosen=private.chosen, scratch=private.scratch))
-    mine = hold(
-        arrays.with_items(
-            control, values=private.values, totals=private.totals, clock=private.clock
-        )
+    values, sums = private.values, private.totals
+    own = arrays.with_items(
+        control, values=values, totals=sums, step=private.step, heat=private.heat
     )
+    mine = hold(own)
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(private.totals, control.totals, totals.WORK)
@@ -185,14 +186,14 @@ def _act_on_all(members, task, call):
         return
     parts = hooks.apart.chosen.shape[0]
     _act_on_parts(hooks.mode, parts, members, task, call)
-    clock = call.control.clock[0]
+    heat = call.control.heat[0]
     for k in range(parts):
-        private = hooks.apart.clock[k, 0]
-        clock.set_low = min(clock.set_low, private.set_low)
-        clock.set_high = max(clock.set_high, private.set_high)
-        clock.rise, clock.fall = max(clock.rise, private.rise), min(clock.fall, private.fall)
-        clock.coldest = min(clock.coldest, private.coldest)
-        clock.hottest = max(clock.hottest, private.hottest)
+        private = hooks.apart.heat[k, 0]
+        heat.set_low = min(heat.set_low, private.set_low)
+        heat.set_high = max(heat.set_high, private.set_high)
+        heat.rise, heat.fall = max(heat.rise, private.rise), min(heat.fall, private.fall)
+        heat.coldest = min(heat.coldest, private.coldest)
+        heat.hottest = max(heat.hottest, private.hottest)
 
 
 # --- formulas and totals ----------------------------------------------------------------------
@@ -228,7 +229,7 @@ def _evaluate_now_and_before(call, c, count):
     if call.hooks.table[call.h].uses_before:
         # Nothing precedes time 0.
         control = call.control
-        step_back = min(control.clock[0].last_dt, control.values[arrays.TIME])
+        step_back = min(control.step[0].last_dt, control.values[arrays.TIME])
         evaluate(call, c, count, BEFORE, -step_back)
 
 
@@ -436,8 +437,8 @@ def _change_update(members, call, c, q):
         hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
     elif not _is_of_rigid(hooks, n):
         work = 0.5 * impulse * moved
-    clock = call.control.clock[0]
-    clock.set_low, clock.set_high = min(clock.set_low, star), max(clock.set_high, star)
+    heat = call.control.heat[0]
+    heat.set_low, heat.set_high = min(heat.set_low, star), max(heat.set_high, star)
     nodes.update[n, c] = star
     nodes.update[n, change] = star - v
     return total, work, before
@@ -600,9 +601,9 @@ def at_nodes(hooks, stage, target, s):
 
 @at_nodes.on(arrays.Hooks)
 def _at_nodes_hooks(hooks, stage, target, s):
-    clock = s.control.clock[0]
-    node_hooks(stage, hooked_nodes(s, target, clock.kept), hooks, s, kick(s))
-    clock.set_low = clock.set_high = 0.0  # for temperatures only
+    step, heat = s.control.step[0], s.control.heat[0]
+    node_hooks(stage, hooked_nodes(s, target, step.kept), hooks, s, kick(s))
+    heat.set_low = heat.set_high = 0.0  # for temperatures only
 
 
 @point_function(otherwise=True)
@@ -652,7 +653,7 @@ def _act_on_motion(members, task, call, count):
             p = hooks.chosen[q]
             velocity, position, total = _call_point_function(
                 hooks.table[h].address, members.mass[p], v[c, p], members.x[c, p], y[c, p],
-                hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], call.dt, control.clock[0].kick,
+                hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q], call.dt, control.step[0].kick,
             )  # fmt: skip
             speed = float(v[c, p])
             first = hooks.scratch[BEFORE, q] if leads else speed
@@ -674,7 +675,7 @@ def _act_on_warmth(members, task, call, count):
     if hooks.programs[h, 1].begin >= 0:
         evaluate(call, 1, count, BEFORE, 0.0)
     slot = hooks.table[h].slot
-    clock = control.clock[0]
+    heat = control.heat[0]
     for q in range(count):
         p = hooks.chosen[q]
         before = members.supply[0, p]
@@ -693,9 +694,9 @@ def _act_on_warmth(members, task, call, count):
             T = hooks.scratch[BEFORE, q]
         elif members.capacity[0, p] > 0:
             rate = supply / members.capacity[0, p]
-            clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
+            heat.rise, heat.fall = max(heat.rise, rate), min(heat.fall, rate)
         if share == 0 or hooks.table[h].holds > 0:
-            clock.coldest, clock.hottest = min(clock.coldest, T), max(clock.hottest, T)
+            heat.coldest, heat.hottest = min(heat.coldest, T), max(heat.hottest, T)
     return 0
 
 
@@ -709,8 +710,8 @@ def _of_time(tag, kin, call):
                 values.append(call.hooks.scratch[VALUE, 0])
             else:
                 values.append(0.0)
-    clock = call.control.clock[0]
-    return (*values, clock.contact_dt, clock.contact_kick, clock.kick)
+    step = call.control.step[0]
+    return (*values, step.contact_dt, step.contact_kick, step.kick)
 
 
 @act.on(WholePoints)
@@ -740,8 +741,8 @@ def _act_on_whole_points(members, task, call, count):
             supply, capacity = members.heat
             if capacity[0, p] > 0:
                 rate = float(supply[0, p]) / float(capacity[0, p])
-                clock = control.clock[0]
-                clock.rise, clock.fall = max(clock.rise, rate), min(clock.fall, rate)
+                heat = control.heat[0]
+                heat.rise, heat.fall = max(heat.rise, rate), min(heat.fall, rate)
     return 0
 
 
@@ -784,7 +785,7 @@ def point_hooks(stage, then, hooks, s, arguments_of):
 
 
 def _positions(s, points, then):
-    now = s.control.clock[0].now
+    now = s.control.motion[0].now
     return points.x[now], points.x[1 - now if then else now]
 
 

@@ -56,10 +56,11 @@ def _largest(address, answer, numbers):
 
 @kernel
 def _agree_on_reports(address, control):
-    clock = control.clock[0]
-    numbers = clock.move, clock.new_move, clock.new_rate, float(clock.wrong)
-    clock.move, clock.new_move, clock.new_rate, wrong = _largest(address, control.answer, numbers)
-    clock.wrong = int(wrong)
+    motion = control.motion[0]
+    numbers = motion.move, motion.new_move, motion.new_rate, float(motion.wrong)
+    numbers = _largest(address, control.answer, numbers)
+    motion.move, motion.new_move, motion.new_rate = numbers[:3]
+    motion.wrong = int(numbers[3])
 
 
 @totals.agree_on_reports.on(Linked)
@@ -69,12 +70,12 @@ def _agree_on_reports_linked(ranks, control):
 
 @kernel
 def _agree_on_heat(address, control):
-    clock = control.clock[0]
-    lowest = clock.T_low, clock.coldest, clock.set_low, clock.fall
-    highest = clock.T_high, clock.hottest, clock.set_high, clock.rise, clock.own_heat
+    heat = control.heat[0]
+    lowest = heat.T_low, heat.coldest, heat.set_low, heat.fall
+    highest = heat.T_high, heat.hottest, heat.set_high, heat.rise, heat.own_heat
     numbers = _largest(address, control.answer, (*[-x for x in lowest], *highest))
-    clock.T_low, clock.coldest, clock.set_low, clock.fall = [-x for x in numbers[:4]]
-    clock.T_high, clock.hottest, clock.set_high, clock.rise, clock.own_heat = numbers[4:]
+    heat.T_low, heat.coldest, heat.set_low, heat.fall = [-x for x in numbers[:4]]
+    heat.T_high, heat.hottest, heat.set_high, heat.rise, heat.own_heat = numbers[4:]
 
 
 @totals.agree_on_heat.on(Linked)

@@ -75,7 +75,7 @@ def _add_forces(s, block, p):
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
     grid = record(s.grids, points.grid[p])
-    stencil = locate(basis, kin, grid, place_at(basis, kin, points.x[s.control.clock[0].now], p))
+    stencil = locate(basis, kin, grid, place_at(basis, kin, points.x[s.control.motion[0].now], p))
     first, turning = forces[points.id[p]], torques[points.id[p]]
     for node in range(support(basis, kin)):
         n, weight, _ = entry(basis, kin, grid, stencil, node)

@@ -179,12 +179,12 @@ def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
     the nodes of its tile. SORT depends on the points only, not on where a run resumes.
     """
     values = s.control.values
-    clock = s.control.clock[0]
+    stepping, motion = s.control.step[0], s.control.motion[0]
     if not begin(kind, s):
         return STOPPED
     for n in range(count):
         time = values[TIME] + values[DT]
-        last = n + 1 == count or time >= clock.end_time
+        last = n + 1 == count or time >= stepping.end_time
         if not step(kind, s, hooks, not last):
             return STOPPED
         clocks.finish(s.control)
@@ -192,11 +192,11 @@ def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
             return GAINED
         if not look_at_heat(s):
             return HEATED
-        if clock.watch_limit > 0 and clock.over_limit >= PATIENCE:
+        if stepping.watch_limit > 0 and stepping.over_limit >= PATIENCE:
             return ABOVE_LIMIT
-        if clock.limit < SMALLEST * clock.first_limit:
+        if stepping.limit < SMALLEST * stepping.first_limit:
             return SHRUNK
-        if clock.drift > clock.drift_limit:
+        if motion.drift > motion.drift_limit:
             return SORT
         if last:
             break
@@ -215,9 +215,9 @@ def advance(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
 @kernel
 def _fastest(frame, kin, points, laws, control):
     points, laws = at_hand(points), at_hand(laws)
-    clock = control.clock[0]
+    motion = control.motion[0]
     rate = 0.0
-    common = clocks.common_velocity(kin, clock, clock.rate)
+    common = clocks.common_velocity(kin, motion, motion.rate)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         f = deformation_of(frame, kin, points, (law, state), p)
@@ -225,11 +225,11 @@ def _fastest(frame, kin, points, laws, control):
         speed = sqrt(wave_speed_squared(law, kin, state) * shorter)
         v = load_vector(kin, points.v, p) - common
         rate = max(rate, speed + v.largest())
-    clock.rate = max(clock.rate, rate)
+    motion.rate = max(motion.rate, rate)
 
 
 def measure(s: Setup) -> None:
     """Store the present rate in the clock, for the first dt."""
-    s.control.clock[0].rate = 0.0
+    s.control.motion[0].rate = 0.0
     for block in s.blocks:
         _fastest(s.frame, s.kin, block.points, block.laws, s.control)

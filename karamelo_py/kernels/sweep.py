@@ -267,15 +267,15 @@ def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
 
 
 def context_of(s: Setup, extent: Extent) -> Context:
-    clock, (dt, gathers, scatters, moves) = s.control.clock[0], extent
+    step, motion, (dt, gathers, scatters, moves) = s.control.step[0], s.control.motion[0], extent
     # A little more: points are sorted whenever one did not fit (see run.tiles).
-    room = clock.drift_limit - clock.drift - clock.move + 0.5 * ROUNDING
+    room = motion.drift_limit - motion.drift - motion.move + 0.5 * ROUNDING
     return Context(
-        s.frame, s.kin, s.basis, in_step(s.transfer, clock.kept), s.averaging, s.grids, s.nodes,
-        s.buffers.nodes, clock.now, real(room, dt), real(clock.stride, dt),
-        common_velocity(s.kin, clock, dt),
-        1 - clock.now if moves else clock.now, gathers, scatters, dt,
-        real(clock.kick, dt),
+        s.frame, s.kin, s.basis, in_step(s.transfer, step.kept), s.averaging, s.grids, s.nodes,
+        s.buffers.nodes, motion.now, real(room, dt), real(motion.stride, dt),
+        common_velocity(s.kin, motion, dt),
+        1 - motion.now if moves else motion.now, gathers, scatters, dt,
+        real(step.kick, dt),
     )  # fmt: skip
 
 

@@ -373,8 +373,8 @@ def light_node(s):
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
-    clock = s.control.clock[0]
-    courant = clock.rate * s.control.values[arrays.DT] / clock.spacing
+    step, motion = s.control.step[0], s.control.motion[0]
+    courant = motion.rate * s.control.values[arrays.DT] / step.spacing
     masses = min(s.kin.dimension * courant * courant, 1.0)
     return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 

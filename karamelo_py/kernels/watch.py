@@ -117,10 +117,10 @@ def sum_energies(s, mode):
 
 def take_energies(s):
     totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
-    clock, answer = s.control.clock[0], s.control.answer
-    clock.kinetic = answer[totals.KINETIC]
-    clock.stored = answer[totals.STORED] + clock.born_with
-    clock.work = answer[totals.WORK]
+    energy, answer = s.control.energy[0], s.control.answer
+    energy.kinetic = answer[totals.KINETIC]
+    energy.stored = answer[totals.STORED] + energy.born_with
+    energy.work = answer[totals.WORK]
 
 
 @kernel
@@ -179,7 +179,7 @@ def take_drift(s):
         for i in range(free_from(s.kin), d):
             momentum = control.answer[k * (1 + d) + 1 + i]
             energy += 0.5 * momentum * momentum / mass if mass > 0 else 0.0
-    control.clock[0].of_drift = energy
+    control.energy[0].of_drift = energy
     note_crossing(control, d)
 
 
@@ -189,36 +189,36 @@ def note_crossing(control, d):
     Energy that leaves takes its path along; new energy has none. Vibrations renew it in the time of
     a wave there and back: transient waves count by what they move while they last.
     """
-    clock, row = control.clock[0], (control.firsts.size - 1) * (1 + d)
-    now, before = control.answer[row], clock.elastic
-    lasting = control.values[TIME] - clock.time_of_look
-    clock.time_of_look = control.values[TIME]
-    clock.elastic = max(now, 0.0)
+    energy, row = control.energy[0], (control.firsts.size - 1) * (1 + d)
+    now, before = control.answer[row], energy.elastic
+    lasting = control.values[TIME] - energy.time_of_look
+    energy.time_of_look = control.values[TIME]
+    energy.elastic = max(now, 0.0)
     if not now > 0:
         return
     moved = 0.0
     for i in range(d):
         moved += (control.answer[row + 1 + i] / now) ** 2
-    cells = lasting / clock.spacing
+    cells = lasting / control.step[0].spacing
     renewed = (
-        min(max((clock.kinetic - clock.of_drift) / now, 0.0), 1.0) * lasting / clock.to_and_fro
+        min(max((energy.kinetic - energy.of_drift) / now, 0.0), 1.0) * lasting / energy.to_and_fro
     )
     # The loss by a linear basis does not count as leaving.
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
-        clock.carried[0, i] = stays * clock.carried[0, i] + control.answer[row + 1 + i] * cells
+        energy.carried[0, i] = stays * energy.carried[0, i] + control.answer[row + 1 + i] * cells
 
 
 def _sum_before(s, mode, step):
     sum_energies(s, mode)
-    note_before(s.control.clock[0], step)
+    note_before(s.control.energy[0], step)
 
 
-def note_before(clock, step):
-    clock.stored_before = clock.stored
-    clock.moving_before = clock.kinetic - clock.work
-    clock.stored_at = step
+def note_before(energy, step):
+    energy.stored_before = energy.stored
+    energy.moving_before = energy.kinetic - energy.work
+    energy.stored_at = step
 
 
 def growth(first, later, unit):
@@ -230,127 +230,127 @@ def keeps(first, later, unit, within=WITHIN):
     return later - first <= within * unit
 
 
-def unit_of(clock):
+def unit_of(energy):
     """Return the unit of energy growth: the largest energy, with a limited part of drift."""
-    return max(clock.largest_own, DRIFTING * clock.largest_energy, clock.energy_floor)
+    return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 
 @kernel
 def judge(control):
     """Update the balance; return whether energy is within its bound."""
-    clock = control.clock[0]
+    energy = control.energy[0]
     # Mean of the balances at the middle and the end of a step, the other energy interpolated. With
     # the phase omega dt of a step, each oscillates by (omega dt)^2/8, in opposite phase, and the
     # mean by (omega dt)^3/16.
-    moving = clock.kinetic - clock.work
-    balance = moving + clock.level * (clock.moving_before - moving)
-    balance += clock.stored_before + clock.level * (clock.stored - clock.stored_before)
-    if clock.looks == 0:
-        clock.first_balance = balance
-        clock.first_work = clock.work
-    clock.looks += 1
-    clock.last_but_one, clock.last_balance = clock.last_balance, clock.balance
-    clock.balance = balance
-    clock.supplied = max(clock.supplied, abs(clock.work - clock.first_work))
-    clock.largest_energy = max(
-        clock.largest_energy, abs(clock.kinetic), abs(clock.stored), clock.supplied
+    moving = energy.kinetic - energy.work
+    balance = moving + energy.level * (energy.moving_before - moving)
+    balance += energy.stored_before + energy.level * (energy.stored - energy.stored_before)
+    if energy.looks == 0:
+        energy.first_balance = balance
+        energy.first_work = energy.work
+    energy.looks += 1
+    energy.last_but_one, energy.last_balance = energy.last_balance, energy.balance
+    energy.balance = balance
+    energy.supplied = max(energy.supplied, abs(energy.work - energy.first_work))
+    energy.largest_energy = max(
+        energy.largest_energy, abs(energy.kinetic), abs(energy.stored), energy.supplied
     )
-    vibrating = max(abs(clock.stored), clock.kinetic - clock.of_drift)
-    clock.largest_own = max(clock.largest_own, vibrating)
+    vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift)
+    energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
     for i in range(3):
-        way += clock.carried[0, i] * clock.carried[0, i]
-    if clock.elastic > 0:
-        way = sqrt(way) / clock.elastic
-        loss = clock.elastic * (exp(2 * PER_CELL * way) - 1) / unit_of(clock)
-        if loss > clock.lost:
-            clock.lost = loss
-            clock.crossed = way
+        way += energy.carried[0, i] * energy.carried[0, i]
+    if energy.elastic > 0:
+        way = sqrt(way) / energy.elastic
+        loss = energy.elastic * (exp(2 * PER_CELL * way) - 1) / unit_of(energy)
+        if loss > energy.lost:
+            energy.lost = loss
+            energy.crossed = way
     # Means: a single look also shows the shortest waves.
-    unit = unit_of(clock)
-    if clock.looks == FEW:
-        clock.first_few = clock.first_mean = clock.largest_mean = (
-            balance + clock.last_balance + clock.last_but_one
+    unit = unit_of(energy)
+    if energy.looks == FEW:
+        energy.first_few = energy.first_mean = energy.largest_mean = (
+            balance + energy.last_balance + energy.last_but_one
         ) / FEW
-    if clock.looks >= 2 * FEW:
+    if energy.looks >= 2 * FEW:
         # The minimum of a few: a look or two may be wrong in collisions. Stored: the result does
         # not depend on the last look.
-        least = min(balance, clock.last_balance, clock.last_but_one)
-        clock.grown = max(clock.grown, growth(clock.first_few, least, unit))
-    clock.sum_of_balance += balance
-    if clock.looks % LOOKS == 0:
-        mean = clock.sum_of_balance / LOOKS
-        clock.sum_of_balance = 0.0
-        if clock.looks == LOOKS:
-            clock.first_mean = clock.largest_mean = mean
-        clock.growth = growth(clock.largest_mean, mean, unit)
-        clock.windows = clock.windows + 1 if clock.growth > GROWTH else 0
-        clock.grown = max(clock.grown, growth(clock.first_mean, mean, unit))
-        clock.largest_mean = max(clock.largest_mean, mean)
-    reference = abs(clock.first_balance) + clock.supplied
+        least = min(balance, energy.last_balance, energy.last_but_one)
+        energy.grown = max(energy.grown, growth(energy.first_few, least, unit))
+    energy.sum_of_balance += balance
+    if energy.looks % LOOKS == 0:
+        mean = energy.sum_of_balance / LOOKS
+        energy.sum_of_balance = 0.0
+        if energy.looks == LOOKS:
+            energy.first_mean = energy.largest_mean = mean
+        energy.growth = growth(energy.largest_mean, mean, unit)
+        energy.windows = energy.windows + 1 if energy.growth > GROWTH else 0
+        energy.grown = max(energy.grown, growth(energy.first_mean, mean, unit))
+        energy.largest_mean = max(energy.largest_mean, mean)
+    reference = abs(energy.first_balance) + energy.supplied
     # In this form, NaN is noticed.
-    return balance - clock.first_balance <= max(BOUND * reference, clock.energy_floor)
+    return balance - energy.first_balance <= max(BOUND * reference, energy.energy_floor)
 
 
 @kernel
 def _range_of_heat(kin, points, laws, control):
-    clock = control.clock[0]
+    heat = control.heat[0]
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
             # In this form, NaN is noticed.
-            clock.T_low = T if not clock.T_low <= T else clock.T_low
-            clock.T_high = T if not clock.T_high >= T else clock.T_high
+            heat.T_low = T if not heat.T_low <= T else heat.T_low
+            heat.T_high = T if not heat.T_high >= T else heat.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)
-            clock.own_heat = max(clock.own_heat, float(work) / float(capacity))
+            heat.own_heat = max(heat.own_heat, float(work) / float(capacity))
 
 
 def measure_heat(s):
-    clock = s.control.clock[0]
-    clock.T_low, clock.T_high, clock.own_heat = inf, -inf, 0.0
+    heat = s.control.heat[0]
+    heat.T_low, heat.T_high, heat.own_heat = inf, -inf, 0.0
     for block in s.blocks:
         _range_of_heat(s.kin, known_to_laws(block.points), block.laws, s.control)
 
 
 def look_at_heat(s):
     """Return whether temperatures are within what fixes, sources and initial state allow."""
-    clock = s.control.clock[0]
-    if clock.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
+    heat = s.control.heat[0]
+    if heat.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
     measure_heat(s)
     totals.agree_on_heat(s.control.ranks, s.control)
-    largest = max(abs(clock.coldest), abs(clock.hottest))
-    room = OVERSHOOT * (clock.hottest - clock.coldest + clock.own_heat) + HEAT_NOISE * largest
-    above = clock.hottest + clock.own_heat + room
-    return clock.T_low >= clock.coldest - room and clock.T_high <= above
+    largest = max(abs(heat.coldest), abs(heat.hottest))
+    room = OVERSHOOT * (heat.hottest - heat.coldest + heat.own_heat) + HEAT_NOISE * largest
+    above = heat.hottest + heat.own_heat + room
+    return heat.T_low >= heat.coldest - room and heat.T_high <= above
 
 
 def begin_to_look(s, mode, level, anew):
     """Store energies if a look is due; `level`: fraction of the later stored energy in balances."""
-    clock = s.control.clock[0]
-    clock.level = level
+    energy = s.control.energy[0]
+    energy.level = level
     if anew:
-        clock.looks = 0
-        clock.windows = 0
-        clock.growth = clock.grown = clock.supplied = 0.0
-        clock.sum_of_balance = clock.largest_energy = clock.largest_own = 0.0
-        clock.time_of_look = s.control.values[TIME]
+        energy.looks = 0
+        energy.windows = 0
+        energy.growth = energy.grown = energy.supplied = 0.0
+        energy.sum_of_balance = energy.largest_energy = energy.largest_own = 0.0
+        energy.time_of_look = s.control.values[TIME]
     step = int(s.control.values[TIMESTEP])
-    if step % LOOK == 0 and (anew or clock.stored_at != step):
+    if step % LOOK == 0 and (anew or energy.stored_at != step):
         _sum_before(s, mode, step)
 
 
 def look(s, mode):
     """Check the energy if due; return whether it is within its bound."""
-    clock = s.control.clock[0]
-    if clock.watch_energy == 0:
+    energy = s.control.energy[0]
+    if energy.watch_energy == 0:
         return True
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0:
         _sum_before(s, mode, step)
-    elif step % LOOK == 1 and clock.stored_at == step - 1:
+    elif step % LOOK == 1 and energy.stored_at == step - 1:
         sum_energies(s, mode)
         _sum_drift(s)
         return judge(s.control)
@@ -359,7 +359,7 @@ def look(s, mode):
 
 def look_at_end(s, mode):
     """Check the energy after an implicit step: velocities and stresses are of one time."""
-    if s.control.clock[0].watch_energy == 0:
+    if s.control.energy[0].watch_energy == 0:
         return True
     _sum_before(s, mode, int(s.control.values[TIMESTEP]))
     _sum_drift(s)

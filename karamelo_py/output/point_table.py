@@ -256,7 +256,7 @@ def absent(columns: dict[str, Callable | None], present: set[str] = frozenset())
 
 
 def _place(s: Setup, points: Points) -> np.ndarray:
-    return points.x[s.control.clock[0].now][: s.kin.dimension]
+    return points.x[s.control.motion[0].now][: s.kin.dimension]
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
@@ -273,7 +273,7 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
     kept = fields.field(points.fields, Moment)
     moment = kept.copy()
     if s.transfer.traits.keeps_gradient:
-        where = points.x[s.control.clock[0].now] if points.home is None else points.home
+        where = points.x[s.control.motion[0].now] if points.home is None else points.home
         at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)
         export.export_velocity_moment(at, kept, moment)
     if not s.frame.moves:

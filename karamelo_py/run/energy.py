@@ -63,41 +63,42 @@ class EnergyWatch:
     Besides the kernels, only this class writes them to the clock.
     """
 
-    def __init__(self, simulation: SceneState):
-        self.simulation, self.clock = simulation, simulation.control.clock[0]
+    def __init__(self, simulation: Backend):
+        self.simulation, self.control = simulation, simulation.control
+        self.watch, self.heat = self.control.energy[0], self.control.heat[0]
         self.followed = False  # the balance is up to date
         self.told_of_growth = False  # since tracking began
         self.told_of_loss = False
 
     def begin(self, *, set_anew: bool) -> None:
         """Begin, or continue unless fields were `set_anew` since the last step."""
-        simulation, clock = self.simulation, self.clock
+        simulation, watch, heat = self.simulation, self.watch, self.heat
         update = simulation.hub.update
-        clock.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)
+        watch.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)
         anew = not self.followed or set_anew
         self.followed = simulation.moves  # load steps are not in the balance
         if anew:
             self.told_of_growth = self.told_of_loss = False
-        if clock.watch_energy:
+        if watch.watch_energy:
             # Velocities are half a step old, stresses by the fraction strained before.
             self._begin_to_look(0.25 + 0.5 * update.scheme.traits.strained_before, anew)
         known = simulation.notes_temperatures and not unknown_heat(simulation.hub)
-        clock.watch_heat = int(update.thermal and known)
-        if clock.watch_heat and anew:
+        heat.watch_heat = int(update.thermal and known)
+        if heat.watch_heat and anew:
             measure_heat(simulation.setup)
             agree_on_heat(simulation.control.ranks, simulation.control)
-            clock.coldest, clock.hottest = clock.T_low, clock.T_high
+            heat.coldest, heat.hottest = heat.T_low, heat.T_high
 
     def _begin_to_look(self, level: float, anew: bool) -> None:
-        simulation, clock = self.simulation, self.clock
+        simulation, watch, motion = self.simulation, self.watch, self.control.motion[0]
         points = simulation.points
         strain = COARSE * float(np.finfo(simulation.setup.nodes.sums.dtype).eps)
-        clock.energy_floor = (
-            max(ROUND_OFF, strain**2) * points.total("mass") * float(clock.rate) ** 2
+        watch.energy_floor = (
+            max(ROUND_OFF, strain**2) * points.total("mass") * float(motion.rate) ** 2
         )
-        clock.born_with = points.total("born with")
+        watch.born_with = points.total("born with")
         if anew:
-            clock.to_and_fro = 2 * self._length() / max(float(clock.wave or clock.rate), 1e-300)
+            watch.to_and_fro = 2 * self._length() / max(float(motion.wave or motion.rate), 1e-300)
         # Energies are summed by tile.
         if not simulation.in_tiles():
             simulation.sort()
@@ -117,18 +118,18 @@ class EnergyWatch:
 
     def energy(self) -> float:
         """Sum kinetic, stored and dissipated energy minus work; NaN if not tracked."""
-        simulation, clock = self.simulation, self.simulation.control.clock
-        if not simulation.in_tiles() or not clock[0].watch_energy:
+        simulation, watch = self.simulation, self.watch
+        if not simulation.in_tiles() or not watch.watch_energy:
             return np.nan
-        present = clock.copy()
+        present = self.control.energy.copy()
         sum_energies(simulation.setup, simulation.mode)
-        energy = float(clock[0].kinetic + clock[0].stored - clock[0].work)
-        clock[:] = present
+        energy = float(watch.kinetic + watch.stored - watch.work)
+        self.control.energy[:] = present
         return energy
 
     def has_grown(self) -> bool:
-        clock = self.clock
-        return bool(clock.watch_energy and (clock.windows >= TOLD or clock.grown > WITHIN))
+        watch = self.watch
+        return bool(watch.watch_energy and (watch.windows >= TOLD or watch.grown > WITHIN))
 
     def has_lost(self, within: float) -> bool:
         clock = self.clock
@@ -136,39 +137,39 @@ class EnergyWatch:
 
     def share_lost(self) -> float:
         """Fraction of the largest energy lost since the first step; negative: a gain."""
-        clock = self.clock
-        mean = (clock.balance + clock.last_balance + clock.last_but_one) / FEW
-        return -growth(clock.first_balance, mean, max(clock.largest_energy, clock.energy_floor))
+        watch = self.watch
+        mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
+        return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
 
     def grown_little(self) -> bool:
         """Return True if energy and last step show no fault in the present state."""
-        clock = self.clock
-        swings = clock.watch_heat and clock.last_dt > BORNE * clock.heat_limit
+        watch, heat = self.watch, self.heat
+        swings = heat.watch_heat and self.control.step[0].last_dt > BORNE * heat.heat_limit
         if swings or self.has_grown():
             return False
-        if not clock.watch_energy:
+        if not watch.watch_energy:
             return True
         # Include the last window: noise that grows by half in 100 steps is in the state.
-        before = clock.first_mean if clock.looks >= FEW else clock.first_balance
-        return bool(keeps(before, clock.balance, unit_of(clock)))
+        before = watch.first_mean if watch.looks >= FEW else watch.first_balance
+        return bool(keeps(before, watch.balance, unit_of(watch)))
 
     def growth_since(self, before: float) -> float:
         """Return energy growth relative to `before`; NaN if not tracked."""
-        unit = max(abs(before), float(self.clock.energy_floor), 1e-300)
+        unit = max(abs(before), float(self.watch.energy_floor), 1e-300)
         return growth(before, self.energy(), unit)
 
     def change(self) -> float | None:
-        if not self.clock.watch_energy or self.clock.looks <= FEW:
+        if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
         # From the first balance, not `first_few`, which `forget_growth` changes.
         return -100 * self.share_lost()
 
     def forget_growth(self) -> None:
         """Measure growth from the present state, after a warning."""
-        clock = self.clock
-        clock.first_few = clock.first_mean = clock.largest_mean
-        clock.windows, clock.grown = 0, 0.0
+        watch = self.watch
+        watch.first_few = watch.first_mean = watch.largest_mean
+        watch.windows, watch.grown = 0, 0.0
 
     def without(self, stored: float) -> None:
-        self.clock.stored_before -= stored
-        self.clock.moving_before += stored
+        self.watch.stored_before -= stored
+        self.watch.moving_before += stored

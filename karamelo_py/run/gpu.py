@@ -407,10 +407,11 @@ class StepsOnCard:
     def advance(self, count: int) -> int:
         """Take up to `count` steps; return DONE or why they ended."""
         control = self.s.control
-        exchanged = [self.fate, control.clock, control.values, control.totals]
+        records = control.step, control.motion, control.energy, control.heat
+        exchanged = [self.fate, *records, control.values, control.totals]
         self.fate[: gpu.DRIFT] = 0
         self.images.send(exchanged)
-        begun, watched = int(control.values[arrays.TIMESTEP]), control.clock[0].watch_energy
+        begun, watched = int(control.values[arrays.TIMESTEP]), control.energy[0].watch_energy
         do = self._do
         do["begin"]()
         if self.begin:  # else points are listed in the first step

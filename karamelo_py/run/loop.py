@@ -111,7 +111,7 @@ class RunLoop:
         hub, file = self.hub, self.hub.restart.path
         hub.restart.take(hub, self.rollback.point, outputs=True)
         hub.restart = hub.interpreter.replay = None
-        watched = simulation.control.clock[0].watch_limit
+        watched = simulation.control.step[0].watch_limit
         self.ruined = not watched and simulation.step > self.first_step
         simulation.go_on(self.end_time, self.rollback.point.halvings)
         self.tell(lambda to: to.begun(self, simulation, resumed=True))
@@ -181,7 +181,7 @@ class RunLoop:
 
     def _steps_left(self, simulation: Backend) -> bool:
         # A limit load also ends a run, at the time reached.
-        end_time = simulation.control.clock[0].end_time
+        end_time = simulation.control.step[0].end_time
         return simulation.step < self.last_step and simulation.time < end_time
 
     def _condition_allows(self) -> bool:

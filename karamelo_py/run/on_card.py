@@ -149,7 +149,7 @@ class SimulationOnCard(Simulation):
             status = super()._advance_to(self.step + 1)
             if status != DONE or self.step >= target:
                 return status
-        if self.step >= target or self.time >= self.control.clock[0].end_time:
+        if self.step >= target or self.time >= self.control.step[0].end_time:
             return DONE
         steps = self.launches()
         if not self._sent:

@@ -210,14 +210,14 @@ class RollBack:
         """Write the last state before step `end` without an energy gain."""
         simulation, good = self.simulation, self.point
         good.return_to(simulation)
-        clock = simulation.control.clock[0]
-        before = float(clock.balance)
-        while clock.watch_energy and simulation.step + LOOK < end:
+        energy = simulation.control.energy[0]
+        before = float(energy.balance)
+        while energy.watch_energy and simulation.step + LOOK < end:
             look = simulation.step + LOOK - (simulation.step - 1) % LOOK
             healthy = good.again(simulation.advance, look) == DONE
             if not (healthy and simulation.energy_watch.grown_little()):
                 break
-            if clock.balance - before < GROWTH * unit_of(clock):
+            if energy.balance - before < GROWTH * unit_of(energy):
                 good.keep(simulation, forget=False)
         good.return_to(simulation)
         return self._write_last_good()

@@ -35,8 +35,7 @@ from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
-from karamelo_py.run.step_size import CARRIED
-from karamelo_py.run.tiles import WholeDomain
+from karamelo_py.run.step_size import carried_on
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import foreign_parts
@@ -116,7 +115,7 @@ class SceneArrays:
 
     @property
     def now(self) -> int:
-        return int(self.control.clock[0].now)
+        return int(self.control.motion[0].now)
 
     @property
     def dt(self) -> float:
@@ -151,7 +150,7 @@ class SceneArrays:
             self.setup.grids,
             {type(one): one.array for one in self.setup.nodes.fields if fields.is_kept(type(one))},
             self.setup.contact,
-            {name: float(self.control.clock[0][name]) for name in CARRIED},
+            carried_on(self.control),
         )
 
     def leaving(self) -> np.ndarray:
@@ -191,8 +190,8 @@ class SceneArrays:
 
     def sort_if_due(self) -> None:
         """Sort the points if one may have left its tile's reach, or none is sorted."""
-        clock = self.control.clock[0]
-        if clock.drift > clock.drift_limit:
+        motion = self.control.motion[0]
+        if motion.drift > motion.drift_limit:
             self.sort()
 
     def bring(self) -> None:

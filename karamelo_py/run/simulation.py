@@ -141,7 +141,7 @@ class Simulation(SceneArrays):
         Load steps call `between` with a progress message and end if it returns True.
         """
         self.between = between
-        self.control.clock[0].wrong = 0  # from earlier steps that were not undone
+        self.control.motion[0].wrong = 0  # from earlier steps that were not undone
         with self.comm.joint():
             from_python = bool(self.fixes.lasting.in_python) or self.begins
             self.domain.begin(self.hooks, from_python=from_python)
@@ -160,7 +160,7 @@ class Simulation(SceneArrays):
             self.mapped = True
             if status != SORT:
                 return status
-            if self.step >= target or self.time >= self.control.clock[0].end_time:
+            if self.step >= target or self.time >= self.control.step[0].end_time:
                 return DONE
 
     def _advance(self, count: int) -> int:

@@ -29,7 +29,6 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.traits import USUAL
 from karamelo_py.script.errors import ScriptError
 
-CARRIED = ("last_dt", "last_contact_dt", "path")  # from one lowering to the next
 FAR = 1e9  # cells, further than points ever move
 
 
@@ -66,15 +65,28 @@ class StepPolicy(NamedTuple):
         }
 
 
-def set_up(control: Control, hub: Hub, transfer: Tag, last: dict[str, float]) -> None:
+class Carried(NamedTuple):
+    """Numbers of the clock that the next lowering takes over."""
+
+    last_dt: float
+    last_contact_dt: float
+    path: float
+
+
+def carried_on(control: Control) -> Carried:
+    step = control.step[0]
+    return Carried(float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path))
+
+
+def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> None:
     """Set the clock of new arrays, continuing after the `last` steps."""
-    clock = control.clock[0]
-    for name, value in last.items():
-        clock[name] = value
-    clock.spacing = min(lattice.h for lattice in hub.lattices)
-    clock.heat_limit = clock.heat_reference = stable_conduction(hub)
-    clock.kept = flip_coefficient(transfer)
-    clock.kept_by_time = clock.kept * transfer.traits.per_time
+    step, heat = control.step[0], control.heat[0]
+    if last is not None:
+        step.last_dt, step.last_contact_dt, control.motion[0].path = last
+    step.spacing = min(lattice.h for lattice in hub.lattices)
+    heat.heat_limit = heat.heat_reference = stable_conduction(hub)
+    step.kept = flip_coefficient(transfer)
+    step.kept_by_time = step.kept * transfer.traits.per_time
 
 
 class StepSize:
@@ -84,22 +96,22 @@ class StepSize:
 
     def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
-        self.clock = simulation.control.clock[0]
-        self.measured = False  # clock.rate belongs to the present state
+        self.step, self.motion = self.control.step[0], self.control.motion[0]
+        self.measured = False  # motion.rate belongs to the present state
 
     def begin(self, end_time: float) -> None:
         self.policy = StepPolicy.of(self.simulation.hub)
         self._ask(0)
-        self.clock.end_time = end_time
-        self.clock.over_limit = 0
+        self.step.end_time = end_time
+        self.step.over_limit = 0
         self._choose()
 
     def begun(self) -> None:
         """Choose the first step again, as initial values may change the fastest point."""
-        simulation, clock = self.simulation, self.clock
-        in_hundred_steps = 100 * simulation.fastest() * clock.courant * clock.dt_factor
-        if simulation.step == 0 and in_hundred_steps > STILL * clock.rate:
-            clock.path = np.inf
+        simulation, step, motion = self.simulation, self.step, self.motion
+        in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
+        if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
+            motion.path = np.inf
             self._ask(0)
         self._choose()
         if not np.isfinite(simulation.dt):
@@ -110,24 +122,20 @@ class StepSize:
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
         # A body at rest without waves has no first limit to compare with.
-        if (
-            clock.first_limit == 0
-            and np.isfinite(self.limit)
-            and not simulation.hub.update.fixed_dt
-        ):
-            clock.first_limit = self.limit
+        if step.first_limit == 0 and np.isfinite(self.limit) and not simulation.hub.update.fixed_dt:
+            step.first_limit = self.limit
         self._watch_limit()
 
     def go_on(self, end_time: float, halvings: int) -> None:
-        clock, self.policy = self.clock, StepPolicy.of(self.simulation.hub)
-        other_end, clock.end_time = clock.end_time != end_time, end_time
-        over_limit = clock.over_limit
+        step, self.policy = self.step, StepPolicy.of(self.simulation.hub)
+        other_end, step.end_time = step.end_time != end_time, end_time
+        over_limit = step.over_limit
         if self._ask(halvings):
             self._choose()
             self._watch_limit()
         elif other_end:
             choose_dt(self.control)
-            clock.over_limit = over_limit
+            step.over_limit = over_limit
 
     def halve(self, times: int) -> None:
         self._ask(times)
@@ -135,74 +143,74 @@ class StepSize:
         self._watch_limit()
 
     def end_here(self) -> float:
-        time = self.clock.end_time = float(self.control.values[TIME])
+        time = self.step.end_time = float(self.control.values[TIME])
         return time
 
     def load_step(self, dt: float) -> None:
-        self.control.values[DT] = self.clock.kick = self.clock.last_dt = dt
+        self.control.values[DT] = self.step.kick = self.step.last_dt = dt
 
     def anew(self) -> None:
-        self.clock.last_dt = 0.0
+        self.step.last_dt = 0.0
 
     @contextmanager
     def altered(self, **fields: float) -> Iterator[None]:
-        before = {name: float(self.clock[name]) for name in fields}
+        before = {name: float(self.step[name]) for name in fields}
         for name, value in fields.items():
-            self.clock[name] = value
+            self.step[name] = value
         try:
             yield
         finally:
             for name, value in before.items():
-                self.clock[name] = value
+                self.step[name] = value
 
     def _ask(self, halvings: int) -> bool:
-        simulation, clock = self.simulation, self.clock
-        numbers = self.policy.numbers(float(clock.path), halvings)
+        simulation, step, motion = self.simulation, self.step, self.motion
+        numbers = self.policy.numbers(float(motion.path), halvings)
         numbers["first_kick"] = 0.5 if simulation.hub.update.half_start else 1.0
-        numbers["stride"] = FAR if simulation.implicit else 1.0
-        before = {name: clock[name] for name in numbers}
+        before = {name: step[name] for name in numbers}
         for name, number in numbers.items():
-            clock[name] = number
-        if self.policy.weight != clock.weight:
-            clock.weight, self.measured = self.policy.weight, False
-        return numbers != before
+            step[name] = number
+        stride, motion.stride = motion.stride, FAR if simulation.implicit else 1.0
+        if self.policy.weight != motion.weight:
+            motion.weight, self.measured = self.policy.weight, False
+        return numbers != before or motion.stride != stride
 
     def _choose(self) -> None:
         if not self.measured:
             # Else the last step has measured: runs in pieces take the steps of a whole run.
-            simulation, clock = self.simulation, self.clock
-            clock.common[:] = common_velocity(simulation, float(clock.weight))
+            simulation, motion = self.simulation, self.motion
+            motion.common[:] = common_velocity(simulation, float(motion.weight))
             self._measure()
-            clock.wave = clock.speed = 0.0
-            if clock.weight != 1:
-                clock.wave = clock.rate - simulation.fastest(clock.common[0])
-                clock.speed = simulation.fastest() / clock.spacing
+            motion.wave = motion.speed = 0.0
+            if motion.weight != 1:
+                motion.wave = motion.rate - simulation.fastest(motion.common[0])
+                motion.speed = simulation.fastest() / self.step.spacing
             self.measured = True
         choose_dt(self.control)
 
     def _measure(self) -> None:
         measure(self.simulation.setup)
-        self.clock.rate = self.simulation.comm.allreduce_max(np.array([self.clock.rate]))[0]
+        self.motion.rate = self.simulation.comm.allreduce_max(np.array([self.motion.rate]))[0]
 
     def rate_with(self, weight: float) -> float:
-        clock = self.clock
-        common, rate = clock.common.copy(), float(clock.rate)
-        clock.common[:] = common_velocity(self.simulation, weight)
+        motion = self.motion
+        common, rate = motion.common.copy(), float(motion.rate)
+        motion.common[:] = common_velocity(self.simulation, weight)
         self._measure()
-        other = float(clock.rate)
-        clock.common[:], clock.rate = common, rate
+        other = float(motion.rate)
+        motion.common[:], motion.rate = common, rate
         return other
 
     @property
     def limit(self) -> float:
-        return float(self.clock.limit)
+        return float(self.step.limit)
 
     @property
     def limit_moving(self) -> float:
         """Stable step of points that cross cells, the basis of a script's fractions."""
-        clock = self.clock
-        waves = clock.courant_moving * clock.spacing / clock.rate if clock.rate > 0 else np.inf
-        return float(min(waves, clock.heat_limit))
+        step, rate = self.step, self.motion.rate
+        waves = step.courant_moving * step.spacing / rate if rate > 0 else np.inf
+        return float(min(waves, self.control.heat[0].heat_limit))
 
     def above_limit(self) -> bool:
         explicit = not self.simulation.implicit
@@ -211,12 +219,12 @@ class StepSize:
     @property
     def too_large(self) -> bool:
         """True if the step exceeded the stability limit from the start of the run."""
-        return not self.clock.watch_limit and not self.simulation.implicit
+        return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:
         """Watch the limit, unless the user's step exceeds it from the start."""
-        self.clock.watch_limit = int(not self.above_limit() and not self.simulation.implicit)
-        self.clock.over_limit = 0
+        self.step.watch_limit = int(not self.above_limit() and not self.simulation.implicit)
+        self.step.over_limit = 0
 
     @property
     def ruling_limit(self) -> str:
@@ -227,25 +235,26 @@ class StepSize:
         ``light_nodes``: usl and :mod:`karamelo_py.run.light_nodes`; ``lone_points``: points with
         moments; ``waves``: the rest.
         """
-        simulation, clock, dt = self.simulation, self.clock, self.control.values[DT]
-        if clock.fixed_dt > 0:
+        simulation, step, motion = self.simulation, self.step, self.motion
+        dt, heat = self.control.values[DT], self.control.heat[0]
+        if step.fixed_dt > 0:
             return "set_dt"
-        waves = clock.courant * clock.spacing / clock.rate if clock.rate > 0 else inf
-        of_waves, of_heat = clock.dt_factor * waves, clock.heat_factor * clock.heat_limit
-        if clock.weight != 1 and clock.speed * dt * (1 + 1e-9) >= STRIDE:
+        waves = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
+        of_waves, of_heat = step.dt_factor * waves, step.heat_factor * heat.heat_limit
+        if motion.weight != 1 and motion.speed * dt * (1 + 1e-9) >= STRIDE:
             return "speed"
         if dt < min(of_waves, of_heat) * (1 - 1e-9):
             return "end"
         if of_heat < of_waves:
             return "conduction"
-        speed = simulation.fastest(clock.common[0])
-        if speed > 0.5 * clock.rate:
+        speed = simulation.fastest(motion.common[0])
+        if speed > 0.5 * motion.rate:
             return "speed"
         undeformed = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
         without = max(wave for wave, _ in undeformed)
         slowed = any(viscous for _, viscous in undeformed)
-        if slowed and 0 < without < (clock.rate - speed) / 1.2:
+        if slowed and 0 < without < (motion.rate - speed) / 1.2:
             return "viscosity"
-        if clock.courant < 1:
-            return "lone_points" if clock.courant == lone_point(simulation.hub) else "light_nodes"
+        if step.courant < 1:
+            return "lone_points" if step.courant == lone_point(simulation.hub) else "light_nodes"
         return "waves"

@@ -139,10 +139,10 @@ class Tiles:
 
     def unsort(self, control: Control, *, limit: float | None = None) -> None:
         """Sort the points before the next step; `limit` replaces the drift limit."""
-        clock = control.clock[0]
-        clock.drift = np.inf
+        motion = control.motion[0]
+        motion.drift = np.inf
         if limit is not None:
-            clock.drift_limit = limit
+            motion.drift_limit = limit
 
     def sort(self, s: Setup) -> None:
         """Sort all points by tile, find the nodes in use, and zero the sums at all others.
@@ -150,12 +150,12 @@ class Tiles:
         The next step zeroes used nodes; boxes are zero between steps.
         """
         before = grid_boxes.used(s.spans)[1:].copy()
-        clock = s.control.clock[0]
+        motion = s.control.motion[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
-        limit = min(max(LEAST_DRIFT[self.dimension], steps * clock.pace), most)
+        limit = min(max(LEAST_DRIFT[self.dimension], steps * motion.pace), most)
         # Deleted points leave an infinite drift, in the total frame too.
-        clock.drift_limit = limit if s.frame.moves else np.finfo(float).max
-        clock.drift = clock.pace = 0.0
+        motion.drift_limit = limit if s.frame.moves else np.finfo(float).max
+        motion.drift = motion.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
         self.occupied = len(set().union(*(tiles.tolist() for tiles in occupied)))
         self.lay_out(s)
@@ -170,12 +170,12 @@ class Tiles:
             far = sorting.widest(at)
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
-        drift = s.control.clock[0].drift_limit + rounding if s.frame.moves else 0.0
+        drift = s.control.motion[0].drift_limit + rounding if s.frame.moves else 0.0
         beyond = far + drift + grid_boxes.beyond(s.contact)
         return beyond if far < cells else cells  # also for NaN
 
-    def _where(self, s: Setup, points: Points) -> np.ndarray:
-        return points.x[s.control.clock[0].now] if points.home is None else points.home
+    def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
+        return points.x[s.control.motion[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
         x, ends = self._where(s, points), np.empty((self.threads, self.count), np.int64)

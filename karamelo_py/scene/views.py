@@ -87,9 +87,9 @@ class View:
 
     def _take_times(self, control: arrays.Control) -> None:
         self.dt = float(control.values[arrays.DT])
-        self.kick = float(control.clock[0].kick)
-        self.contact_dt = float(control.clock[0].contact_dt)
-        self.contact_kick = float(control.clock[0].contact_kick)
+        self.kick = float(control.step[0].kick)
+        self.contact_dt = float(control.step[0].contact_dt)
+        self.contact_kick = float(control.step[0].contact_kick)
         self.time = float(control.values[arrays.TIME])
 
     def write_back(self) -> None:

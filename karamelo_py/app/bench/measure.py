@@ -284,8 +284,8 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
     while count < 3 or (time.perf_counter() - begun < seconds and count < MOST_STEPS):
         _take_step(simulation, timed)
         count += 1
-        clock = s.control.clock[0]
-        if clock.drift > clock.drift_limit:  # tiles are out of date
+        motion = s.control.motion[0]
+        if motion.drift > motion.drift_limit:  # tiles are out of date
             simulation.sort()
             begin(StepKind(scheme, Fused(), simulation.mode), s)
     of_points, of_nodes = (

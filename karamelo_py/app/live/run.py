@@ -67,8 +67,8 @@ class RunPage(Rhythmic, Listener):
         self.every = hub.output.log.every  # a run starts with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
-        clock = simulation.control.clock[0]
-        has_gain = clock.watch_energy and clock.looks >= FEW  # mean over these
+        watch = simulation.control.energy[0]
+        has_gain = watch.watch_energy and watch.looks >= FEW  # mean over these
         gain = -100 * simulation.energy_watch.share_lost() if has_gain else None
         why = unknown_work(hub)
         self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""

@@ -43,7 +43,7 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
     for name, array in kept_at_nodes(s):
         yield f"kept/{name}", array
     for k, block in enumerate(s.blocks):
-        now = s.control.clock[0].now  # known once the clock is restored
+        now = s.control.motion[0].now  # known once the clock is restored
         for name, array in arrays_of(block.points):
             # The other positions belong to the step before.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
@@ -210,7 +210,7 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
         if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:
-        block.points.x[:] = block.points.x[s.control.clock[0].now]
+        block.points.x[:] = block.points.x[s.control.motion[0].now]
     if "values" in state:
         s.control.values[:] = state["values"]
     for memory in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
@@ -344,7 +344,7 @@ def check_numbers(simulation: SceneState, arrays: ArraysByName) -> None:
         ends[points + "id"] = simulation.count
         ends[points + "grid"] = ends[tiling + "grid"] = len(s.grids.x0)
         # Ranges still hold points deleted since the last sort; the next step sorts first.
-        sorted_since = np.isfinite(np.asarray(arrays["clock"][()])["drift"]).all()
+        sorted_since = np.isfinite(np.asarray(arrays["clock"][()])["motion"]["drift"]).all()
         number = arrays[points + "id"].size if sorted_since else simulation.count
         ends[tiling + "range"] = number + 1
     for name in ends.keys() & arrays.keys():

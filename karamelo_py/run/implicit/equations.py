@@ -102,7 +102,7 @@ class Equations:
     def _seen(self, block: Block) -> tuple[loops.Seen, loops.Response]:
         s = self.s
         seen, response = loops.nothing_seen(s, block)
-        points, now = block.points, s.control.clock[0].now
+        points, now = block.points, s.control.motion[0].now
         where = points.x[now] if s.frame.moves else points.home
         at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)
         matter = Matter(s.kin, points, block.laws)

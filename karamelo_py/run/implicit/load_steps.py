@@ -57,12 +57,12 @@ class LoadSteps:
     def advance(self, hooks: Tag, count: int) -> int:
         """Take up to `count` load steps; return the status, as `run_steps` does."""
         control = self.simulation.setup.control
-        clock = control.clock[0]
+        step, motion, energy = control.step[0], control.motion[0], control.energy[0]
         s, mode = self.simulation.setup, self.simulation.mode
-        if clock.looks == 0 and not self.simulation.begins:
+        if energy.looks == 0 and not self.simulation.begins:
             look_at_end(s, mode)
         for _ in range(count):
-            if control.values[TIME] >= clock.end_time:
+            if control.values[TIME] >= step.end_time:
                 break
             try:
                 self._step(hooks)
@@ -75,7 +75,7 @@ class LoadSteps:
                 return STOPPED
             if not look_at_end(s, mode):
                 return GAINED
-            if clock.drift > clock.drift_limit:
+            if motion.drift > motion.drift_limit:
                 return SORT
         return DONE
 
@@ -93,8 +93,8 @@ class LoadSteps:
         control = self.simulation.setup.control
         whole, step = float(control.values[DT]), control.values[TIMESTEP]
         end = float(control.values[TIME]) + whole
-        if abs(end - control.clock[0].end_time) <= 1e-9 * whole:
-            end = float(control.clock[0].end_time)
+        if abs(end - control.step[0].end_time) <= 1e-9 * whole:
+            end = float(control.step[0].end_time)
         if not self.dynamic and step == 0:
             self._check_at_rest()
         left, fraction, most, iterations, residual = 1.0, 1.0, 1.0, 0, 0.0
@@ -128,7 +128,7 @@ class LoadSteps:
                 fraction = (
                     min(2 * fraction, most) if taken <= self.scheme.iterations // 2 else fraction
                 )
-                if control.clock[0].drift > control.clock[0].drift_limit:
+                if control.motion[0].drift > control.motion[0].drift_limit:
                     self.simulation.sort_if_due()
         for name, value in zip(PUBLISHED, (iterations, residual, self.parts), strict=True):
             self.simulation.hub.values.set(name, float(value))

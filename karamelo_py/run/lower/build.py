@@ -36,7 +36,7 @@ from karamelo_py.run.lower.bodies import lower_bodies
 from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
 from karamelo_py.run.stable_step import sparse
-from karamelo_py.run.step_size import set_up
+from karamelo_py.run.step_size import Carried, set_up
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
@@ -61,7 +61,7 @@ class State(NamedTuple):
     grids: NamedTuple
     node_fields: dict[type, np.ndarray]  # of the nodes of `grids`, (nodes, components)
     contact: NamedTuple  # contact tag with its memory
-    clock: dict[str, float]  # that later steps need
+    clock: Carried
 
 
 def check_scene(hub: Hub) -> None:
@@ -146,7 +146,7 @@ def lower(
         method.resume(contact, previous.contact)
     firsts = [solid.first_id for solid in hub.solids.values()]
     control = arrays.new_control(hub.values.array, firsts, kin.dimension)
-    set_up(control, hub, transfer, previous.clock if previous else {})
+    set_up(control, hub, transfer, previous.clock if previous else None)
     tiles.unsort(control)
     grids = table(lattices, real)
     if hub.update.boundary == "reflect":

@@ -59,7 +59,8 @@ def lower_hooks(
             scratch=np.zeros((copies, STACK + ROWS + 1, BLOCK)),
             values=np.zeros((copies, values + 16)),
             totals=np.zeros((copies, values, LIMBS), np.int64),
-            clock=np.zeros((copies, 1), arrays.CLOCK).view(np.recarray),
+            step=np.zeros((copies, 1), arrays.STEP).view(np.recarray),
+            heat=np.zeros((copies, 1), arrays.HEAT).view(np.recarray),
         ),
         whole=tuple(builder.whole),
     )

@@ -172,8 +172,8 @@ class Subdomain(WholeDomain):
         """Hand over whole tiles if due: points may never be sorted again."""
         simulation, tiles = self.simulation, self.tiles
         s = simulation.setup
-        clock = s.control.clock[0]
-        sorted_next = clock.drift > clock.drift_limit  # and repartitioned then
+        motion = s.control.motion[0]
+        sorted_next = motion.drift > motion.drift_limit  # and repartitioned then
         due = abs(simulation.step - self._learned_at) >= LEARN_EVERY
         due = due and not (tiles.direct or sorted_next)
         if not due or not tiles.balance(partition.work_of(tiles.loads(s.blocks), self.learn())):

@@ -79,7 +79,7 @@ class PairContact(Gripping):
             tables = [
                 self._known(simulation, *one) for one in zip(blocks, rows, grips, strict=True)
             ]
-            last = float(simulation.control.clock[0].last_dt)
+            last = float(simulation.control.step[0].last_dt)
             push = partial(self._push, kin, (last, points.contact_dt, points.contact_kick))
             result, total = simulation.comm.at_first(push, np.concatenate(tables))
         for block, grip, k in zip(blocks, grips, range(len(blocks)), strict=True):

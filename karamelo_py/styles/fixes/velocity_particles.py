@@ -202,7 +202,7 @@ def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -
     x, x0 = simulation.hub.fields.position[ids], places_before(simulation.hub, ids)
     values = simulation.hub.values
     a, b = (one.formulas[axis].evaluate_points(values, x, x0) for one in (other, fix))
-    small = ALIKE * max(np.abs(a).max(), np.abs(b).max(), float(simulation.control.clock[0].rate))
+    small = ALIKE * max(np.abs(a).max(), np.abs(b).max(), float(simulation.control.motion[0].rate))
     return bool((np.abs(a - b) > small).any())
 
 
