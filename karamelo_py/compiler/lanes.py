@@ -2,12 +2,9 @@
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
-components). Point functions are unaware of it; those listed in ``scalarised`` of a class are called
-lane by lane. Each lane has the bits of the same operations on numbers; sums at nodes differ from
-sums over single points by round-off.
-
-In a tile's last group, missing lanes load the first point, and store and contribute nothing.
-Interpreted kernels process points one by one.
+components). Point functions listed in ``scalarised`` of a class are called lane by lane. Each lane
+has the bits of the same operations on numbers; sums at nodes differ from sums over single points by
+round-off. In a tile's last group, missing lanes load the first point, and contribute nothing.
 """
 
 import operator

@@ -1,9 +1,9 @@
 """Parallel loops, one implementation for all kernels, which calls the loop body by address.
 
-A loop's arguments stay in memory; the body is a function of their address and an index. Waking
-threads takes as long as a small loop, so a kernel with many loops is run by a *team* (`by_team`):
-its first thread executes the kernel, the rest wait for its loops. Each thread has a fixed range of
-indices, and takes indices of threads that make no progress (work stealing).
+The body is a function of the address of the loop's arguments, and an index. Waking threads takes as
+long as a small loop, so a kernel with many loops is run by a *team* (`by_team`): its first thread
+executes the kernel, the rest wait for its loops. Each thread has a fixed range of indices, and
+takes those of threads that make no progress (work stealing).
 """
 
 import ctypes

@@ -127,11 +127,9 @@ class Buffers(NamedTuple):
     """Sums of the tiles of points: dense boxes of nodes, one after another.
 
     A tile of nodes sums the boxes that reach it, in one order, and zeros them. Its parts are ranges
-    of nodes that overlap a box, after a part that clears the rest if the first box does not cover
-    all. Columns of a part: first node in the grid and in the box; lengths; strides in the grid and
-    in the box along the first two directions; the action.
-
-    With few points, the nodes are the only buffer, and tiles add to them one by one.
+    of nodes that overlap a box, after a part that clears what the first box does not cover. Columns
+    of a part: first node in the grid and in the box; lengths; strides in the grid and in the box
+    along the first two directions; the action. With few points, the nodes are the only buffer.
     """
 
     nodes: Nodes  # the fields that points scatter to
@@ -185,28 +183,24 @@ class NoHooks(NamedTuple):
     """No hooks in the compiled loop."""
 
 
-HOOK = np.dtype(
-    [
-        ("address", np.int64),
-        ("stage", np.int64),
-        ("begin", np.int64),  # range of members; -1: all
-        ("end", np.int64),
-        ("slot", np.int64),  # of the published total; -1: none
-        ("uses_before", np.int64),  # the value one step earlier
-        ("uses_share", np.int64),  # 1 / number of members with mass
-        ("holds", np.int64),  # sets the velocity, or bounds it
-        ("uses_place", np.int64),  # formulas depend on position
-        ("totals", np.int64),  # number published by a hook on whole points
-    ]
-)
-PROGRAM = np.dtype(
-    [
-        ("begin", np.int64),  # range of code; -1: NULL
-        ("end", np.int64),
-        ("first", np.int64),  # range of constants
-        ("last", np.int64),
-    ]
-)
+HOOK = np.dtype([
+    ("address", np.int64),
+    ("stage", np.int64),
+    ("begin", np.int64),  # range of members; -1: all
+    ("end", np.int64),
+    ("slot", np.int64),  # of the published total; -1: none
+    ("uses_before", np.int64),  # the value one step earlier
+    ("uses_share", np.int64),  # 1 / number of members with mass
+    ("holds", np.int64),  # sets the velocity, or bounds it
+    ("uses_place", np.int64),  # formulas depend on position
+    ("totals", np.int64),  # number published by a hook on whole points
+])  # fmt: skip
+PROGRAM = np.dtype([
+    ("begin", np.int64),  # range of code; -1: NULL
+    ("end", np.int64),
+    ("first", np.int64),  # range of constants
+    ("last", np.int64),
+])  # fmt: skip
 # The hook that holds a node in one direction.
 HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: none
 
@@ -261,110 +255,98 @@ POST_CONTACT = 10  # damping, of the forces of contact as well
 # Where in the node arrays a hook acts.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
-# The step size: written by `kernels.clock` and `run.step_size`. Times are in the unit of time, all
-# other numbers are fractions, counts or lengths of cells.
-STEP = np.dtype(
-    [
-        ("fixed_dt", np.float64),  # step of set_dt, or 0
-        ("dt_factor", np.float64),  # fraction of the stable step of waves
-        ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.clock
-        ("heat_factor", np.float64),  # fraction of the stable step of conduction
-        ("end_time", np.float64),
-        ("last_dt", np.float64),  # the last step; 0 at the start and after load steps
-        ("kick", np.float64),  # time that forces act: between the middles of the two steps
-        ("first_kick", np.float64),  # kick of the first step, in steps
-        ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock
-        ("contact_kick", np.float64),  # time that forces would act in such steps
-        ("last_contact_dt", np.float64),
-        ("spacing", np.float64),  # smallest cell size
-        ("courant", np.float64),  # stable step over cell size / rate
-        ("courant_moving", np.float64),  # the same once points have moved
-        ("kept", np.float64),  # FLIP coefficient
-        ("kept_by_time", np.float64),  # the same per stable step if it depends on time, or 0
-        ("first_limit", np.float64),  # stable step at the start
-        ("limit", np.float64),  # stable step now
-        ("over_limit", np.int64),  # consecutive steps above the stable limit
-        ("watch_limit", np.int64),  # whether to stop because of them
-    ]
-)
-# The motion of points, as sweeps report it: written by `kernels.clock` and `run.tiles`. Lengths are
-# in cells, speeds in lengths per time (`speed`: cells per time).
-MOTION = np.dtype(
-    [
-        ("rate", np.float64),  # max over points of c + max |v_i - common_i|
-        ("new_rate", np.float64),  # of the last sweep
-        ("common", np.float64, (1, 3)),  # reference velocity for speeds
-        ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
-        ("wave", np.float64),  # wave speed when `common` was measured
-        ("speed", np.float64),  # of the fastest point, in cells
-        ("move", np.float64),  # largest move of a point in this step, in cells
-        ("new_move", np.float64),
-        ("stride", np.float64),  # cells that a point may move in a step
-        ("drift", np.float64),  # since the points were sorted, in cells
-        ("drift_limit", np.float64),
-        ("pace", np.float64),  # largest move in a step since then
-        ("path", np.float64),  # largest path of a point, in cells
-        ("now", np.int64),  # index of the present array of places
-        ("wrong", np.int64),  # 1 when a point went wrong
-    ]
-)
-# The watch over energy: written by `kernels.watch` and `run.energy`. In the unit of energy, but for
-# counts, fractions and steps.
-ENERGY = np.dtype(
-    [
-        ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
-        ("level", np.float64),  # fraction of the present stored energy in the balance
-        ("work", np.float64),  # of the fixes so far
-        ("kinetic", np.float64),  # sums over the points
-        ("stored", np.float64),  # with dissipated energy
-        ("born_with", np.float64),  # internal energy of gases before any work
-        ("stored_before", np.float64),  # one step earlier
-        ("moving_before", np.float64),  # kinetic minus work, then
-        ("stored_at", np.int64),  # step of these values
-        ("looks", np.int64),  # number of looks at the balance
-        ("balance", np.float64),  # kinetic + stored + dissipated - work
-        ("first_balance", np.float64),
-        ("first_work", np.float64),
-        ("sum_of_balance", np.float64),  # of a window of looks
-        ("last_balance", np.float64),  # at the look before
-        ("last_but_one", np.float64),
-        ("first_few", np.float64),  # mean of the first looks
-        ("first_mean", np.float64),  # mean of the first window
-        ("largest_mean", np.float64),
-        ("largest_energy", np.float64),  # of kinetic, stored and work
-        ("largest_own", np.float64),  # the same, without pure drift
-        ("of_drift", np.float64),  # kinetic energy of the centres of mass
-        ("elastic", np.float64),  # elastic energy at the last look
-        ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
-        ("to_and_fro", np.float64),  # time for waves through all bodies and back
-        ("time_of_look", np.float64),
-        ("lost", np.float64),  # largest loss by that, as a fraction of the unit
-        ("crossed", np.float64),  # cells that stressed material has moved through
-        ("supplied", np.float64),  # largest work so far, of either sign
-        ("energy_floor", np.float64),  # round-off of energies
-        ("windows", np.int64),  # consecutive windows in which the balance has grown
-        ("growth", np.float64),  # in the last window, relative to the largest energy
-        ("grown", np.float64),  # largest growth since the first looks
-    ]
-)
-# Conduction and temperatures: written by `kernels.heat`, hooks that heat, `kernels.watch` and
-# `run.energy`. In the units of time and temperature.
-HEAT = np.dtype(
-    [
-        ("heat_limit", np.float64),  # stable step of conduction, infinite without
-        ("heat_reference", np.float64),  # the same in undeformed bodies
-        ("watch_heat", np.int64),  # whether all sources of heat are known
-        ("coldest", np.float64),  # lower bound from initial state, fixes and sources
-        ("hottest", np.float64),
-        ("T_low", np.float64),  # of the points at the last look
-        ("T_high", np.float64),
-        ("own_heat", np.float64),  # largest temperature rise of a point by its dissipation
-        ("set_low", np.float64),  # set at nodes by fixes
-        ("set_high", np.float64),
-        ("rise", np.float64),  # largest heating rate of points by fixes
-        ("fall", np.float64),
-    ]
-)
+# The step size, by `kernels.clock` and `run.step_size`: times, lengths (`spacing`) and fractions.
+STEP = np.dtype([
+    ("fixed_dt", np.float64),  # step of set_dt, or 0
+    ("dt_factor", np.float64),  # fraction of the stable step of waves
+    ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.clock
+    ("heat_factor", np.float64),  # fraction of the stable step of conduction
+    ("end_time", np.float64),
+    ("last_dt", np.float64),  # the last step; 0 at the start and after load steps
+    ("kick", np.float64),  # time that forces act: between the middles of the two steps
+    ("first_kick", np.float64),  # kick of the first step, in steps
+    ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock
+    ("contact_kick", np.float64),  # time that forces would act in such steps
+    ("last_contact_dt", np.float64),
+    ("spacing", np.float64),  # smallest cell size
+    ("courant", np.float64),  # stable step over cell size / rate
+    ("courant_moving", np.float64),  # the same once points have moved
+    ("kept", np.float64),  # FLIP coefficient
+    ("kept_by_time", np.float64),  # the same per stable step if it depends on time, or 0
+    ("first_limit", np.float64),  # stable step at the start
+    ("limit", np.float64),  # stable step now
+    ("over_limit", np.int64),  # consecutive steps above the stable limit
+    ("watch_limit", np.int64),  # whether to stop because of them
+])  # fmt: skip
+# The motion of points, by `kernels.clock` and `run.tiles`: lengths in cells, speeds per time.
+MOTION = np.dtype([
+    ("rate", np.float64),  # max over points of c + max |v_i - common_i|
+    ("new_rate", np.float64),  # of the last sweep
+    ("common", np.float64, (1, 3)),  # reference velocity for speeds
+    ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
+    ("wave", np.float64),  # wave speed when `common` was measured
+    ("speed", np.float64),  # of the fastest point, in cells per time
+    ("move", np.float64),  # largest move of a point in this step, in cells
+    ("new_move", np.float64),
+    ("stride", np.float64),  # cells that a point may move in a step
+    ("drift", np.float64),  # since the points were sorted, in cells
+    ("drift_limit", np.float64),
+    ("pace", np.float64),  # largest move in a step since then
+    ("path", np.float64),  # largest path of a point, in cells
+    ("now", np.int64),  # index of the present array of places
+    ("wrong", np.int64),  # 1 when a point went wrong
+])  # fmt: skip
+# The watch over energy, by `kernels.watch` and `run.energy`: energies, counts and fractions.
+ENERGY = np.dtype([
+    ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
+    ("level", np.float64),  # fraction of the present stored energy in the balance
+    ("work", np.float64),  # of the fixes so far
+    ("kinetic", np.float64),  # sums over the points
+    ("stored", np.float64),  # with dissipated energy
+    ("born_with", np.float64),  # internal energy of gases before any work
+    ("stored_before", np.float64),  # one step earlier
+    ("moving_before", np.float64),  # kinetic minus work, then
+    ("stored_at", np.int64),  # step of these values
+    ("looks", np.int64),  # number of looks at the balance
+    ("balance", np.float64),  # kinetic + stored + dissipated - work
+    ("first_balance", np.float64),
+    ("first_work", np.float64),
+    ("sum_of_balance", np.float64),  # of a window of looks
+    ("last_balance", np.float64),  # at the look before
+    ("last_but_one", np.float64),
+    ("first_few", np.float64),  # mean of the first looks
+    ("first_mean", np.float64),  # mean of the first window
+    ("largest_mean", np.float64),
+    ("largest_energy", np.float64),  # of kinetic, stored and work
+    ("largest_own", np.float64),  # the same, without pure drift
+    ("of_drift", np.float64),  # kinetic energy of the centres of mass
+    ("elastic", np.float64),  # elastic energy at the last look
+    ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
+    ("to_and_fro", np.float64),  # time for waves through all bodies and back
+    ("time_of_look", np.float64),
+    ("lost", np.float64),  # largest loss by that, as a fraction of the unit
+    ("crossed", np.float64),  # cells that stressed material has moved through
+    ("supplied", np.float64),  # largest work so far, of either sign
+    ("energy_floor", np.float64),  # round-off of energies
+    ("windows", np.int64),  # consecutive windows in which the balance has grown
+    ("growth", np.float64),  # in the last window, relative to the largest energy
+    ("grown", np.float64),  # largest growth since the first looks
+])  # fmt: skip
+# Conduction and temperatures, by `kernels.heat`, hooks and `kernels.watch`: times, temperatures.
+HEAT = np.dtype([
+    ("heat_limit", np.float64),  # stable step of conduction, infinite without
+    ("heat_reference", np.float64),  # the same in undeformed bodies
+    ("watch_heat", np.int64),  # whether all sources of heat are known
+    ("coldest", np.float64),  # lower bound from initial state, fixes and sources
+    ("hottest", np.float64),
+    ("T_low", np.float64),  # of the points at the last look
+    ("T_high", np.float64),
+    ("own_heat", np.float64),  # largest temperature rise of a point by its dissipation
+    ("set_low", np.float64),  # set at nodes by fixes
+    ("set_high", np.float64),
+    ("rise", np.float64),  # largest heating rate of points by fixes
+    ("fall", np.float64),
+])  # fmt: skip
 CLOCK = np.dtype([("step", STEP), ("motion", MOTION), ("energy", ENERGY), ("heat", HEAT)])
 TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
 LAST = 2**62  # above any id of a point

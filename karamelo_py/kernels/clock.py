@@ -26,11 +26,9 @@ def last_step_size(s: Setup) -> Number:
 
 
 def kick(s: Setup) -> Number:
-    """Return the time for which forces act in this step.
+    """Return the time for which forces act: from the middle of the last step to that of this one.
 
-    Velocities belong to the middles of steps: forces act from the middle of the last step to the
-    middle of this one. In the first step they act for all of it, since initial velocities belong to
-    half a step earlier, unless the script requests half.
+    In the first step it is all of it, as if initial velocities were half a step old, or half.
     """
     return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 
@@ -43,13 +41,11 @@ def common_velocity(kin: Tag, motion: Any, like: Number) -> tuple:
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: round-off of a million additions
 
-# Contact stiffness depends on dt. If dt drops suddenly (set_dt), the dt of the stiffness drops by
-# this fraction of the time: loaded springs stiffen over several periods.
+# If dt drops suddenly (set_dt), the dt of the contact stiffness drops by this fraction of the time:
+# loaded springs stiffen over several periods.
 FOLLOWING = 0.01
-
-# Crossing cells adds energy, more with a longer step. Until points have moved this far, in cells,
-# the stable step is the one at rest.
-STILL = 0.25
+# Crossing cells adds energy: the stable step is the one at rest until points have moved this far.
+STILL = 0.25  # cells
 # Cells that a point may move in a step, if the step ignores a common drift.
 STRIDE = 0.65
 
@@ -60,8 +56,7 @@ def choose_dt(control: Control) -> None:
 
     The last two steps are equally shortened: prescribed or mapped velocities give impulses that do
     not vanish with dt, so a very short step would have huge forces. Contact with a stiffness of
-    m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back. The first step after
-    load steps begins as in a new scene.
+    m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back.
     """
     step, motion, heat = control.step[0], control.motion[0], control.heat[0]
     if motion.weight > 1:

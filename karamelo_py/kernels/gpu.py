@@ -1,11 +1,9 @@
 """A step on a GPU: functions of one thread for a point, a cell, a node, or the clock.
 
-A cell is numbered by the first node its points see; all its points see the same nodes. Before each
-scatter a counting sort orders points by cell, then by id. One thread sums what a cell's points give
-to each of its nodes, another sums at a node over cells. No two threads add to one real number:
-results are reproducible, and independent of the order in memory.
-
-`fate` (5,) has errors and extremes; after the last step, threads do nothing.
+A cell has the points that see the same nodes, and the number of the first of these. Before each
+scatter a counting sort orders points by cell, then by id. One thread sums over a cell's points,
+another at a node over cells. No two threads add to one real number: results are reproducible, and
+independent of the order in memory. `fate` (5,) has errors and extremes.
 """
 
 import functools

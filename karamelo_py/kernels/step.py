@@ -5,7 +5,7 @@ and calls them between rows.
 """
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -130,32 +130,24 @@ def _take_all(rows, s, step):
     return True
 
 
-_step_rows: Any = functools.cache(rows_of)  # interpreted
-_begin_rows: Any = functools.cache(first_rows)
+def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bool]:
+    """Make a function that takes the rows of a scheme; it returns whether no point failed."""
+    cached = functools.cache(rows_of_kind)  # interpreted
+
+    def take_all(kind, s, hooks, more):
+        scheme, visits, mode = kind
+        return _take_all(cached(type(scheme), type(visits)), s, InStep(mode, hooks, more))
+
+    @implements(take_all, by_type=True)
+    def take_all_of(kind, s, hooks, more):
+        rows = rows_of_kind(*(tag.instance_class for tag in kind.types[:2]))
+        return lambda kind, s, hooks, more: _take_all(rows, s, InStep(kind.mode, hooks, more))
+
+    return take_all
 
 
-def step(kind: StepKind, s: Setup, hooks: Tag, more: bool) -> bool:
-    """Take a step; if `more`, a fused one leaves the next sums. Return whether no point failed."""
-    scheme, visits, mode = kind
-    return _take_all(_step_rows(type(scheme), type(visits)), s, InStep(mode, hooks, more))
-
-
-@implements(step, by_type=True)
-def _step(kind, s, hooks, more):
-    rows = rows_of(*(tag.instance_class for tag in kind.types[:2]))
-    return lambda kind, s, hooks, more: _take_all(rows, s, InStep(kind.mode, hooks, more))
-
-
-def begin(kind: StepKind, s: Setup) -> bool:
-    """Prepare the first of several steps; return whether all points are on the grid."""
-    scheme, visits, mode = kind
-    return _take_all(_begin_rows(type(scheme), type(visits)), s, InStep(mode, NoHooks(), True))
-
-
-@implements(begin, by_type=True)
-def _begin(kind, s):
-    rows = first_rows(*(tag.instance_class for tag in kind.types[:2]))
-    return lambda kind, s: _take_all(rows, s, InStep(kind.mode, NoHooks(), True))
+# A step: if `more`, a fused one leaves the next sums; and the rows before the first.
+step, begin = _taking(rows_of), _taking(first_rows)
 
 
 def take_rows(rows: tuple, s: Setup, mode: Tag, hooks: Tag) -> bool:
@@ -175,12 +167,12 @@ def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
     """Take up to `count` steps, to the end time at most; return why it stopped.
 
     DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt near
-    0), GAINED (spurious energy), HEATED (unexplained temperatures), or SORT: a point may soon leave
-    the nodes of its tile. SORT depends on the points only, not on where a run resumes.
+    0), GAINED (spurious energy), HEATED (unexplained temperatures), SORT (a point may soon leave
+    the nodes of its tile; wherever the run resumed).
     """
     values = s.control.values
     stepping, motion = s.control.step[0], s.control.motion[0]
-    if not begin(kind, s):
+    if not begin(kind, s, NoHooks(), True):
         return STOPPED
     for n in range(count):
         time = values[TIME] + values[DT]

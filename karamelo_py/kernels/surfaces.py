@@ -3,9 +3,8 @@
 Faces are simplices (points in 1D, segments in 2D, triangles in 3D), leaves of a binary tree of
 boxes. Node k has the children 2k and 2k + 1: a walk needs no stack. A position is enclosed if the
 faces wind around it: each face crossed by a ray along the last axis counts 1 or -1, by its side.
-Faces with a common edge find the same crossings bit for bit, and whether an edge is reached is a
-comparison without rounding: no position is counted twice or omitted. (Winding number: Sunday 2001;
-triangles: Ericson 2005, section 5.1.5.)
+Faces find the crossings of a common edge bit for bit: no position is counted twice or omitted.
+(Winding number: Sunday 2001; triangles: Ericson 2005, section 5.1.5.)
 """
 
 from collections.abc import Callable

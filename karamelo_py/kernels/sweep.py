@@ -142,10 +142,9 @@ class TileVisit(NamedTuple):
 
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
-    """Visit the points of the t-th occupied tile of a block.
+    """Visit the points of the t-th occupied tile of a block, in a fused or a single stage.
 
-    One kernel serves a scheme's fused and single stages. After the first point that failed or left
-    its box, a tile scatters nothing more: the run ends, or points are sorted and scatter.
+    After a point that failed, a tile scatters nothing more.
     """
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling

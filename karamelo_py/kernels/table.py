@@ -1,10 +1,9 @@
 """Rows of schemes, and the fused and staged steps made of them.
 
 A scheme's class attribute ``rows`` lists its stages once. From it follow the staged step, in which
-fixes act on points between stages; the fused step with as few visits of the points as possible,
-whose first scatter joins the last visit of the previous step; the text of `karamelo-py check`; and
-the memory traffic of `karamelo-py bench`. F-bar, XPIC, heat and contact are rows that a scene adds
-(`plain`).
+fixes act on points between stages; the fused step with the fewest visits of the points, whose first
+scatter joins the last visit of the previous step; the words of `karamelo-py check`; and the memory
+traffic of `karamelo-py bench`. F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -367,8 +366,7 @@ def at_nodes_with(kind: type, task: Tag) -> Any:
 def light_node(s):
     """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
-    At most 1: a fraction below m / m_p would be less than what comes back to the node through the
-    points' velocities, and the node's strain would run ahead of its stress. No limit in the total
+    At most 1: below m / m_p, the node's strain would run ahead of its stress. No limit in the total
     frame with moments, which return all of the node's velocity: any limit makes it grow.
     """
     if stores_moment(s.transfer) and not s.frame.moves:

@@ -67,8 +67,7 @@ def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
     As integers of two sizes, except terms 2^30 times smaller than the largest. A number added to
-    1.5 2^52 has its integer part in its last bits: both loops sum bits, in any order, and
-    vectorise.
+    1.5 2^52 has its integer part in its last bits: a loop that sums bits vectorises.
     """
     if many_threads():  # a term or two each
         for q in range(count):

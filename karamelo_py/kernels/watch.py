@@ -2,10 +2,8 @@
 
 Kinetic plus stored plus dissipated energy minus the work of loads cannot grow. Velocities belong to
 the middles of steps, stresses to their ends: two consecutive steps give energies at one time, to
-second order. Sums are in the order of tiles, on any number of threads. Growth is relative to the
-energy without drift (motion of the centres of mass): drift, however large, cannot hide vibrations.
-
-The same looks measure how many cells stressed material moves through, weighted by elastic energy
+second order. Growth is relative to the energy without drift (of the centres of mass), which cannot
+hide vibrations. The same looks measure how many cells stressed material moves through
 (`note_crossing`): a linear basis in the updated frame loses stress by that.
 """
 
@@ -186,8 +184,7 @@ def take_drift(s):
 def note_crossing(control, d):
     """Add the cells that elastic energy moved through since the last look.
 
-    Energy that leaves takes its path along; new energy has none. Vibrations renew it in the time of
-    a wave there and back: transient waves count by what they move while they last.
+    New energy has no path; vibrations renew it in the time of a wave there and back.
     """
     energy, row = control.energy[0], (control.firsts.size - 1) * (1 + d)
     now, before = control.answer[row], energy.elastic

@@ -15,6 +15,7 @@ from numba import config
 from karamelo_py.app.launch import share
 from karamelo_py.compiler import index, kernel
 from karamelo_py.compiler.threads import Serial, Threaded, new_team, shared_out
+from karamelo_py.kernels.arrays import NoHooks
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, Fused, StepKind, begin, step
 from karamelo_py.kernels.sums import columns_of
@@ -275,7 +276,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
     """Seconds per step of each sweep over points, and over nodes: summed medians."""
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {}, {})
-    begin(StepKind(scheme, Fused(), timed), s)
+    begin(StepKind(scheme, Fused(), timed), s, NoHooks(), True)
     _take_step(simulation, timed)
     timed.of_points.clear()
     timed.of_nodes.clear()
@@ -287,7 +288,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
         motion = s.control.motion[0]
         if motion.drift > motion.drift_limit:  # tiles are out of date
             simulation.sort()
-            begin(StepKind(scheme, Fused(), simulation.mode), s)
+            begin(StepKind(scheme, Fused(), simulation.mode), s, NoHooks(), True)
     of_points, of_nodes = (
         {name: _per_step(taken, count) for name, taken in kind.items()} for kind in timed[1:]
     )

@@ -65,13 +65,12 @@ def point_function(
 ) -> Callable[[Callable], PointFunction]:
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
-    The decorated function gives name, parameters and docstring. ``name.on(Class, ...)`` adds
-    implementations, also in plug-ins; derived classes inherit them. They run as plain Python
-    (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection happens at compile time. With
-    ``otherwise`` the decorated function is the default implementation.
+    ``name.on(Class, ...)`` adds implementations, also in plug-ins; derived classes inherit them.
+    They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection
+    happens at compile time. With ``otherwise`` the decorated function is the default.
 
-    Point functions process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those
-    named in ``scalarised`` of a class, because they branch, are called point by point.
+    They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those named in
+    ``scalarised`` of a class, because they branch, are called point by point.
     """
 
     def declare(stub: Callable) -> PointFunction:

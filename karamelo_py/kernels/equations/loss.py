@@ -12,10 +12,10 @@ follow the velocity. XPIC leaves Q^m v of v, Q = 1 - P, and loses <v, Q^m v> - |
 r_k = Q^k v and the terms of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S
 w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each part is local and >= 0.
 
-The change dv by forces is excluded: in musl, where strain is from the re-mapped velocity,
-velocities that points do not take do not strain them either. A hot point alone in its cells would
-heat itself by that. Apart from time integration, the remainder is that moments are mapped
-differently after a move (not with splines), and that usl strains by dv.
+The change dv by forces is excluded: in musl, with strain from the re-mapped velocity, what points
+do not take does not strain them either, and a hot point alone in its cells would heat itself. The
+remainder is time integration, moments mapped differently after a move (not with splines), and that
+usl strains by dv.
 """
 
 from collections import namedtuple
