@@ -101,10 +101,8 @@ def swelling(points: PointTable) -> np.ndarray:
     return points.particle("volume") / points.reference_volume
 
 
-def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble | None:
+def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble:
     energy = simulation.control.energy[0]
-    if not simulation.energy_watch.has_grown():
-        return None
     cause, fix = cause_of_gain(hub, simulation)
     gain, since = energy.grown, "since the start"
     if energy.windows >= TOLD:
@@ -127,10 +125,9 @@ def taken_by(hub: Hub) -> list[str]:
     return takers
 
 
-def words_of_loss(hub: Hub, simulation: Simulation, within: float) -> Trouble | None:
+def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
     """Describe a loss, unless chosen damping explains it."""
-    energy = simulation.control.energy[0]
-    if not energy.watch_energy or energy.looks <= LOOKS:
+    if taken_by(hub):
         return None
     lost, (cause, fix) = simulation.energy_watch.share_lost(), cause_of_loss(hub)
     message = (

@@ -411,7 +411,7 @@ def _value(body, s, k):
 @noinline
 def _start(body, s):
     """Find momentum and velocities without contact, in rows START_P and U."""
-    state, vectors, kick = body.state, body.vectors, s.control.clock[0].kick
+    state, vectors, kick = body.state, body.vectors, s.control.step[0].kick
     set_mass(body)
     for k in range(3):
         force = _value(body, s, LOADED + k) + body.constants[OF_MASS] * _value(body, s, FALLS + k)
@@ -442,7 +442,7 @@ def _finish(body, s, total):
     `total` (6,): impulses of the body on others, about its centre.
     """
     state, vectors, dt = body.state, body.vectors, s.control.values[DT]
-    kick = s.control.clock[0].kick
+    kick = s.control.step[0].kick
     for k in range(3):
         state[FORCE + k], state[TORQUE + k] = -total[k] / kick, -total[3 + k] / kick
     for a in range(6):
@@ -515,7 +515,7 @@ def _publish(body, values):
 @noinline
 def _place_of(s, points, p):
     return place_at(
-        s.basis, s.kin, points.x[s.control.clock[0].now] if s.frame.moves else points.home, p
+        s.basis, s.kin, points.x[s.control.motion[0].now] if s.frame.moves else points.home, p
     )
 
 
@@ -523,13 +523,9 @@ def _place_of(s, points, p):
 def _list_point(body, surface, s, block, p):
     """Put a contact of point `p` with a surface into the next row; return whether there is one."""
     kin, state, points, d = s.kin, body.state, block.points, s.kin.dimension
-    clock, dt, h, none = (
-        s.control.clock[0],
-        s.control.values[DT],
-        s.grids.h[0],
-        zero_vector(s.kin, 0.0),
-    )
-    x = load_vector(kin, points.x[clock.now], p)
+    times, dt = s.control.step[0], s.control.values[DT]
+    h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
+    x = load_vector(kin, points.x[s.control.motion[0].now], p)
     away = 0.0
     for c in range(d):
         away += (x[c] - state[X + c]) ** 2
@@ -559,7 +555,7 @@ def _list_point(body, surface, s, block, p):
         n, weight, _ = entry(s.basis, kin, grid, stencil, node)
         for c in range(d):
             contact[SOFT_V + c] += weight * s.nodes.update[n, c]
-    stiffness = SOFT * dt * clock.kick / (clock.contact_dt * clock.contact_kick)
+    stiffness = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
     contact[GAP], contact[SOFT_MASS], contact[MU] = -within - ball, points.mass[p], surface.mu
     contact[SHARE], contact[MOST] = stiffness / (1 + stiffness), 0.0
     return True
@@ -579,7 +575,7 @@ def _list_points(body, surface, s, block, number):
 def _give_to_points(body, s, block, number, measures):
     """Give the impulses of contacts to the nodes of the points of a block; or sum their work."""
     kin, nodes, points, d = s.kin, s.nodes, block.points, s.kin.dimension
-    kick, work = s.control.clock[0].kick, 0.0
+    kick, work = s.control.step[0].kick, 0.0
     for i in range(body.count[0]):
         if body.which[i, 0] != number:
             continue
@@ -654,7 +650,7 @@ def _list_nodes(body, s):
 def _reaction(body, s):
     """Put the impulses of contact at nodes, about the centre, into row SUM."""
     total, state, values = body.vectors[SUM], body.state, s.control.values
-    kick, force, torque = s.control.clock[0].kick, s.contact.slot, s.contact.torque
+    kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
     for k in range(3):
         total[k] = -kick * values[force[body.field] + k]
     for k in range(3):
@@ -741,7 +737,7 @@ def _lead_point(s, block, p):
 
 @noinline
 def _lead(body, s, points, p):
-    state, d, now = body.state, s.kin.dimension, s.control.clock[0].now
+    state, d, now = body.state, s.kin.dimension, s.control.motion[0].now
     before = body.vectors[TRIAL]
     for c in range(d):
         v = state[MOVE + c]

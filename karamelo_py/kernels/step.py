@@ -132,7 +132,7 @@ def _take_all(rows, s, step):
 
 def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bool]:
     """Make a function that takes the rows of a scheme; it returns whether no point failed."""
-    cached = functools.cache(rows_of_kind)  # interpreted
+    cached: Any = functools.cache(rows_of_kind)  # interpreted
 
     def take_all(kind, s, hooks, more):
         scheme, visits, mode = kind

@@ -63,7 +63,7 @@ class EnergyWatch:
     Besides the kernels, only this class writes them to the clock.
     """
 
-    def __init__(self, simulation: Backend):
+    def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
         self.watch, self.heat = self.control.energy[0], self.control.heat[0]
         self.followed = False  # the balance is up to date
@@ -132,8 +132,8 @@ class EnergyWatch:
         return bool(watch.watch_energy and (watch.windows >= TOLD or watch.grown > WITHIN))
 
     def has_lost(self, within: float) -> bool:
-        clock = self.clock
-        return bool(clock.watch_energy and clock.looks > LOOKS and self.share_lost() > within)
+        watch = self.watch
+        return bool(watch.watch_energy and watch.looks > LOOKS and self.share_lost() > within)
 
     def share_lost(self) -> float:
         """Fraction of the largest energy lost since the first step; negative: a gain."""

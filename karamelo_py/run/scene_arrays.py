@@ -36,6 +36,7 @@ from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.run.step_size import carried_on
+from karamelo_py.run.tiles import WholeDomain
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import foreign_parts

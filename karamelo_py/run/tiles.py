@@ -174,7 +174,7 @@ class Tiles:
         beyond = far + drift + grid_boxes.beyond(s.contact)
         return beyond if far < cells else cells  # also for NaN
 
-    def _where(self, s: kernel_arrays.Setup, points: kernel_arrays.Points) -> np.ndarray:
+    def _where(self, s: Setup, points: Points) -> np.ndarray:
         return points.x[s.control.motion[0].now] if points.home is None else points.home
 
     def tiles_of(self, s: Setup, points: Points) -> np.ndarray:
