@@ -27,7 +27,7 @@ from karamelo_py.app.live.folder import FolderPage
 from karamelo_py.app.live.frames import Frame, KeptFrames
 from karamelo_py.app.live.server import Server
 from karamelo_py.app.live.study import StudyPage
-from karamelo_py.app.studies import study as studies
+from karamelo_py.app.studies import sweep as studies
 from karamelo_py.output.console import Console
 from karamelo_py.script.errors import ScriptError
 

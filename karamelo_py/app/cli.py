@@ -82,10 +82,11 @@ ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
     "plot": ("karamelo_py.app.plot", "Draw curves of a log."),
-    "sweep": ("karamelo_py.app.studies.study", "Run a script with many values of its variables."),
+    "sweep": ("karamelo_py.app.studies.sweep", "Run a script with many values of its variables."),
     "chart": ("karamelo_py.app.studies.chart", "Draw the table of a sweep: error against cost."),
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest set-up within an error."),
     "fit": ("karamelo_py.app.studies.fit", "Find the values of variables that match measurements."),
+    "sensitivity": ("karamelo_py.app.studies.sensitivity", "Find which variables matter."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
     "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }

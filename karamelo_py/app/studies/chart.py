@@ -12,7 +12,7 @@ from string import Template
 import numpy as np
 
 from karamelo_py.app.live.server import require_plotly
-from karamelo_py.app.studies import keeping, look, pictures, records, results
+from karamelo_py.app.studies import keeping, look, pictures, records, results, uncertainty
 from karamelo_py.app.studies.case import Row, command_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
@@ -54,6 +54,10 @@ def add_options(parser: ArgumentParser) -> None:
         help="write a table of what a log column does: keeps, damps, gains, breaks, refused; "
         "rows by -by, columns by the other variables",
     )  # fmt: skip
+    wanted.add_argument(
+        "-distribution", metavar="COLUMN",
+        help="draw the distribution of a result of sweep -sample, and it over each variable",
+    )  # fmt: skip
     parser.add_argument("-cost", metavar="COLUMN", help="column of the cost (seconds)")
     parser.add_argument(
         "-by", action="append", default=[], metavar="A,B", help="variables with a line per value"
@@ -80,7 +84,9 @@ def run(options: Namespace) -> int:
     options.cost = options.cost or "seconds"
     if options.axes and (options.keeps or not (options.o or options.curve)):
         raise ScriptError("-axes", expected="-curve, or -accuracy or -y with -o")
-    if not (options.accuracy or options.curve or options.keeps or options.y):
+    if not (
+        options.accuracy or options.curve or options.keeps or options.y or options.distribution
+    ):
         hint = f"karamelo-py chart {options.tables[0]} -accuracy error -o chart.png"
         expected = "-accuracy of an error, -y of a result, -curve or -keeps"
         raise ScriptError("no column is named", expected=expected, hint=hint)
@@ -96,6 +102,8 @@ def run(options: Namespace) -> int:
         return keeps(options, table, by or table.variables)
     if options.curve:
         return curves(options, table, by or table.variables)
+    if options.distribution:
+        return uncertainty.draw(options, table)
     if options.y:
         return results.draw(options, table, by)
     family = Family(table, options.accuracy, options.cost, by=by, along=options.x)

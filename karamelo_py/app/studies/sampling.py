@@ -1,0 +1,173 @@
+"""Random variables of a study, and samples of them."""
+
+import re
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.app.options import positive
+from karamelo_py.scene.tables import read_table
+from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.terms import number_of
+
+KINDS = {
+    "uniform": "uniform(low, high)", "loguniform": "loguniform(low, high)",
+    "normal": "normal(mean, deviation)", "lognormal": "lognormal(mean, deviation)",
+    "triangular": "triangular(low, mode, high)",
+}  # fmt: skip
+SEQUENCES = ("latin", "sobol", "halton")
+CALL = re.compile(r"([^\W\d]\w*)\((.*)\)")
+
+
+class Random(NamedTuple):
+    name: str
+    text: str  # as given
+    law: Any  # of scipy.stats
+
+
+def needs_scipy(word: str) -> None:
+    if find_spec("scipy") is None:
+        hint = "pip install '.[implicit]' in the folder of karamelo-py"
+        raise ScriptError(f"karamelo-py {word} needs SciPy", hint=hint)
+
+
+def random_variables(words: Sequence[str]) -> tuple[list[Random], list[str]]:
+    """Separate ``NAME=normal(1, 0.1)`` from other words of -var."""
+    found, others = [], []
+    for word in words:
+        name, _, text = (part.strip() for part in word.partition("="))
+        call = CALL.fullmatch(text)
+        if call and name.isidentifier():
+            found.append(Random(name, text, _law(name, *call.groups())))
+        else:
+            others.append(word)
+    if len({one.name for one in found}) < len(found):
+        raise ScriptError("a random variable is given twice")
+    return found, others
+
+
+def _law(name: str, kind: str, text: str) -> Any:
+    from scipy import stats
+
+    if kind not in KINDS:
+        raise unknown(f"-var {name}: unknown distribution '{kind}'", kind, KINDS)
+    parts = [number_of(part.strip()) for part in text.split(",")]
+    numbers = [part for part in parts if part is not None]
+    expected = f"{KINDS[kind]} with numbers"
+    if len(numbers) != len(parts) or len(numbers) != KINDS[kind].count(",") + 1:
+        raise ScriptError(f"-var {name}: {kind}({text})", expected=expected)
+    a, b, *more = numbers
+    if kind in ("normal", "lognormal") and not b > 0:
+        raise ScriptError(f"-var {name}: a deviation of {b:g}", expected="a number above 0")
+    if kind in ("uniform", "loguniform") and not a < b:
+        raise ScriptError(f"-var {name}: from {a:g} to {b:g}", expected="low below high")
+    if kind in ("lognormal", "loguniform") and not a > 0:
+        raise ScriptError(f"-var {name}: {kind} of {a:g}", expected="a number above 0")
+    if kind == "uniform":
+        return stats.uniform(a, b - a)
+    if kind == "loguniform":
+        return stats.loguniform(a, b)
+    if kind == "normal":
+        return stats.norm(a, b)
+    if kind == "lognormal":
+        variance = np.log1p((b / a) ** 2)
+        return stats.lognorm(np.sqrt(variance), scale=a * np.exp(-variance / 2))
+    if not (a <= b <= more[0] and a < more[0]):
+        raise ScriptError(f"-var {name}: {kind}({text})", expected="low <= mode <= high")
+    return stats.triang((b - a) / (more[0] - a), a, more[0] - a)
+
+
+def samples(
+    laws: Sequence[Any], count: int, sequence: str, seed: int, factor: np.ndarray | None = None
+) -> np.ndarray:
+    """Draw (count, variables); `factor`: Cholesky factor of the correlation of normal scores.
+
+    A longer Sobol' or Halton sequence begins with the shorter one.
+    """
+    from scipy.stats import norm, qmc
+
+    engines = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol, "halton": qmc.Halton}
+    if sequence == "sobol" and count & (count - 1):
+        power = 2 ** round(np.log2(count))
+        raise ScriptError(f"-sample {count}", expected=f"a power of 2 with sobol, such as {power}")
+    parts = engines[sequence](len(laws), rng=np.random.default_rng(seed)).random(count)
+    if factor is not None:
+        parts = norm.cdf(norm.ppf(parts) @ factor.T)
+    return np.column_stack([law.ppf(part) for law, part in zip(laws, parts.T, strict=True)])
+
+
+def correlation(path: Path, names: Sequence[str]) -> np.ndarray:
+    """Cholesky factor of the matrix in a file whose columns have the names of the variables."""
+    table = read_table(path)
+    for name in names:
+        if name not in table:
+            raise unknown(f"{path}: no column '{name}'", name, table)
+    matrix = np.column_stack([table[name] for name in names])
+    square = matrix.shape == (len(names),) * 2
+    if not (square and np.allclose(matrix, matrix.T) and np.allclose(np.diag(matrix), 1)):
+        expected = f"{len(names)} rows of a symmetric matrix with a diagonal of 1"
+        raise ScriptError(f"{path} is no matrix of correlations", expected=expected)
+    least = float(np.linalg.eigvalsh(matrix).min())
+    if not least > 1e-9:
+        raise ScriptError(
+            f"{path}: these correlations contradict each other (an eigenvalue is {least:.3g})",
+            expected="a positive definite matrix",
+        )
+    return np.linalg.cholesky(matrix)
+
+
+def add_options(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "-sample", type=positive, metavar="N",
+        help="N cases of random variables: -var 'E=normal(1e7, 1e6)', uniform(low, high), "
+        "lognormal(mean, deviation), loguniform(low, high), triangular(low, mode, high)",
+    )  # fmt: skip
+    parser.add_argument(
+        "-sequence", choices=SEQUENCES, default="latin",
+        help="of -sample: Latin hypercube (latin), or one that more samples extend",
+    )  # fmt: skip
+    parser.add_argument("-seed", type=int, default=1, help="of -sample (1)")
+    parser.add_argument(
+        "-correlation",
+        type=Path,
+        metavar="FILE",
+        help="correlation matrix of the random variables; its columns have their names",
+    )
+    parser.add_argument(
+        "-fails", metavar="CONDITION", help="print the probability of an event: 'factor < 1'"
+    )
+
+
+def prepare(options: Namespace) -> dict[str, Any]:
+    """Replace random variables in the options by lists of samples; return facts for the record."""
+    from_formulas = any(CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
+    if not options.sample:
+        if from_formulas:
+            raise ScriptError("random variables are sampled", expected="-sample N, such as 200")
+        if options.correlation or options.fails:
+            raise ScriptError("-correlation and -fails", expected="-sample N with them")
+        return {}
+    needs_scipy("sweep -sample")
+    found, others = random_variables(options.var)
+    if not found:
+        expected = "at least one of " + ", ".join(KINDS.values())
+        raise ScriptError("-sample: no variable is random", expected=expected)
+    names = [one.name for one in found]
+    factor = correlation(options.correlation, names) if options.correlation else None
+    laws = [one.law for one in found]
+    drawn = samples(laws, options.sample, options.sequence, options.seed, factor)
+    lists = [
+        f"{n}={','.join(f'{x:.10g}' for x in xs)}" for n, xs in zip(names, drawn.T, strict=True)
+    ]
+    options.var = [*lists, *others]
+    options.zip = [*options.zip, ",".join(names)]
+    laws_given = {one.name: one.text for one in found}
+    return {"random": laws_given, "sequence": options.sequence, "seed": options.seed}
+
+
+def described(found: Sequence[Random]) -> Mapping[str, str]:
+    return {one.name: one.text for one in found}

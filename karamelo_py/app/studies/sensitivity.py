@@ -1,0 +1,180 @@
+"""karamelo-py sensitivity: which variables matter for a result."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from karamelo_py.app.options import positive
+from karamelo_py.app.studies import variables
+from karamelo_py.app.studies.case import worded
+from karamelo_py.app.studies.records import recorded, value, write
+from karamelo_py.app.studies.sampling import (
+    KINDS,
+    Random,
+    described,
+    needs_scipy,
+    random_variables,
+)
+from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
+from karamelo_py.app.studies.uncertainty import RESAMPLED, SURE, Interval
+from karamelo_py.script.errors import ScriptError, plural
+
+DESCRIPTION = """\
+Says which random variables matter for a result, by runs of a script.
+
+  karamelo-py sensitivity in.slope -var 'phi=uniform(25, 35)' -var 'c=normal(5e3, 1e3)' -record u
+  karamelo-py sensitivity in.slope -method morris -n 10 ...     first: which of many matter at all
+
+sobol: the fraction of the variance that a variable explains by itself (first), and with all its
+interactions (total), with intervals of 95 % (Saltelli et al. 2010); n (d + 2) runs of d variables.
+morris: the mean size of the change of the result over the range of a variable, between quantiles
+of 1 and 99 % (mu*), and the deviation of the changes (sigma): curvature and interaction (Morris
+1991; Campolongo et al. 2007); n (d + 1) runs. Runs that are known are not repeated."""
+LEVELS = 4  # of morris
+ENDS = 0.01, 0.99  # quantiles
+
+Results = Callable[[np.ndarray], np.ndarray]  # (d, n) to (results, n)
+
+
+def sobol(
+    laws: Sequence, results: Results, n: int, seed: int
+) -> list[list[tuple[Interval, Interval]]]:
+    """First and total indices, for each result and each variable."""
+    from scipy.stats import sobol_indices
+
+    if n & (n - 1):
+        expected = f"a power of 2, such as {2 ** round(np.log2(n))}"
+        raise ScriptError(f"-n {n}", expected=expected)
+    rng = np.random.default_rng(seed)
+    found = sobol_indices(func=results, n=n, dists=list(laws), rng=rng)
+    sure = found.bootstrap(confidence_level=SURE, n_resamples=RESAMPLED // 4)
+    firsts, totals = np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)
+    ends = [
+        [np.atleast_2d(end) for end in one.confidence_interval]
+        for one in (sure.first_order, sure.total_order)
+    ]
+    return [
+        [
+            tuple(
+                Interval(float(middle[s, k]), float(low[s, k]), float(high[s, k]))
+                for middle, (low, high) in zip((firsts, totals), ends, strict=True)
+            )
+            for k in range(firsts.shape[1])
+        ]
+        for s in range(len(firsts))
+    ]
+
+
+def morris(
+    laws: Sequence, results: Results, n: int, seed: int
+) -> list[list[tuple[Interval, float]]]:
+    """mu* with its interval, and sigma, for each result and each variable."""
+    from SALib.analyze import morris as analyzer
+    from SALib.sample import morris as sampler
+
+    low, high = (np.array([law.ppf(end) for law in laws]) for end in ENDS)
+    names = [f"x{k}" for k in range(len(laws))]
+    problem = {"num_vars": len(laws), "names": names, "bounds": [[0.0, 1.0]] * len(laws)}
+    parts = sampler.sample(problem, n, num_levels=LEVELS, seed=seed)
+    numbers = results((low + parts * (high - low)).T)
+    made = []
+    for one in numbers:
+        found = analyzer.analyze(
+            problem,
+            parts,
+            one,
+            num_levels=LEVELS,
+            conf_level=SURE,
+            seed=seed,
+            print_to_console=False,
+        )
+        half = np.asarray(found["mu_star_conf"], float)
+        mu, sigma = (np.asarray(found[word], float) for word in ("mu_star", "sigma"))
+        made.append(
+            [(Interval(m, m - h, m + h), float(s)) for m, h, s in zip(mu, half, sigma, strict=True)]
+        )
+    return made
+
+
+def results_of(study: Study, found: Sequence[Random], fixed: dict[str, str]) -> Results:
+    def results(numbers: np.ndarray) -> np.ndarray:
+        cases = [
+            {one.name: f"{x:.10g}" for one, x in zip(found, column, strict=True)} | fixed
+            for column in np.atleast_2d(numbers).T
+        ]
+        rows = study.run(cases)
+        made = [[value(row, item.word) for item in study.items] for row in rows]
+        for case, row, one in zip(cases, rows, made, strict=True):
+            if None in one or not np.isfinite(one).all():
+                raise ScriptError(
+                    f"the run with {worded(case)} has no result: {row['reason'] or row['status']}",
+                    hint="narrower distributions: every run counts here",
+                )
+        return np.array(made, float).T
+
+    return results
+
+
+def add_options(parser: ArgumentParser) -> None:
+    variables.add_family(parser)
+    parser.add_argument(
+        "-record", action="append", required=True, metavar="COLUMNS",
+        help="results: log columns as for sweep",
+    )  # fmt: skip
+    parser.add_argument(
+        "-method", choices=("sobol", "morris"), default="sobol", help="indices (sobol)"
+    )
+    parser.add_argument("-n", type=positive, default=64, help="runs of each kind (64)")
+    parser.add_argument("-seed", type=int, default=1, help="of the samples (1)")
+    parser.add_argument(
+        "-o", type=Path, default=Path("sensitivity.csv"), help="table of runs (sensitivity.csv)"
+    )
+
+
+def run(options: Namespace) -> int:
+    needs_scipy("sensitivity")
+    if options.method == "morris" and find_spec("SALib") is None:
+        hint = "pip install '.[studies]' in the folder of karamelo-py"
+        raise ScriptError("karamelo-py sensitivity -method morris needs SALib", hint=hint)
+    out = variables.out_file(options.o, ".csv")
+    found, options.var = random_variables(options.var)
+    if len(found) < 2:
+        expected = "two of " + ", ".join(KINDS.values())
+        raise ScriptError("sensitivity compares random variables", expected=expected)
+    fixed = variables.choices(options.var)
+    if several := next((name for name, words in fixed.items() if words[1:]), None):
+        raise ScriptError(f"-var {several} has several values", expected="one, or a distribution")
+    # Two values stand for a distribution in the plan of the study.
+    options.var = [f"{one.name}={one.law.ppf(0.3):.10g},{one.law.ppf(0.7):.10g}" for one in found]
+    options.var += [f"{name}={word}" for name, (word,) in fixed.items()]
+    plan = variables.family(options)
+    items = recorded(",".join(options.record), plan.script, plan.values)
+    runs = options.n * (len(found) + (2 if options.method == "sobol" else 1))
+    facts = {"random": described(found), "method": options.method, "n": options.n}
+    study = open_study(options, plan, out, items, strict=True, most=runs, facts=facts)
+    results = results_of(study, found, {name: word for name, (word,) in fixed.items()})
+    laws = [one.law for one in found]
+    method: Callable = {"sobol": sobol, "morris": morris}[options.method]
+    indices = method(laws, results, options.n, options.seed)
+    write(out, list(study.rows.values()))
+    heads = ["first", "total"] if options.method == "sobol" else ["mu*", "sigma"]
+    for item, rows in zip(items, indices, strict=True):
+        table = plain_table(["variable"], heads, f"\n{item.word}")
+        for one, pair in zip(found, rows, strict=True):
+            table.add_row(
+                one.name, *[str(x) if isinstance(x, Interval) else shown(x) for x in pair]
+            )
+        terminal().print(table)
+        if options.method == "sobol":
+            _doubt(rows, options.n)
+    print(f"{plural(len(study.rows), 'run')}; the table is {out}")
+    return 0
+
+
+def _doubt(rows: Sequence[tuple[Interval, Interval]], n: int) -> None:
+    widest = max(total.high - total.low for _, total in rows)
+    if widest > 0.2:
+        print(f"the widest interval is {widest:.2g}: -n {2 * n} makes them narrower")
