@@ -65,7 +65,7 @@ def tell(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> None
         print("\nin brackets: with a probability of 95 %, by resampling")
         terminal().print(table)
     if lost := len(rows) - len(done):
-        print(f"{plural(lost, 'run')} without results: the numbers are those of the others")
+        print(f"{plural(lost, 'run')} without results are left out")
     if fails and done:
         seen = sum(_happens(fails, row, results) for row in done)
         print(f"probability of {fails}: {probability(seen, len(done))}; {seen} of {len(done)} runs")
