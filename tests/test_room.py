@@ -127,7 +127,7 @@ def small(monkeypatch):
         for module in ("run.lower.memory", "scene.machine_memory"):
             monkeypatch.setattr(f"karamelo_py.{module}.machine_memory", lambda *_: there)
         for module in ("run.lower.memory", "scene.placement"):
-            monkeypatch.setattr(f"karamelo_py.{module}.FEW", 0)
+            monkeypatch.setattr(f"karamelo_py.{module}.FITS_EVERYWHERE", 0)
 
     return set_to
 
@@ -235,7 +235,7 @@ def test_what_is_not_free_but_there_is_warned_of(small, tmp_path, capsys, monkey
 def test_scenes_of_before_that_nobody_holds_are_let_go(tmp_path, capsys, monkeypatch):
     """They point to themselves, and Python's collector comes seldom."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("karamelo_py.run.lower.memory.FEW", 0)
+    monkeypatch.setattr("karamelo_py.run.lower.memory.FITS_EVERYWHERE", 0)
     held = []
 
     def there(*_) -> MachineMemory:

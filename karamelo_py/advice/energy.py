@@ -8,7 +8,7 @@ from karamelo_py.language import registry
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run import stable_step
-from karamelo_py.run.energy import TOLD
+from karamelo_py.run.energy import GROWING
 from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
@@ -50,7 +50,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return (
             f"time step is {simulation.dt / borne:.3g} x the stability limit{alone} in the "
             f"undeformed state ({borne:.4g})",
-            f"set_dt({stable_step.USUAL * borne:.3g}) or less, or remove set_dt",
+            f"set_dt({stable_step.DEFAULT_SHARE * borne:.3g}) or less, or remove set_dt",
         )
     if moves and jumps and update.transfer.traits.inverts_spread:
         return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
@@ -59,7 +59,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
         return "F-bar in the updated frame", "remove anti_volumetric_locking"
-    if keeping < stable_step.USUAL and share > keeping * (1 + 1e-9):
+    if keeping < stable_step.DEFAULT_SHARE and share > keeping * (1 + 1e-9):
         points = " with one point per cell" if stable_step.sparse(hub) else ""
         return (
             f"points crossing cells: {transfer} and {scheme} with {basis}{points} at "
@@ -105,7 +105,7 @@ def words_of_growth(hub: Hub, simulation: Simulation) -> Trouble:
     energy = simulation.control.energy[0]
     cause, fix = cause_of_gain(hub, simulation)
     gain, since = energy.grown, "since the start"
-    if energy.windows >= TOLD:
+    if energy.windows >= GROWING:
         gain, since = energy.growth, f"in the last {10 if simulation.implicit else 100} steps"
     message = (
         f"energy balance: spurious gain of {100 * gain:.2g} % of the largest energy {since} "

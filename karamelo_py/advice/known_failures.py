@@ -28,7 +28,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 
-LOOK = 100  # steps: shorter runs only inspect a scene
+PEEK = 100  # steps: shorter runs only inspect a scene
 ENDLESS = 1e8
 MIXED = 300  # step over the stable one; above, units are likelier wrong
 DENSITIES = 10.0, 1e5  # kg/m^3: foams to beyond osmium; gases excluded
@@ -41,7 +41,7 @@ UNITS = (
 
 
 def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
-    if duration >= LOOK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
+    if duration >= PEEK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
         hub.warn(
             "nothing moves in this run: all velocities, stresses and loads are zero",
             hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "

@@ -5,7 +5,7 @@ from math import inf
 from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
-from karamelo_py.schemes.traits import USUAL
+from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 LOST = 2.05  # times the stable step: every run above it failed
 NO_LIMITS = ("set_dt", "end")  # of stability
@@ -19,7 +19,7 @@ def own_step(simulation: Simulation, *, still: bool = False) -> float:
     weight = own_weight_of_drift(simulation.hub)
     rate = motion.rate if weight == motion.weight else steps.rate_with(weight)
     limit = courant * spacing / rate if rate > 0 else inf
-    step = min(share * limit, USUAL * control.heat[0].heat_limit)
+    step = min(share * limit, DEFAULT_SHARE * control.heat[0].heat_limit)
     speed = simulation.fastest() if weight != 1 else 0.0
     return float(min(step, STRIDE * spacing / speed) if speed > 0 else step)
 
@@ -69,7 +69,7 @@ def step_after_motion(simulation: Simulation) -> float:
 
 def stable_step(simulation: Simulation, limit: float) -> float:
     """The larger of `limit` and the default's stable step."""
-    return max(limit, own_step(simulation) / USUAL)
+    return max(limit, own_step(simulation) / DEFAULT_SHARE)
 
 
 def own_step_instead(simulation: Simulation, command: str = "") -> str:
@@ -93,7 +93,7 @@ def words_of_share(simulation: Simulation) -> str:
     elif asked is None:
         step = simulation.control.step[0]
         of_heat = steps.ruling_limit == "conduction"
-        words = f"{USUAL if of_heat else float(step.dt_factor):g} of the stable step, "
+        words = f"{DEFAULT_SHARE if of_heat else float(step.dt_factor):g} of the stable step, "
         words += "the program's own"
         after = step_after_motion(simulation)
         far = f"; {after:.2g} of that once points have gone a quarter of a cell"
@@ -102,6 +102,6 @@ def words_of_share(simulation: Simulation) -> str:
         share = asked
         words = f"{share:g} of the stable step, by dt_factor"
     # `large_steps` warns of a fraction above 1.
-    if max(keeping, 1e-9) * (1 + 1e-9) < share <= 1 and keeping < USUAL:
+    if max(keeping, 1e-9) * (1 + 1e-9) < share <= 1 and keeping < DEFAULT_SHARE:
         return words + f": above {keeping:g} a body that drifts gains energy"
     return words

@@ -28,7 +28,7 @@ RESOLVED = 1000  # least motion per step over the spacing of single-precision nu
 # Core seconds (Intel Xeon): a point per step (linear), log line, picture, first picture, file of
 # points, number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
-LONG = 10.0  # seconds of output worth a suggestion
+WORTHWHILE = 10.0  # seconds of output worth a suggestion
 
 
 def seconds_of_step(hub: Hub, count: int) -> float:
@@ -305,7 +305,7 @@ def _output(hub: Hub, simulation: Simulation) -> Words:
     output = LINE * times(hub.output.log) + PICTURE * pictures + DRAWING * (pictures > 0)
     output += sum(times(dump) * (FILE + NUMBER * count * len(dump.columns)) for dump in files)
     stepping = steps * seconds_of_step(hub, count)
-    if output > max(LONG, stepping):
+    if output > max(WORTHWHILE, stepping):
         lines, tables = round(times(hub.output.log)), round(sum(map(times, files)))
         yield (
             f"output takes some {output:.1g} s of a core, and the steps {stepping:.1g} s: "

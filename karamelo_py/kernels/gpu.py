@@ -23,7 +23,7 @@ from karamelo_py.kernels.equations import load_all, node_array, scattered_all, u
 from karamelo_py.kernels.equations.node_updates import at_node
 from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.stencils import gathered_by
-from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, PATIENCE, SHRUNK, SMALLEST, STOPPED
+from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, MOST_ABOVE_LIMIT, SHRUNK, SMALLEST, STOPPED
 from karamelo_py.kernels.sums import columns_in_turn
 from karamelo_py.kernels.views import PointView, node_of, place_at
 from karamelo_py.points.basis import entry, locate, support
@@ -471,7 +471,7 @@ def finish_step(i, fate, s):
 
 def end_step(i, fate, s):
     step = s.control.step[0]
-    if step.watch_limit > 0 and step.over_limit >= PATIENCE:
+    if step.watch_limit > 0 and step.over_limit >= MOST_ABOVE_LIMIT:
         fate[STATUS] = 1.0 + ABOVE_LIMIT
     elif step.limit < SMALLEST * step.first_limit:
         fate[STATUS] = 1.0 + SHRUNK

@@ -159,7 +159,7 @@ _alone: Any = functools.cache(table.one_by_one)
 
 
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)
-PATIENCE = 50  # steps above the stable limit that stop a run
+MOST_ABOVE_LIMIT = 50  # steps above the stable limit that stop a run
 SMALLEST = 1e-6  # fraction of the first stable step below which a run stops
 
 
@@ -184,7 +184,7 @@ def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
             return GAINED
         if not look_at_heat(s):
             return HEATED
-        if stepping.watch_limit > 0 and stepping.over_limit >= PATIENCE:
+        if stepping.watch_limit > 0 and stepping.over_limit >= MOST_ABOVE_LIMIT:
             return ABOVE_LIMIT
         if stepping.limit < SMALLEST * stepping.first_limit:
             return SHRUNK

@@ -78,10 +78,10 @@ class LoadPath(Named):
 SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
-HALVINGS = 8
+SEARCH_HALVINGS = 8
 DIVISIONS = 8  # of an increment that does not converge
 TOLERANCE = 1e-10  # of the stress, or of its change if elastic
-ROUNDING = 1e-13  # unresolved stress over modulus
+UNRESOLVED = 1e-13  # unresolved stress over modulus
 
 
 class Unreachable(Exception):
@@ -237,7 +237,7 @@ class Point:
             size = np.linalg.norm(residual)
             largest = float(np.abs(increment).max())
             stresses = [modulus * largest, *np.abs(target), *np.abs(self.stress)]
-            if size <= TOLERANCE * max(stresses) + ROUNDING * modulus:
+            if size <= TOLERANCE * max(stresses) + UNRESOLVED * modulus:
                 return unknown
             if not np.isfinite(size):
                 break
@@ -246,7 +246,7 @@ class Point:
                 break
             # Least squares: components without stiffness do not move.
             step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
-            for halving in range(HALVINGS):
+            for halving in range(SEARCH_HALVINGS):
                 trial = unknown + step / 2**halving
                 trial_residual = misfit(trial)
                 if np.linalg.norm(trial_residual) < size:

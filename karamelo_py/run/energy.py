@@ -26,7 +26,7 @@ from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 
-TOLD = 2  # consecutive windows of growth before a warning
+GROWING = 2  # consecutive windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
@@ -129,7 +129,7 @@ class EnergyWatch:
 
     def has_grown(self) -> bool:
         watch = self.watch
-        return bool(watch.watch_energy and (watch.windows >= TOLD or watch.grown > WITHIN))
+        return bool(watch.watch_energy and (watch.windows >= GROWING or watch.grown > WITHIN))
 
     def has_lost(self, within: float) -> bool:
         watch = self.watch

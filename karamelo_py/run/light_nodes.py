@@ -29,9 +29,9 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
-LIGHT = 0.9  # fraction of an inner node's mass
-MANY = 100_000  # target number of point-node pairs
-STEPS = 24  # iterations: within 1 % of the highest frequency
+LIGHT_SHARE = 0.9  # fraction of an inner node's mass
+MOST_PAIRS = 100_000  # target number of point-node pairs
+LANCZOS_STEPS = 24  # iterations: within 1 % of the highest frequency
 
 
 class _Line(NamedTuple):
@@ -78,7 +78,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     area = volume if radius is None else volume / radius**kin.hoops
     none = np.zeros(count)
     filled = sum((np.bincount(nodes(k), area * weight(k), count) for k in pairs), none)
-    limit = LIGHT * filled.max()
+    limit = LIGHT_SHARE * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
         for _ in range(2):  # their points, then the points of those points' nodes
@@ -86,7 +86,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
             seen = np.zeros(count, bool)
             for k in pairs:
                 seen[nodes(k)[near]] = True
-        if near.sum() * len(pairs) <= MANY or limit < 0.01 * filled.max():
+        if near.sum() * len(pairs) <= MOST_PAIRS or limit < 0.01 * filled.max():
             break
         limit *= 0.7
     if not near.any():
@@ -150,7 +150,7 @@ def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []
-    for _ in range(min(STEPS, q.size)):
+    for _ in range(min(LANCZOS_STEPS, q.size)):
         r = operator(basis[-1])
         diagonal.append(float((r * basis[-1]).sum()))
         for _ in range(2):

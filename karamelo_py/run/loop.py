@@ -21,7 +21,7 @@ from karamelo_py.scene.plugins import attributed
 from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
 
-PATIENCE = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
+SECONDS_PER_CHUNK = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
@@ -152,7 +152,7 @@ class RunLoop:
             self.tell(lambda to: to.stepped(simulation))
             rollback.act_between_steps()
             elapsed = simulation.comm.bcast(timings.passed("steps") - before["steps"])
-            in_time = PATIENCE * max(simulation.step - step, 1) / max(elapsed, 1e-9)
+            in_time = SECONDS_PER_CHUNK * max(simulation.step - step, 1) / max(elapsed, 1e-9)
             length = int(min(longest, max(1, in_time)))
             with timings.counted("output"):
                 if self._steps_left(simulation):

@@ -20,7 +20,7 @@ HALVINGS = 5  # per run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
 RETURNS = 2  # returns per state before an energy gain: two halvings without effect are enough
 LAST_GOOD = "last_good.*.h5"
-FAR = 100  # maximum steps repeated for the last rows of log and dumps
+MOST_REPEATED = 100  # maximum steps repeated for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
@@ -165,7 +165,7 @@ class RollBack:
             path = self._write_last_good()
         present.give(self.hub)  # their files are unchanged
         end = step - (status in (GAINED, HEATED))
-        if end - simulation.step <= FAR:
+        if end - simulation.step <= MOST_REPEATED:
             good.again(simulation.advance, end)
             self._end_outputs()
         return self._resume(path)

@@ -26,9 +26,9 @@ from karamelo_py.run.body_motion import motions
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
-from karamelo_py.schemes.traits import USUAL
+from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-BOXES = 6.0  # weight of a common drift in steps with boxes
+BOX_WEIGHT = 6.0  # weight of a common drift in steps with boxes
 LONE = 0.9  # fraction of an isolated point's stable step: expanded points are stiffer
 DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
 
@@ -51,14 +51,14 @@ def keeping_share(hub: Hub) -> float:
     update = hub.update
     alpha = flip_coefficient(update.transfer)
     if not update.method.frame.moves or not alpha > 0.9:
-        return USUAL
+        return DEFAULT_SHARE
     basis = update.method.basis.traits
     kind = basis.nodes_per_cell if basis.gradient_jumps else 0
-    keeping = update.scheme.traits.keeping or ((USUAL, USUAL),) * 3
+    keeping = update.scheme.traits.keeping or ((DEFAULT_SHARE, DEFAULT_SHARE),) * 3
     share = keeping[kind][sparse(hub)]
     if alpha > 0.99:
         return share
-    return max(share, DAMPED) if sparse(hub) else USUAL
+    return max(share, DAMPED) if sparse(hub) else DEFAULT_SHARE
 
 
 def _keeps_velocities(hub: Hub) -> bool:
@@ -116,7 +116,7 @@ def bears_drift(hub: Hub) -> bool:
         and not _flows(laws[0])
         and not basis.gradient_jumps
         and (basis.bears_drift or scheme.traits.bears_drift)
-        and keeping_share(hub) == USUAL
+        and keeping_share(hub) == DEFAULT_SHARE
     )
 
 
@@ -132,7 +132,7 @@ def own_weight_of_drift(hub: Hub) -> float:
     basis = hub.update.method.basis.traits
     boxes = basis.steep_edge and basis.cells > 1
     fed = boxes and _keeps_velocities(hub) and not hub.update.scheme.traits.bears_drift
-    return BOXES if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
+    return BOX_WEIGHT if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
 def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
@@ -184,7 +184,7 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
     if still:
         # An isolated point with a linear basis is stable up to 0.8 h/c in 3D.
-        share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else USUAL)
+        share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else DEFAULT_SHARE)
     courant = courant_number(hub, longer=still or bears_drift(hub))
     return min(courant, lone_point(hub)), share
 

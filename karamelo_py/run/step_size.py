@@ -26,10 +26,10 @@ from karamelo_py.run.stable_step import (
 )
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
-from karamelo_py.schemes.traits import USUAL
+from karamelo_py.schemes.traits import DEFAULT_SHARE
 from karamelo_py.script.errors import ScriptError
 
-FAR = 1e9  # cells, further than points ever move
+NO_STRIDE = 1e9  # cells, further than points ever move
 
 
 class StepPolicy(NamedTuple):
@@ -47,10 +47,10 @@ class StepPolicy(NamedTuple):
         fixed, heat = update.fixed_dt or float(update.scheme.traits.implicit), update.dt_factor
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
-            return cls(still, moving, own_weight_of_drift(hub), fixed, USUAL)
+            return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_SHARE)
         # A script's steps are fractions of h/(c + |v|), also at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
-        return cls(asked, asked, 1.0, fixed, heat or USUAL)
+        return cls(asked, asked, 1.0, fixed, heat or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
         """Return clock fields after a `path` of the points, in cells."""
@@ -170,7 +170,7 @@ class StepSize:
         before = {name: step[name] for name in numbers}
         for name, number in numbers.items():
             step[name] = number
-        stride, motion.stride = motion.stride, FAR if simulation.implicit else 1.0
+        stride, motion.stride = motion.stride, NO_STRIDE if simulation.implicit else 1.0
         if self.policy.weight != motion.weight:
             motion.weight, self.measured = self.policy.weight, False
         return numbers != before or motion.stride != stride

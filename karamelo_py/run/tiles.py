@@ -43,14 +43,14 @@ LONGER = 16  # times, along the rows of nodes in 3D, if cells have one point: ot
 SHARES = 64  # nearly equal parts of a block's points, divided among threads
 # Times the nodes: boxes with fewer rows are allocated at once, aligned with cache lines (untouched
 # pages cost no memory). Larger ones grow.
-AT_ONCE = 8
+ALLOCATED_UP_TO = 8
 DIRECT_UP_TO = 2000  # points; below, clearing and summing boxes costs more than threads save
 PART = 2000  # points per part when threads sort
-DRIFT = 1.0  # maximum cells that points move between sorts
+MOST_DRIFT = 1.0  # maximum cells that points move between sorts
 # Minimum by dimension: smaller boxes, and more neighbouring points with the same nodes; in 2D
 # sorting costs more than this gains.
-LEAST_DRIFT = {1: DRIFT, 2: DRIFT, 3: 0.25}
-STEPS = 32  # desired steps between sorts, if points may move further for it
+LEAST_DRIFT = {1: MOST_DRIFT, 2: MOST_DRIFT, 3: 0.25}
+SORT_STEPS = 32  # desired steps between sorts, if points may move further for it
 # If points scatter directly to the nodes: this only brings more nodes into use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
@@ -119,7 +119,7 @@ class Tiles:
 
     def empty_buffers(self, nodes: Nodes, blocks: int) -> Buffers:
         most = blocks * self._most_rows
-        rows = int(most) if most <= AT_ONCE * len(nodes.sums) else 0
+        rows = int(most) if most <= ALLOCATED_UP_TO * len(nodes.sums) else 0
         summed_fields = tuple(one for one in nodes.fields if isinstance(one, SummedField))
         of = nodes._replace(fields=summed_fields)
         if not self.direct:
@@ -151,7 +151,7 @@ class Tiles:
         """
         before = grid_boxes.used(s.spans)[1:].copy()
         motion = s.control.motion[0]
-        most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (DRIFT, STEPS)
+        most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (MOST_DRIFT, SORT_STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * motion.pace), most)
         # Deleted points leave an infinite drift, in the total frame too.
         motion.drift_limit = limit if s.frame.moves else np.finfo(float).max

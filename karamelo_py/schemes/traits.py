@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-USUAL = 0.9  # default fraction of the stable step
+DEFAULT_SHARE = 0.9  # default fraction of the stable step
 
 
 class SchemeTraits(NamedTuple):

@@ -29,7 +29,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 OUTPUTS = ("dump", "log", "curve", "restart")
-CLOCK = ("time", "timestep", "dt")  # values that belong to the arrays of a state
+CLOCK_VALUES = ("time", "timestep", "dt")  # values that belong to the arrays of a state
 
 Key = tuple[str, str, str]  # family, ID and style
 
@@ -49,7 +49,7 @@ class PartStates(NamedTuple):
             for key, part in parts_of(hub)
             if not families or key[0] in families
         }
-        names = (name for name in hub.values.names() if not families and name not in CLOCK)
+        names = (name for name in hub.values.names() if not families and name not in CLOCK_VALUES)
         return cls(parts, arrays, {name: hub.values.get(name) for name in names})
 
     def give(self, hub: Hub, *, cut: bool = False, anew: bool = False) -> None:

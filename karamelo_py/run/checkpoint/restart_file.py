@@ -42,7 +42,7 @@ CONTENT = (
 # From this version on HDF5 stores checksums of all but arrays, which have one as an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
-PIECE = 1 << 22  # bytes per read
+READ_AT_ONCE = 1 << 22  # bytes per read
 
 
 class Restarts(Rhythmic):
@@ -152,7 +152,7 @@ def _checksum(data: "h5py.Dataset", file: BinaryIO) -> int:
         return zlib.crc32(np.ascontiguousarray(data[()]))
     file.seek(begin)
     while left > 0:
-        piece = file.read(min(left, PIECE))
+        piece = file.read(min(left, READ_AT_ONCE))
         if not piece:
             raise OSError(f"it ends within {data.name}")
         crc, left = zlib.crc32(piece, crc), left - len(piece)

@@ -23,7 +23,7 @@ from karamelo_py.styles.methods.base import takes_average
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]
-LONG = 1e30  # a time over which viscosity sustains no stress
+RELAXED = 1e30  # a time over which viscosity sustains no stress
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
@@ -145,7 +145,7 @@ def _bears_shear(law: Tag, kin: Tag) -> bool:
     """Return True if a law resists slow shear; in 1D all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
-    _, C = on_numbers(stress_and_tangent)(law, kin, initial_state(law, kin, 1.0), rest, LONG)
+    _, C = on_numbers(stress_and_tangent)(law, kin, initial_state(law, kin, 1.0), rest, RELAXED)
     if kin.dimension == 1:
         return True
     shear = places.index((0, 1))

@@ -21,8 +21,8 @@ from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.scene.modify import Fix
 
-AT_ONCE = 8192  # points per batch of assembly
-FAR = 0.5  # cells that nodes may move at once towards others, per cell of distance
+BATCH = 8192  # points per batch of assembly
+MOST_MOVED = 0.5  # cells that nodes may move at once towards others, per cell of distance
 # The second are reused from the step before if the first are the same.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
@@ -204,7 +204,7 @@ class Equations:
         held (nodes, d) without points.
         """
         cells = u / self.s.grids.spacing[self.grid][:, None]
-        far, k = np.nonzero(np.abs(cells) > FAR)
+        far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
         g, start, way, most = self.grid[far], self.places[far], cells[far, k], 0.0
         ends = np.stack([self.s.grids.nx[g], self.s.grids.ny[g], self.s.grids.nz[g]], 1)[
             :, : self.d
@@ -214,7 +214,7 @@ class Equations:
             node = self.nodes[far] + (shift * self.steps[far]).sum(1)
             number = self.number_of(node)
             other = np.where(number >= 0, cells[number, k], 0.0)
-            meets = np.abs(way - other) > FAR * (1 + np.abs(shift).max(1))
+            meets = np.abs(way - other) > MOST_MOVED * (1 + np.abs(shift).max(1))
             meets &= (number >= 0) | held[node, k]
             most = max(most, float(np.abs(way[meets]).max(initial=0.0)))
         return most
@@ -266,9 +266,9 @@ class Equations:
                 loops.add_stiffness(self.mode, loops.PARTS, kin, seen, some, into)
                 continue
             matter = matter_of(kin, block)
-            tangent = rows_of_points((t * t, min(n, AT_ONCE)), np.float64)
-            for first in range(0, n, AT_ONCE):
-                some = loops.Tangent(first, min(first + AT_ONCE, n), tangent, done)
+            tangent = rows_of_points((t * t, min(n, BATCH)), np.float64)
+            for first in range(0, n, BATCH):
+                some = loops.Tangent(first, min(first + BATCH, n), tangent, done)
                 loops.respond_to_changes(self.mode, loops.PARTS, matter, dt, response, some)
                 loops.add_stiffness(self.mode, loops.PARTS, kin, seen, some, into)
         if ghost is not None:

@@ -30,8 +30,8 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Place, ScriptError
 
-HALVINGS = 10  # maximum, of a load step
-LONG = 1.0  # cells
+SUBSTEP_HALVINGS = 10  # maximum, of a load step
+LONG_WAY = 1.0  # cells
 
 
 class PointsWrong(Exception):
@@ -110,7 +110,7 @@ class LoadSteps:
             except Failed as reason:
                 if before is None:  # the user may end the step between substeps
                     before = self.simulation.snapshot()
-                if fraction <= 2.0**-HALVINGS:
+                if fraction <= 2.0**-SUBSTEP_HALVINGS:
                     if self.scheme.limit == "error":
                         share = f" even in 1/{round(1 / fraction)} of the load step"
                         raise NoEquilibrium(f"{reason}{share}") from None
@@ -137,7 +137,7 @@ class LoadSteps:
     def _tell_of_long_way(self, equilibrium: "Equilibrium") -> None:
         """Report once that points cross cells within a load step, which costs accuracy."""
         far = equilibrium.equations.furthest() / float(np.min(self.simulation.setup.grids.spacing))
-        if far <= LONG or self.dynamic or not self.simulation.setup.frame.moves:
+        if far <= LONG_WAY or self.dynamic or not self.simulation.setup.frame.moves:
             return
         if self.simulation.hub.update.first_time("a long way in a load step"):
             self.simulation.hub.console.say(

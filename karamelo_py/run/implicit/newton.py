@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from karamelo_py.kernels.arrays import Tag
 from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
-from karamelo_py.run.implicit.equations import FAR, Equations, Moduli
+from karamelo_py.run.implicit.equations import MOST_MOVED, Equations, Moduli
 from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
@@ -202,12 +202,12 @@ class Newton:
         if not np.all(np.isfinite(self.inner)):
             raise self._wrong(u)
         far = equations.furthest() / self.spacing
-        if far > ASTRAY * FAR:
+        if far > ASTRAY * MOST_MOVED:
             raise Loose(SINGULAR, int(np.abs(u).max(1).argmax()))
         far = max(far, np.abs(u[equations.led]).max(initial=0.0) / self.spacing)
-        if far <= FAR or not equations.s.frame.moves:
+        if far <= MOST_MOVED or not equations.s.frame.moves:
             return
         if not self.pushing:  # contact only uses the present surfaces
             far = min(far, equations.furthest_into(u, self.held()))
-        if far > FAR:
-            raise TooFar(f"points would go {far:.3g} cells at once", far / FAR)
+        if far > MOST_MOVED:
+            raise TooFar(f"points would go {far:.3g} cells at once", far / MOST_MOVED)

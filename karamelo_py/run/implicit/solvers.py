@@ -11,8 +11,8 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import MatrixRankWarning, splu
 
-MANY = 5000  # unknowns above which multigrid beats a direct solver
-MANY_IN_SPACE = 2000
+AMG_FROM = 5000  # unknowns above which multigrid beats a direct solver
+AMG_FROM_IN_3D = 2000
 MANY_ITERATIONS = 25  # above which the hierarchy is rebuilt
 
 
@@ -142,7 +142,7 @@ def solve(
     name: str, A: sp.spmatrix, b: np.ndarray, rigid: np.ndarray, accuracy: float, kept: dict
 ) -> np.ndarray:
     in_space = rigid.shape[1] == 6
-    large = np.count_nonzero(rigid.any(1)) >= (MANY_IN_SPACE if in_space else MANY)
+    large = np.count_nonzero(rigid.any(1)) >= (AMG_FROM_IN_3D if in_space else AMG_FROM)
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
         try:
             return solve("amg", A, b, rigid, accuracy, kept)

@@ -99,13 +99,13 @@ def bytes_per_point(simulation: SceneState) -> int:
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
-FEW = 100_000  # points; this number fits everywhere
+FITS_EVERYWHERE = 100_000  # points; this number fits everywhere
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
     comm = hub.settings.comm
     count = sum(solid.count for solid in hub.solids.values())
-    if count <= FEW or (memory := machine_memory(comm.on_machine)) is None:
+    if count <= FITS_EVERYWHERE or (memory := machine_memory(comm.on_machine)) is None:
         return
     need = comm.share_here * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > memory.free:

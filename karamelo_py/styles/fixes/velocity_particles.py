@@ -19,7 +19,7 @@ from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
 
 SAMPLE = 1000  # points at which formulas are compared, about
 ALIKE = 1e-6  # of a velocity, or of the wave speed: smaller differences are ignored
-HELD = " how they move, that one how they deform"
+DIFFERENT = " how they move, that one how they deform"
 
 
 def start(mass, v, x_old, x, value, before, dt, kick):
@@ -185,7 +185,7 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
         "other": other,
         "points": "all nodes around " * by_nodes + plural(len(ids), "point"),
         "axes": " and ".join(f"v{AXES[k]}" for k in axes),
-        "more": HELD * by_nodes,
+        "more": DIFFERENT * by_nodes,
         "apart": "nodes that these points do not see"
         if by_nodes
         else "groups that have no points in common",
