@@ -93,7 +93,7 @@ class FakeHub:
         from karamelo_py.output.schedule import Output
 
         used = np.arange(3) < dimension
-        self.folder = Path(folder)
+        self.folder, self.asked = Path(folder), set()
         self.domain = SimpleNamespace(
             dimension=dimension,
             lo=np.where(used, -0.5, 0.0),

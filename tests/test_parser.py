@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from karamelo_py.language.interpreter import Interpreter
-from karamelo_py.script import grammar, parser
+from karamelo_py.script import parser
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.syntax import Assignment, CommandCall, Evaluation
@@ -281,7 +281,7 @@ def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypat
     """It makes the same of a script, and of a mistake; a file that is no use is written anew."""
 
     def parsed() -> tuple:
-        grammar.parser_of.cache_clear()
+        parser.parser_of.cache_clear()
         parser._tree.cache_clear()
         with pytest.raises(ScriptError) as mistake:
             parse("a = 2^(3\n")
@@ -317,4 +317,4 @@ def test_a_parser_on_disk_is_read_and_never_a_reason_to_stop(tmp_path, monkeypat
         assert min(file.stat().st_size for file in kept) > 5000
     if state == "kept":
         assert [file.read_bytes() for file in files] == whole  # only read
-    grammar.parser_of.cache_clear()
+    parser.parser_of.cache_clear()

@@ -15,7 +15,8 @@ from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
-from karamelo_py.script.parser import parse, parse_expression, read_script
+from karamelo_py.script.parser import parse, parse_expression
+from karamelo_py.script.reading import read_script
 
 
 @dataclass

@@ -9,7 +9,8 @@ from typing import Any
 from karamelo_py.language.unknown import check_name
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.expressions import Value
-from karamelo_py.script.parser import parse, parse_text, read_script
+from karamelo_py.script.parser import parse, parse_text
+from karamelo_py.script.reading import read_script
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 _WORD = r"[^\W\d]\w*"

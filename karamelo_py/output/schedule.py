@@ -135,7 +135,8 @@ class Output:
             self.log.close()
 
     def _to_finish(self) -> list[Rhythmic | Plots]:
-        return [self.plots, *self.hub.dumps.values()] if self.writes else []
+        plots = [self.plots] if self.plots else []
+        return [*plots, *self.hub.dumps.values()] if self.writes else []
 
     def _write(self, item: Rhythmic) -> None:
         what = "write" if self.hub.settings.comm.leads else "take_part"

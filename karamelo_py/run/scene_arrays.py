@@ -27,13 +27,13 @@ from karamelo_py.run.lower.build import (
     State,
     check_scene,
     fixes_of_bodies,
+    fixes_of_walls,
     lower,
     thread_count,
     warms_by_friction,
 )
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
-from karamelo_py.run.lower.walls import key_of_walls
 from karamelo_py.run.mpi.subdomain import Subdomain
 from karamelo_py.run.step_size import carried_on
 from karamelo_py.run.tiles import WholeDomain
@@ -44,6 +44,7 @@ from karamelo_py.scene.plugins import foreign_parts
 
 def scene_key(hub: Hub) -> tuple:
     update = hub.update
+    walls = fixes_of_walls(hub) if update.method else []
     return (
         hub.domain,
         hub.domain.h if hub.domain else None,
@@ -62,7 +63,7 @@ def scene_key(hub: Hub) -> tuple:
         fields.declared(hub.fixes.values(), "node_fields"),
         hub.fields.rate_is_asked_for(),
         update.method is not None and warms_by_friction(hub),
-        key_of_walls(hub),
+        [(fix.group, fix.group.parts, fix.held_directions) for fix in walls],
         fixes_of_bodies(hub),
         hub.settings.precision,
         hub.settings.threads,

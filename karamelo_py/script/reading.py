@@ -1,9 +1,12 @@
 """Read text files in the usual encodings; refuse endless pipes."""
 
+import difflib
 import os
 import re
 import stat
 from pathlib import Path
+
+from karamelo_py.script.errors import ScriptError
 
 LARGEST = 100_000_000  # bytes of a script or a table
 _CODES = (
@@ -12,6 +15,11 @@ _CODES = (
 )  # fmt: skip
 # Shell substitutions <(command), and the read end of a pipe.
 _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
+# Endings of files that programs write next to scripts.
+_WRITTEN = (
+    *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
+    *(".LAMMPS", ".log", ".part"),
+)
 
 
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
@@ -48,3 +56,27 @@ def read_text(path: Path, largest: int | None = LARGEST) -> str:
     except UnicodeDecodeError:
         # Old editors write Latin-1, in which every byte is valid.
         return data.decode("latin-1")
+
+
+def read_script(path: Path) -> str:
+    try:
+        return read_text(path)
+    except IsADirectoryError:
+        expected = "the name of a script"
+        raise ScriptError(f"{path} is a folder", expected=expected, code="file") from None
+    except FileNotFoundError:
+        parent = path.parent
+        files = parent.iterdir() if parent.is_dir() else ()
+        scripts = sorted(f.name for f in files if f.suffix not in _WRITTEN and f.is_file())
+        close = difflib.get_close_matches(path.name, scripts, n=1, cutoff=0.75)
+        where = "" if parent.is_dir() else f": the folder {parent} does not exist"
+        raise ScriptError(
+            f"there is no file {path}{where}",
+            code="no-file",
+            expected="the name of a script",
+            hint=f"did you mean {parent / close[0]}?" if close else None,
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        message = f"{path} cannot be read: {reason}"
+        raise ScriptError(message, expected="a script, which is a text file", code="file") from None

@@ -20,7 +20,8 @@ from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError, meant, plural, unknown
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
-from karamelo_py.script.parser import parse, parse_text, read_script
+from karamelo_py.script.parser import parse, parse_text
+from karamelo_py.script.reading import read_script
 from karamelo_py.script.syntax import Assignment, CommandCall, FunctionCall, Node, Raw
 from karamelo_py.script.terms import number_of
 

@@ -23,7 +23,7 @@ from karamelo_py.kernels.table import Insulated
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import owners_of_fields
 from karamelo_py.points import laws
-from karamelo_py.points.basis import carried, deformed
+from karamelo_py.points.basis import carried, deformed, walled
 from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws.eos import taken_heat
@@ -42,6 +42,7 @@ from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
+from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError, render_message
 
@@ -135,7 +136,8 @@ def lower(
     lattices = method.lattices(hub)
     transfer = hub.update.transfer_tag(real)
     basis = type(method.basis)(*(real(x) for x in method.basis))
-    basis = with_walls(hub, lattices, basis)
+    if fixes := fixes_of_walls(hub):
+        basis = with_walls(fixes, lattices, basis)
     cut = lattices, basis, sum(solid.count for solid in hub.solids.values()), sparse(hub)
     if comm.size == 1:
         tiles = Tiles(*cut)
@@ -207,6 +209,12 @@ def returns_loss(hub: Hub) -> bool:
     if not lost_fractions.defined(type(transfer)) or keeps_all:
         return False
     return any(laws.can(solid.material.law, taken_heat) for solid in hub.solids.values())
+
+
+def fixes_of_walls(hub: Hub) -> list[Fix]:
+    if not walled.defined(type(hub.update.method.basis)):
+        return []
+    return [fix for fix in hub.fixes.values() if fix.held_directions and not fix.group.all]
 
 
 def warms_by_friction(hub: Hub) -> bool:

@@ -8,24 +8,11 @@ import numpy as np
 
 from karamelo_py.points.basis import walled
 from karamelo_py.points.basis.splines import ABOVE, BELOW
-from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 
 
-def fixes_of_walls(hub: Hub) -> list[Fix]:
-    method = hub.update.method
-    if method is None or not walled.defined(type(method.basis)):
-        return []
-    return [fix for fix in hub.fixes.values() if fix.held_directions and not fix.group.all]
-
-
-def key_of_walls(hub: Hub) -> tuple:
-    return tuple((fix.group, fix.group.parts, fix.held_directions) for fix in fixes_of_walls(hub))
-
-
-def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:
-    fixes = fixes_of_walls(hub)
+def with_walls(fixes: list[Fix], lattices: list[Lattice], basis: NamedTuple) -> NamedTuple:
     walls = []
     for axis in sorted({axis for fix in fixes for axis in fix.held_directions}):
         nodes = np.unique(np.concatenate([f.nodes for f in fixes if axis in f.held_directions]))
@@ -37,7 +24,7 @@ def with_walls(hub: Hub, lattices: list[Lattice], basis: NamedTuple) -> NamedTup
     if not walls:
         return basis
     cells = sum(math.prod(lattice.cells) for lattice in lattices)
-    faces = np.zeros((cells, hub.domain.dimension), np.int8)
+    faces = np.zeros((cells, lattices[0].dimension), np.int8)
     for lattice, direction, above in walls:
         for step, side in ((0, BELOW), (-1, ABOVE)):
             cell = above.copy()
