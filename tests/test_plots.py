@@ -10,7 +10,7 @@ from fakes import FakeHub
 
 from karamelo_py.output.plots import PlottedCurve
 from karamelo_py.output.quantity import Quantity
-from karamelo_py.output.units import Units
+from karamelo_py.output.units import ENERGY, Units
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_two_axes_and_units(hub):
     """A curve over a logarithmic axis at the right, and units of what a compute publishes."""
     hub.output.plots.file = Path("energies.svg")
     hub.output.units = Units("mm", "g", "ms")
-    hub.computes["Ek"] = SimpleNamespace(style="kinetic_energy", published=("s",))
+    hub.computes["Ek"] = SimpleNamespace(unit=ENERGY, published=("s",))
     quantities = Quantity(hub, "time"), Quantity(hub, "Es_s")
     axis = {"side": "right", "scale": "log", "label": "stored (mJ)"}
     hub.output.plots.add("stored", PlottedCurve(1, *quantities, **axis))
