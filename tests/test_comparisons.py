@@ -60,6 +60,7 @@ SHARED = {
     "two_disks": "disks", "axis_aligned": "neo-hookean",
     "hertz": "contact", "slump": "soil",
     "dam_break": "water", "dam_ritter": "water",
+    "thick_cylinder": "implicit",
 }  # fmt: skip
 # Of these a sibling shows the same in less: a cylinder and a vertical cut in test_implicit.py,
 # slump, taylor_bar_axisymmetric, friction in test_contact_grid.py, disks that turn in
