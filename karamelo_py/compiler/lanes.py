@@ -17,10 +17,21 @@ from numba import types
 
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code import machine
-from karamelo_py.compiler.llvm import I32, I64, Lanes, LaneType, lane, pack, shuffle, splat
+from karamelo_py.compiler.llvm import (
+    I32,
+    I64,
+    Lanes,
+    LaneType,
+    lane,
+    pack,
+    scalar_of,
+    shuffle,
+    splat,
+)
 from karamelo_py.compiler.trace.primitives import (
     all_same,
     implements,
+    in_lanes,
     index,
     lanes_of,
     real,
@@ -34,70 +45,49 @@ REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays prefetched ahead
 
 
-@shared
+def _largest(builder: ir.IRBuilder, lanes: Lanes, vector: ir.Value) -> ir.Value:
+    best = lane(builder, vector, 0)
+    for k in range(1, lanes.width):
+        value = lane(builder, vector, k)
+        best = builder.select(builder.fcmp_ordered(">", value, best), value, best)
+    return best
+
+
+@in_lanes(scalar_of, _largest)
 def largest(a: float) -> float:
     """Return the maximum over the lanes."""
     return a
 
 
-@implements(largest, Lanes)
-@intrinsic
-def _largest_lane(a):
-    def codegen(builder, vector):
-        best = lane(builder, vector, 0)
-        for k in range(1, a.width):
-            value = lane(builder, vector, k)
-            best = builder.select(builder.fcmp_ordered(">", value, best), value, best)
-        return best
-
-    return a.scalar(a), codegen
+def _first_false(builder: ir.IRBuilder, lanes: Lanes, mask: ir.Value) -> ir.Value:
+    first = I64(0)
+    for k in reversed(range(lanes.width)):
+        first = builder.select(lane(builder, mask, k), first, I64(k))
+    return first
 
 
-@shared
+@in_lanes(lambda lanes: types.int64, _first_false)
 def first_false_lane(condition: bool) -> int:
     """Return the first lane where a condition is false; 0 for a number."""
     return 0
 
 
-@implements(first_false_lane, Lanes)
-@intrinsic
-def _first_false(mask):
-    def codegen(builder, value):
-        first = I64(0)
-        for k in reversed(range(mask.width)):
-            first = builder.select(lane(builder, value, k), first, I64(k))
-        return first
-
-    return types.int64(mask), codegen
-
-
-@shared
+@in_lanes(scalar_of, lambda builder, lanes, vector: lane(builder, vector, 0))
 def first_lane(number: int) -> int:
     """Return the number in the first lane."""
     return number
 
 
-@implements(first_lane, Lanes)
-@intrinsic
-def _first(a):
-    return a.scalar(a), lambda builder, value: lane(builder, value, 0)
+def _added(builder: ir.IRBuilder, lanes: Lanes, total: ir.Value, vector: ir.Value) -> ir.Value:
+    for k in range(lanes.width):
+        total = builder.fadd(total, lane(builder, vector, k))
+    return total
 
 
-@shared
+@in_lanes(scalar_of, _added)
 def added(total: float, value: float) -> float:
     """Add to `total`, lane after lane, as for numbers."""
     return total + value
-
-
-@implements(added, Lanes)
-@intrinsic
-def _added_lanes(total, a):
-    def codegen(builder, so_far, value):
-        for k in range(a.width):
-            so_far = builder.fadd(so_far, lane(builder, value, k))
-        return so_far
-
-    return total(total, a), codegen
 
 
 def beside(first: int, steps: int) -> int:
@@ -117,7 +107,7 @@ def of_present(p: int, value: float) -> float:
     return value
 
 
-@shared
+@in_lanes(lambda lanes: types.boolean, lambda builder, lanes, nodes: all_same(builder, nodes))
 def is_one(number: int) -> bool:
     return True
 
@@ -402,12 +392,6 @@ def _set(array, at, value):
     if isinstance(array, types.Array) and isinstance(_index_at(at, -1), LaneGroup):
         return _store_points
     return None
-
-
-@implements(is_one, Lanes)
-@intrinsic
-def _is_one(nodes):
-    return types.boolean(nodes), all_same
 
 
 @implements(beside, Lanes)

@@ -203,26 +203,36 @@ def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> ir.Va
     return builder.icmp_signed(sign, bits, ir.Constant(bits.type, wanted))
 
 
-@shared
+def in_lanes(result: Callable, code: Callable) -> Callable[[Callable], Callable]:
+    """Decorate a helper of numbers with its code for lanes, the type of its first argument.
+
+    There it returns ``result(lanes)``, written by ``code(builder, lanes, *values)``.
+    """
+
+    def declare(function: Callable) -> Callable:
+        @implements(function, Lanes)
+        @intrinsic
+        def of_lanes(*kinds):
+            lanes = next(kind for kind in kinds if isinstance(kind, Lanes))
+            return result(lanes)(*kinds), lambda builder, *values: code(builder, lanes, *values)
+
+        return shared(function)
+
+    return declare
+
+
+def _truth(lanes: Lanes) -> types.Type:
+    return types.boolean
+
+
+@in_lanes(_truth, lambda builder, lanes, mask: _all_bits(builder, mask, "==", -1))
 def all_lanes(condition: bool) -> bool:
     return condition
 
 
-@implements(all_lanes, Lanes)
-@intrinsic
-def _all(mask):
-    return types.boolean(mask), lambda builder, bits: _all_bits(builder, bits, "==", -1)
-
-
-@shared
+@in_lanes(_truth, lambda builder, lanes, mask: _all_bits(builder, mask, "!=", 0))
 def any_lane(condition: bool) -> bool:
     return condition
-
-
-@implements(any_lane, Lanes)
-@intrinsic
-def _any(mask):
-    return types.boolean(mask), lambda builder, bits: _all_bits(builder, bits, "!=", 0)
 
 
 def all_same(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
