@@ -193,7 +193,6 @@ def text_of(
 
 
 def numbers_of(function: Callable, arguments: tuple) -> int:
-    """Count the numbers a thread function returns."""
     kinds = plan_for(arguments).types
     with in_one({}):
         return len(traced(function, (*kinds, types.int64)).result)

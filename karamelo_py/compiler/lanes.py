@@ -74,7 +74,6 @@ def first_false_lane(condition: bool) -> int:
 
 @in_lanes(scalar_of, lambda builder, lanes, vector: lane(builder, vector, 0))
 def first_lane(number: int) -> int:
-    """Return the number in the first lane."""
     return number
 
 

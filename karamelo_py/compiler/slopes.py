@@ -106,7 +106,6 @@ def is_tensor(thing: Any) -> bool:
 
 
 def value_of(x: Any) -> Any:
-    """Drop the slopes of a number, or of a tuple's numbers."""
     if isinstance(x, Dual):
         return x.value
     if isinstance(x, tuple):

@@ -232,7 +232,6 @@ def _call(task, arguments, number):
 
 @in_kernels
 def _regardless(lowering: Any, function: Callable, *arguments: Any) -> Any:
-    """Call a function, leaving exceptions to the caller."""
     lowering.regardless = True
     try:
         return function(*arguments)

@@ -5,7 +5,6 @@ Comprehensions make lists, which Python interprets in two thirds of the time.
 
 
 def flat(nested):
-    """List the numbers of nested tuples in order."""
     numbers = ()
     for item in nested:
         numbers += flat(item) if isinstance(item, tuple) else (item,)
@@ -13,7 +12,6 @@ def flat(nested):
 
 
 def nested_as(like, numbers):
-    """Nest numbers like `like`, in its classes."""
     made, begin = [], 0
     for item in like:
         inner = isinstance(item, tuple)

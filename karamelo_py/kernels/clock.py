@@ -92,7 +92,6 @@ def choose_dt(control: Control) -> None:
 
 @kernel
 def finish(control: Control) -> None:
-    """End a step: advance time, swap the arrays of places, choose the next dt."""
     step, motion = control.step[0], control.motion[0]
     motion.now = 1 - motion.now
     dt = control.values[DT]

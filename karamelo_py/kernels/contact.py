@@ -249,7 +249,6 @@ def _entering(bodies, n, other, velocity, least):
 
 
 def _across(direction, other):
-    """Return the component of `direction` perpendicular to `other`."""
     square = dot(other, other)
     return direction - (dot(direction, other) / square if square > 0 else 0.0) * other
 
@@ -272,7 +271,6 @@ def _entering_corner(bodies, n, other, velocity):
 
 @noinline
 def _normal_of_led(bodies, n, other, velocity, may_be_hollow):
-    """Return normal, scatter, and whether the corner is hollow, of a prescribed body."""
     normal, scatter = _normal(bodies, n, other)
     hollow = may_be_hollow and scatter >= EDGE and _is_hollow(bodies, n, normal, other)
     if hollow:
@@ -283,7 +281,6 @@ def _normal_of_led(bodies, n, other, velocity, may_be_hollow):
 
 @noinline
 def _pair_of(bodies, records, n, m, may_be_hollow):
-    """Pair the bodies at nodes `n` and `m`, with velocities `records`."""
     contact, kin, nodes = bodies
     per_n, per_m = 1.0 / nodes.sums[n, MASS], 1.0 / nodes.sums[m, MASS]
     zero = zero_vector(kin, 0.0)

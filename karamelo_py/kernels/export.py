@@ -17,7 +17,6 @@ EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy 
 
 @kernel
 def export_state(matter, out):
-    """Fill ``out`` (n, EXPORTED)."""
     kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)

@@ -275,7 +275,6 @@ class Stage:
         return age_node
 
     def mark(self) -> Callable:
-        """Return the function of a cell that marks its nodes as used."""
         count, only_if_more = self.support, self.row.only_if_more
 
         def mark_nodes(i, fate, s, cells, use):
@@ -432,7 +431,6 @@ def put_rows(i, fate, rows, room):
 
 
 def of_nodes(row: Any) -> Callable:
-    """Return the function of a node for a `NodeTask`."""
     task, at, length = row.task, row.at or (lambda s: s), row.length or kick
     made = task if callable(task) else lambda s: task
 
@@ -449,7 +447,6 @@ def clear(i, fate, array, first):
 
 
 def take_reports(take: Callable) -> Callable:
-    """Return the function that passes a visit's reports to the clock."""
 
     def take_all_reports(i, fate, s):
         motion = s.control.motion[0]

@@ -78,12 +78,10 @@ def count_node(i, fate, s, about):
 
 
 def hooked_nodes(target: int, of_heat: bool = False) -> Callable:
-    """Return the `nodes_of` of hooks on node components; temperatures as in FLIP."""
     return lambda s: hook_loop.hooked_nodes(s, target, 1.0 if of_heat else s.control.step[0].kept)
 
 
 def whole_nodes(target: int, stage: int) -> Callable:
-    """Return the `nodes_of` of hooks on whole nodes."""
     return lambda s, tag: hook_loop.whole_nodes(s, tag, stage, target)
 
 
@@ -126,7 +124,6 @@ def clear_force(i, fate, s, block):
 
 
 def whole_points(heats: bool) -> Callable:
-    """Return the `points_of` of hooks on whole points."""
     return lambda s, block, then, tag: hook_loop.whole_points(
         tag, s, block, then, heat_of(block.points) if heats else ()
     )
@@ -283,7 +280,6 @@ def add_work(i, fate, s, block, copies):
 
 
 def look_before(i, fate, s):
-    """Store the energies for a look at the next step."""
     totals.carry(s.control.totals[totals.WORK])
     watch.take_energies(s)
     watch.note_before(s.control.energy[0], int(s.control.values[TIMESTEP]))

@@ -235,7 +235,6 @@ def _evaluate_now_and_before(call, c, count):
 
 @noinline
 def _published(hooks, h):
-    """Return the first total of a hook, and their number."""
     slot = hooks.table[h].slot
     if hooks.table[h].address == arrays.WHOLE:
         return slot, hooks.table[h].totals
@@ -392,7 +391,6 @@ def _change_nodes(members, call, count):
 
 
 def _called(call, state, force, values):
-    """Call a node function with (mass, v, v*), force, and values of formulas."""
     hook = call.hooks.table[call.h]
     return _call_node_function(hook.address, *state, force, *values, call.dt, call.share)
 

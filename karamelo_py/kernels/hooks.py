@@ -88,7 +88,6 @@ class CompiledHook(NamedTuple):
 
     @property
     def signature(self) -> Any:
-        """The Numba type of the function."""
         return FUNCTIONS[self.where]
 
 

@@ -101,7 +101,6 @@ def nothing_seen(s: Setup, block: Block) -> tuple[Seen, Response]:
 
 
 def points_of(count, k):
-    """Return the first of `count` points of a part."""
     groups = (count + GROUP - 1) // GROUP
     return min(GROUP * (groups * k // PARTS), count)
 
@@ -205,7 +204,6 @@ def respond(matter, dt, response, part):
 
 @by_threads
 def respond_to_changes(matter, dt, response, tangent, part):
-    """Compute the stress derivatives of some points."""
     matter, response = at_hand(matter), at_hand(response)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)

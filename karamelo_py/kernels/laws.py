@@ -12,7 +12,6 @@ from karamelo_py.points.laws.parameters import Numbers
 
 
 def law_in(law: Any, real: type) -> Any:
-    """Return the law with numbers of type `real`."""
     return type(law)(*(_in(p, real) for p in law))
 
 

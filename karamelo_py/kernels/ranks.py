@@ -47,7 +47,6 @@ def _number_of_all_linked(ranks, control, number):
 
 
 def _largest(address, answer, numbers):
-    """Return the largest of each number among the processes."""
     for k, number in enumerate(numbers):
         answer[k] = number
     _call(address, LARGEST, len(numbers), 0)

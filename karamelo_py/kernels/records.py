@@ -108,7 +108,6 @@ def _transposed(builder: ir.IRBuilder, rows: list) -> list:
 
 
 def _record(builder: ir.IRBuilder, kind: Any, pointer: ir.Value, components: int) -> ir.Value:
-    """Cast a pointer to one to a vector of components."""
     vector = ir.VectorType(llvm.register_type(kind.dtype), components)
     return builder.bitcast(pointer, vector.as_pointer())
 
@@ -259,7 +258,6 @@ def _move(*kinds):
 
 
 def _records(builder: ir.IRBuilder, parts: list) -> list:
-    """Return four records of four, two or one components from lanes."""
     if len(parts) == 4:
         return _transposed(builder, parts)
     if len(parts) == 2:

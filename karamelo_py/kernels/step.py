@@ -151,7 +151,6 @@ step, begin = _taking(rows_of), _taking(first_rows)
 
 
 def take_rows(rows: tuple, s: Setup, mode: Tag, hooks: Tag) -> bool:
-    """Take some rows from Python; return whether no point failed."""
     return _take_all(_alone(rows), s, InStep(mode, hooks, False))
 
 

@@ -83,7 +83,6 @@ def _from_line(a, b, x):
 
 
 def _share_along(way, local):
-    """Return the fraction of a segment at the point nearest to a place."""
     return min(max(dot(way, local) / max(way.squared(), TINY), 0.0), 1.0)
 
 
@@ -94,7 +93,6 @@ def _cross(a, b):
 
 
 def _is_above(corners, normal, size, x):
-    """Return True if `x` projects into a triangle."""
     (a, b, c), above = corners, size > TINY
     above = above and dot(_cross(b - a, x - a), normal) >= 0
     above = above and dot(_cross(c - b, x - b), normal) >= 0

@@ -256,7 +256,6 @@ _SAYS: dict[type, Any] = {
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """Describe a row; None if it does nothing in this scene."""
     return _SAYS[type(row)](row, setup) if type(row) in _SAYS else None
 
 

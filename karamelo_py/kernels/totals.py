@@ -40,7 +40,6 @@ def _grow(totals, row, limb, number):
 
 @noinline
 def add_to(totals, row, x):
-    """Add `x` without rounding."""
     if x == 0.0:
         return
     bits = np.float64(x).view(np.int64)
@@ -178,7 +177,6 @@ def counts(ranks, n):
 
 @point_function(otherwise=True)
 def number_of_all(ranks, control, number):
-    """Sum a number over all processes."""
     return number
 
 

@@ -87,7 +87,6 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
 
     @property
     def v(self):
-        """The deforming velocity."""
         kin, records = self.w.kin, self.w.nodes.velocity
         if many_threads() and not isinstance(self.i, Weighted):
             return vector(kin, aligned_record(records, self.i, of_change(kin))[: kin.dimension])

@@ -156,7 +156,6 @@ def _add_momentum(control, solid, d):
 
 
 def _sum_drift(s):
-    """Sum kinetic energies of centres of mass in the clock, after `sum_energies`."""
     control, d = s.control, s.kin.dimension
     first_row = control.values.size
     control.totals[first_row:] = 0
@@ -340,7 +339,6 @@ def begin_to_look(s, mode, level, anew):
 
 
 def look(s, mode):
-    """Check the energy if due; return whether it is within its bound."""
     energy = s.control.energy[0]
     if energy.watch_energy == 0:
         return True

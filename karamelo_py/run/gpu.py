@@ -102,7 +102,6 @@ class StepsOnCard:
         self.ordered = -np.inf  # path of the points at the last reordering, in cells
 
     def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
-        """Return the launches of a step, and of the last of several."""
         begin, end = self._clear(*self._slots()), [self.launch(gpu.finish_step, 1, self.s)]
         own = self._launches(rows)
         last = [launch for launch in own if launch not in self._ahead]
@@ -160,7 +159,6 @@ class StepsOnCard:
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
     def of_points(self, function: Callable, block: Any, *rest: Any, **more: Any) -> KernelLaunch:
-        """Launch ``function(i, fate, s, block, *rest)`` per point."""
         return self.launch(function, block.points.mass.size, self.s, block, *rest, **more)
 
     def _launches(self, rows: list) -> list[KernelLaunch]:
@@ -361,7 +359,6 @@ class StepsOnCard:
         return [*self.collect(*self._rows_of(h)), self._publish_some((h, h + 1), True)]
 
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
-        """Return the launches that measure energy: before a step, and a step later."""
         s, sums = self.s, self.s.control.totals
         copies, solids = self.copies, (len(s.control.values), len(sums))
         found = [*self._clear(0, WORK), *self._clear(*solids)]
@@ -432,7 +429,6 @@ class StepsOnCard:
         return int(status) - 1 if status > 0 else DONE
 
     def _order_if_due(self) -> None:
-        """Reorder points in memory once some have moved far."""
         gone = self.fate[gpu.DRIFT]
         if gone - self.ordered > FAR:
             self.ordered = gone

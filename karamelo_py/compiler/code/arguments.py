@@ -88,7 +88,6 @@ class ArgumentBuffer:
         self.words += words
 
     def _of(self, items: tuple) -> tuple[list, bool]:
-        """Return a tuple's words, and whether it contains arrays."""
         words: list = []
         arrays = False
         kinds = self.kinds
@@ -193,7 +192,6 @@ def plan_for(arguments: tuple) -> Plan:
 
 
 def reader(kind: types.Type) -> tuple[int, Callable[[bytearray], Any]]:
-    """Return a result's size in bytes, and its reader."""
     places: list[tuple[int, str]] = []
     size, _ = _lay(llvm.memory_type(kind), 0, places)
 

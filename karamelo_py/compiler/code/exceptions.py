@@ -108,7 +108,6 @@ def _return(builder: ir.IRBuilder) -> None:
 
 
 def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
-    """Write code that records an exception and returns."""
     text = pickle.dumps((kind, arguments))
     constant = ir.Constant(ir.ArrayType(llvm.I8, len(text)), bytearray(text))
     constant_at = llvm.in_module(builder, constant, "exception")

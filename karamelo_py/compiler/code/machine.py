@@ -93,7 +93,6 @@ def assembly(text: str, triple: str, processor: str, library: bytes | None = Non
 
 
 def load(code: bytes, *names: str) -> list[int]:
-    """Load machine code; return addresses of functions."""
     engine = _engine()
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()

@@ -59,7 +59,6 @@ def note(modules: Iterable[str]) -> None:
 
 @contextmanager
 def modules_noted() -> Iterator[set[str]]:
-    """Collect the modules recorded within this context."""
     modules: set[str] = set()
     before = _noted.set((*_noted.get(), modules))
     try:

@@ -109,7 +109,6 @@ class Flow:
         return Edge(self.builder and self.builder.block, names, self.lowering.read)
 
     def split(self, condition: Value) -> tuple[Edge, Edge]:
-        """Start two branches, for a condition true and false."""
         truth = emit(bool, condition)
         blocks = self._block(), self._block()
         if self.builder:

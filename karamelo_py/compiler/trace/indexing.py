@@ -17,7 +17,6 @@ def _indices(index: Any) -> tuple:
 
 
 def is_part(kind: types.Array, index: Any) -> bool:
-    """Return True if indices select a slice."""
     places = _indices(index)
     return len(places) < kind.ndim or any(isinstance(one, slice) for one in places)
 

@@ -52,7 +52,6 @@ class Unit(NamedTuple):
 
 
 def load(unit: Unit) -> list[int]:
-    """Load a unit; return the addresses of function and entry."""
     with one_at_a_time:
         loaded = session.loaded
         if unit.name not in loaded:
@@ -157,7 +156,6 @@ def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
 
 
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
-    """Write the entry, called with addresses of arguments, result and `Failure`."""
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [llvm.I64] * 3), NAME + ENTRY)
     builder = ir.IRBuilder(entry.append_basic_block("entry"))
     value = builder.call(main, [*items_at(builder, kinds, entry.args[0]), entry.args[2]])
@@ -214,7 +212,6 @@ class Kernel:
         self._planned(ArgumentBuffer(arguments), arguments)
 
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:
-        """Return argument layout, entry, and result size and reader."""
         kinds = tuple(written.kinds)
         self._find_changes()
         plans = self._plans

@@ -91,7 +91,6 @@ class Lowering:
         raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
-        """Return the LLVM value of a thing in type `wanted`."""
         if isinstance(thing, _TRACED):
             return llvm.cast(self.builder, thing._value, thing._kind, wanted)
         if isinstance(thing, tuple):
@@ -202,7 +201,6 @@ class Lowering:
         return functions[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
-        """Return from the present function with `run`'s result."""
         passed = iter(values)
         with traced.writing(self):
             value = run(

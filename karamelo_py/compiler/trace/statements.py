@@ -77,7 +77,6 @@ def _has(node: ast.expr, code: python.CodeType) -> bool:
 
 @functools.cache
 def source_of(code: python.CodeType) -> list[ast.stmt]:
-    """Return the statements of a function; for a lambda, its return."""
     text = "".join(linecache.getlines(code.co_filename))
     if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start anew")
@@ -212,7 +211,6 @@ class AstCompiler:
 
     @property
     def branches(self) -> bool:
-        """Return True in a branch or loop of the kernel."""
         return bool(self.depth or self.returns or self.breaks or self.continues)
 
     # --- branches
@@ -622,7 +620,6 @@ class AstCompiler:
             go_back()
 
     def state(self) -> Callable[[], None]:
-        """Return a function that restores the present state."""
         names, depth = dict(self.names), self.depth
         breaks, continues = self.breaks, self.continues
         returns, read = [*self.returns], dict(self.flow.lowering.read)

@@ -53,7 +53,6 @@ _lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", 
 
 
 def now() -> Any:
-    """Return the active `Lowering`."""
     return _lowerings.get()[-1]
 
 
@@ -72,12 +71,10 @@ def at_work() -> bool:
 
 
 def is_begun(key: tuple) -> bool:
-    """Return True if this function's result type is being determined."""
     return any(lowering.key == key for lowering in _lowerings.get())
 
 
 def _real_kind(thing: Any) -> Any:
-    """Return the type of a real number or real lanes, or None."""
     kind = scalar_of(thing._kind) if isinstance(thing, Value) else None
     return kind if isinstance(kind, types.Float) else None
 

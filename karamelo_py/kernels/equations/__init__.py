@@ -229,7 +229,6 @@ def mass(pt):
 
 @reads("v")
 def v(pt):
-    """Velocity (d,)."""
     return pt.v
 
 

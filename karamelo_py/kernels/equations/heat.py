@@ -82,7 +82,6 @@ def content(pt):
 
 @eq.reads("heat gradient")
 def heat_gradient(pt):
-    """Gradient of temperature (d,)."""
     return pt.load(HeatGradient, pt.v)
 
 
@@ -95,13 +94,11 @@ def temperature_at(pt, node):
 
 
 def heat_at(pt, node):
-    """Capacity and heat."""
     capacity = at_least_round_off(node.N) * pt.content[0]
     return capacity, capacity * temperature_at(pt, node)
 
 
 def mean_at(pt, node):
-    """Conductance times temperature, and conductance."""
     conductance = at_least_round_off(node.N) * pt.content[1]
     return conductance * temperature_at(pt, node), conductance
 
@@ -126,7 +123,6 @@ def flow(pt):
 
 @eq.reads()
 def supply(pt):
-    """Heat per time from fixes."""
     return of_present(pt.p, pt.of(Supply)[0, pt.p])
 
 

@@ -33,7 +33,6 @@ class SeriesTerm(namedtuple("SeriesTerm", "k"), eq.Task):
 
 @eq.reads("term of series")
 def term(pt):
-    """Term of the series (d,)."""
     return pt.load(TermOfSeries, pt.v)
 
 
