@@ -102,6 +102,8 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
         raise ScriptError(message, argument="ID", expected=expected)
     catalogue.refuse_unnameable(ID)
     _check_names(hub, kind, ID, target)
+    if kind == "fix" and target.reads_itself and ID not in catalogue:
+        hub.values.publish_vector(ID, target.published)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
     new.style = style
     if kind == "fix" and new.by_sizes and hub.domain.thickness != 1:

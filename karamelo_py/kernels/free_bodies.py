@@ -9,8 +9,9 @@ is known in closed form::
     p_t = m (A U - v*)_t, but at most mu p_n
 
 so the body's equations alone remain, M (U - U*) + sum A^T p = 0, six at most, solved by Newton's
-method: the mass of what it touches does not limit the step. Contact at points has s = k / (1 + k),
-k = 0.1 (dt / dt0)^2 with the whole step dt0: an implicit spring. Contact at nodes has s = 1.
+method: the mass of what it touches does not limit the step. Contact at points has s = 0.1 (dt /
+dt0)^2 with the whole step dt0: an implicit spring, as stiff in shortened steps. Contact at nodes
+has s = 1.
 
 Forces act over `kick`, motion over dt. Between the forces the angular momentum is constant, and the
 body rotates about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma &
@@ -26,10 +27,19 @@ import numpy as np
 from karamelo_py.compiler import kernel, noinline
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import DT, MASS, TIMESTEP, Tag, of_change, of_momentum
+from karamelo_py.kernels.arrays import (
+    DT,
+    MASS,
+    ON_UPDATE,
+    POST_CONTACT,
+    TIMESTEP,
+    Tag,
+    of_change,
+    of_momentum,
+)
 from karamelo_py.kernels.contact import Bodies, ListedPairs, SeparateFields, list_pairs
 from karamelo_py.kernels.surfaces import depth, slopes
-from karamelo_py.kernels.table import Once, each_point
+from karamelo_py.kernels.table import AtNodes, Once, each_point
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, SOFT, direction_of
 from karamelo_py.kernels.views import place_at, state_at, volume_of
@@ -104,6 +114,10 @@ class NoBodies(NamedTuple):
 class FreeBodies(NamedTuple):
     bodies: tuple[FreeBody, ...]
     held: np.ndarray  # (N, d) bool: nodes whose velocity is prescribed
+
+
+class BodiesAtPoints(FreeBodies):
+    """Bodies without contact at nodes."""
 
 
 # --- rotation ---------------------------------------------------------------------------------
@@ -557,7 +571,7 @@ def _list_point(body, surface, s, block, p):
             contact[SOFT_V + c] += weight * s.nodes.update[n, c]
     stiffness = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
     contact[GAP], contact[SOFT_MASS], contact[MU] = -within - ball, points.mass[p], surface.mu
-    contact[SHARE], contact[MOST] = stiffness / (1 + stiffness), 0.0
+    contact[SHARE], contact[MOST] = stiffness, 0.0
     return True
 
 
@@ -748,5 +762,6 @@ def _lead(body, s, points, p):
 
 FreeBodies.rows_first = (Once(_meet),)  # type: ignore[attr-defined]
 FreeBodies.rows_last = (Once(_part), each_point(_lead_point, Rigid))  # type: ignore[attr-defined]
+BodiesAtPoints.rows_last = (*FreeBodies.rows_last, AtNodes(POST_CONTACT, ON_UPDATE))  # type: ignore[attr-defined]
 FreeBodies.rows_before = (Once(_follow_before),)  # type: ignore[attr-defined]
 FreeBodies.rows_after = (Once(_follow_again),)  # type: ignore[attr-defined]

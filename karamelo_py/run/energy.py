@@ -41,8 +41,9 @@ def unknown_work(hub: Hub) -> str:
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
         if acts and not fix.first_step_only and not fix.conserves:
             return f"fix {fix.style} '{fix.id}'"
+    free = [fix.body for fix in hub.fixes.values()]
     for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity) and apart:
+        if can(solid.material.law, constrained_velocity) and apart and solid not in free:
             return f"rigid solid '{solid.id}'"
         if hub.update.thermal and can(solid.material.law, initial_heat):
             return "heat"

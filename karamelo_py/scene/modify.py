@@ -112,6 +112,7 @@ class Fix(Publisher):
     by_sizes = False  # sizes of points follow from their volumes, without a thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
+    reads_itself = False  # its formulas may contain its own values
     body: Any = None  # rigid solid that moves by the forces on it
     ignites = False
     follows_points = False  # force depends on positions of points (tools)

@@ -27,7 +27,8 @@ def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
         for k, formula in enumerate(fix.formulas) if fix.prescribes_velocity else ():
             if formula is not None:
                 held[slice(None) if fix.group.all else fix.nodes, k] = True
-    return kernel.FreeBodies(tuple(_body(hub, fix, len(held)) for fix in moving), held)
+    kind = kernel.FreeBodies if hub.update.method.fields_per_solid else kernel.BodiesAtPoints
+    return kind(tuple(_body(hub, fix, len(held)) for fix in moving), held)
 
 
 def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:

@@ -112,7 +112,9 @@ class _Builder:
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
         uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))
         late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
-        after_contact = late and fix.brakes and self.hub.update.method.fields_per_solid
+        apart = self.hub.update.method.fields_per_solid
+        apart = apart or any(other.body for other in self.hub.fixes.values())
+        after_contact = late and fix.brakes and apart
         stage = arrays.POST_CONTACT if after_contact else STAGES[moment]
         self.rows.append((address, stage, begin, end, slot, *uses))
         whole = hook.tag is not None  # its functions take all directions

@@ -139,6 +139,7 @@ class RigidBody(Fix):
         "fx", "fy", "fz", "tx", "ty", "tz",
     )  # fmt: skip
     for_method = True
+    reads_itself = True
     remembers = ("memory",)
 
     def __init__(

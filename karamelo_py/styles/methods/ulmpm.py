@@ -79,6 +79,12 @@ class TLMPM(Method):
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
         touching = {solid.id for fix in hub.fixes.values() for solid in fix.solids}
+        touching |= {
+            solid.id
+            for fix in hub.fixes.values()
+            for solid in hub.solids.values()
+            if fix.body and fix.group and (fix.body is solid or fix.group.touches(solid))
+        }
         alone = [ID for ID in hub.solids if ID not in touching]
         if len(hub.solids) > 1 and alone and not self.warned:
             self.warned = True
