@@ -401,6 +401,10 @@ def _tried(lines, dimension, folder):
                 interpreter.run_text(f"solid({solid}, region, disk, 2, steel, {h}, 0)")
             interpreter.run_text(line)
             continue
+        if words[2] == "rigid_body":
+            h = STAGES[dimension][0].split()[-1]
+            interpreter.run_text("material(lead, rigid, 1)")
+            interpreter.run_text(f"solid({words[3]}, region, disk, 2, lead, {h}, 0)")
         kind = "nodes" if words[2] in ("body_force",) or "_nodes" in line else "particles"
         if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
             interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")

@@ -1,9 +1,10 @@
 """Fix rigid_body: rigid bodies that move by the forces on them, and fix contact/rigid_body."""
 
-from math import pi
+from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
+from conftest import INPUTS
 from going_on import goes_on, with_files
 
 pytestmark = pytest.mark.xdist_group("rigid body")
@@ -203,3 +204,42 @@ def test_momentum_is_conserved_and_energy_does_not_grow(run_interpreted, method,
 def test_a_restarted_run_has_the_same_bits(run_interpreted, method, touch):
     text = HIT.format(method=method, touch=touch, ratio=1).replace("run(20)", "run(10)")
     goes_on(run_interpreted, with_files(text))
+
+
+@pytest.mark.parametrize(("mu", "far"), [(0.5, 0.05), (0.06, 0.08)], ids=["rolls", "slides"])
+def test_a_wheel_on_a_slope(run_script, mu, far):
+    """in.rolling: 2/3 g sin without slip; g (sin - mu cos) and the spin of friction with it."""
+    text = (INPUTS / "in.rolling").read_text("utf-8").replace("mu = 0.5", f"mu = {mu}")
+    log, g, a = run_script(text).log, 9.81, radians(20)
+    late = log.Time > 0.5
+    along, spin = (np.polyfit(log.Time[late], v[late], 1)[0] for v in (log.w_vx, -log.w_wz))
+    exact = g * sin(a) * 2 / 3 if mu > 0.2 else g * (sin(a) - mu * cos(a))
+    turns = exact / 0.3 if mu > 0.2 else 2 * mu * g * cos(a) / 0.3
+    assert along == pytest.approx(exact, rel=far) and spin == pytest.approx(turns, rel=far)
+    assert log.w_fy == pytest.approx(-log.touch_y)
+
+
+@pytest.mark.parametrize(
+    ("refine", "draught", "end"), [(0.5, 0.2, 2), pytest.param(1, 0.05, 8, marks=pytest.mark.full)]
+)
+def test_a_box_floats(run_script, refine, draught, end):
+    """in.floating: Archimedes. The level is 1.2 + (draught - 0.4) 1.2/4 with what is displaced."""
+    text = (INPUTS / "in.floating").read_text("utf-8").replace("refine = 1", f"refine = {refine}")
+    log = run_script(text.replace("end = 8", f"end = {end}")).log
+    late = log.Time > end / 2
+    depth = 1.08 + 0.4 - log.b_y[late].mean()  # d - 0.3 d
+    assert depth / 0.7 == pytest.approx(0.48, rel=draught)
+    assert log.b_fy[late].mean() == pytest.approx(0.96 * 600 * 9.81, rel=0.03)
+    assert np.abs(log.b_rz).max() < 1e-3
+
+
+def test_rigid_bodies_that_pass_through_each_other_are_reported(run_interpreted):
+    """And a spring to the ground, of the values of its own fix."""
+    second = "region(two, block, 6, 8, 3, 4)\nsolid(two, region, two, 1, steel, 1)\n"
+    second += "fix(c, rigid_body, two, spin=1)\n"
+    text = alone("force=(-12*(b_x - 4), 0)", "b_x").replace("scheme(", second + "scheme(")
+    result = run_interpreted(text)
+    assert "'body' passes through other rigid solids: two" in result.err
+    # Leapfrog of period 2 pi: 2 arcsin(dt / 2) / dt.
+    rate = 2 * np.arcsin(0.05) / 0.1
+    assert result.log.b_x == pytest.approx(4 - np.cos(rate * result.log.Time), rel=1e-3)

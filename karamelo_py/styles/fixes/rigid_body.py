@@ -240,6 +240,13 @@ class RigidBody(Fix):
                     kept[at : at + 3] = self.state[at : at + 3]
             self.state[:] = kept
             self._spin_up()
+        laws = {s.id: s.material.law for s in self.hub.solids.values() if s is not self.body}
+        others = [ID for ID, law in laws.items() if can(law, constrained_velocity)]
+        if others and before is None:
+            self.hub.warn(
+                f"'{self.body.id}' passes through other rigid solids: {', '.join(others)}",
+                hint="one of two that may meet deforms: neo-hookean, stiffer than the rest",
+            )
         for slot, column in self.slots():
             self.hub.values.array[slot] = self.state[column]
 
@@ -377,7 +384,7 @@ class ContactRigidBody(Fix):
 
     Example
     -------
-    fix(touch, contact/rigid_body, soil, wheel, 0.4)
+    fix(touch, contact/rigid_body, all, wheel, 0.4)
 
     Notes
     -----
