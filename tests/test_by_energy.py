@@ -252,6 +252,12 @@ def test_a_power_of_0_is_1():
     assert energy_density(law, SPACE, state) == pytest.approx(exact, rel=1e-12)
 
 
+def test_functions_without_a_form_for_lanes_are_computed_one_by_one():
+    """They did not compile: "sinh is not defined for (numbers in lanes ...)"."""
+    form = FORMULA + " + G*(cosh(J)^2 - sinh(J)^2 - 1)"
+    assert LAWS[FORMULA].in_lanes and not ready(1000, form, G=G, lam=LAM).in_lanes
+
+
 def test_rest_is_without_stress_and_energy():
     for law in (*LAWS.values(), Ogden.given(1, 5, 0.6, 1.3), Yeoh.given(1, 9, 1, -0.1, 0.1)):
         state = initial_state(law, SPACE, 1.0)
@@ -273,6 +279,7 @@ SCENE = """
     material(built, neo-hookean, 1000, 1e6, 0.3)
     material(formula, hyperelastic, 1000, G/2*(I1 - 3) - G*log(J) + lam/2*log(J)^2)
     material(stretches, hyperelastic, 1e3, G/2*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + lam/2*log(J)^2)
+    material(hyperbolic, hyperelastic, 1e3, FORMULA + G*(cosh(J)^2 - sinh(J)^2 - 1))
     solid(s, region, box, 2, law, 0.5, 0)
     region(left, block, INF, 0, INF, INF)
     group(left, nodes, region, left, all)
@@ -281,7 +288,7 @@ SCENE = """
     compute(Es, strain_energy, all)
     log_modify(custom, Es)
     run(3)
-"""
+""".replace("FORMULA", FORMULA)
 
 
 @pytest.mark.parametrize(
@@ -306,6 +313,8 @@ def test_scenes_are_those_of_the_built_in_law(run_interpreted, law, scheme, thin
     [
         ("formula", ""),
         pytest.param("stretches", "scheme(quasi-static)", marks=pytest.mark.full),
+        pytest.param("hyperbolic", "", marks=pytest.mark.full),
+        pytest.param("hyperbolic", "scheme(quasi-static)", marks=pytest.mark.full),
     ],
 )
 def test_compiled_formulas_have_the_numbers_of_the_built_in_law(run_script, law, scheme):

@@ -3,7 +3,7 @@
 The formula is differentiated when a script defines the material. Its structure is in the class of
 the law, so kernels contain it as code; its numbers are parameters. So laws that differ only in
 numbers have common kernels, unless some are equal or small whole exponents. Formulas of invariants
-are computed in lanes, formulas of principal stretches point by point.
+are computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by point.
 """
 
 from collections import namedtuple
@@ -41,6 +41,7 @@ FIBRES = ("I4", "I6")  # squared stretches of two fibre families
 STRETCHES = ("l1", "l2", "l3")
 WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
 
+ONE_BY_ONE = {"sin", "cos", "tan", "tanh", "sinh", "cosh"}  # not in lanes
 OF_TWO = ("+", "-", "*", "/", "^", "max", "min", ">=")
 
 Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
@@ -232,6 +233,7 @@ def _class_of(kind: type, codes: dict, count: int) -> type:
         known = (*FIELDS, *kind.directions)
         fields = namedtuple(name, (*known, *[f"number{k}" for k in range(count)]))
         traits = {**codes, "start": len(known), "__slots__": (), "__module__": __name__}
+        traits["in_lanes"] = kind.in_lanes and ONE_BY_ONE.isdisjoint(dict(codes["energy"]))
         return type(name, (kind, fields), traits)
 
     return importable(__name__, name, made)
