@@ -191,5 +191,6 @@ def words_of_change(hub: Hub, share: float) -> str:
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
     # The sum of losses may exceed the largest energy.
+    share = round(share, 2) + 0.0  # no -0.00
     much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
     return f"{much} {words}{by}"

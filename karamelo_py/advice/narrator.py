@@ -86,7 +86,7 @@ class Narrator(Listener):
             shown["own dt"] = words_of_own_step(simulation, dt) if dt else None
             facts["limited_by"] = simulation.steps.ruling_limit
             self.limits, self.least = {facts["limited_by"]}, simulation.steps.limit
-            shown["limited by"] = f"{facts['limited_by']}; {words_of_share(simulation)}"
+            shown["limited by"] = f"{simulation.steps.words_of_limit}; {words_of_share(simulation)}"
         if why and simulation.moves:
             facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
         hub.record.begin(facts)
@@ -126,8 +126,8 @@ class Narrator(Listener):
         self.limits.add(name)
         self.least = min(limit, before)
         words = (
-            f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by {name} "
-            f"now: {limit:.4g} is stable, {before:.4g} before"
+            f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by "
+            f"{simulation.steps.words_of_limit} now: {limit:.4g} is stable, {before:.4g} before"
         )
         self.hub.console.say(render_message("note", words))
 

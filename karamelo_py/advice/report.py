@@ -67,7 +67,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"               {words_of_share(simulation)}")
         if (step := own_step_instead_of(simulation)) is not None:
             say(f"own dt         {words_of_own_step(simulation, step)}")
-        say(f"limited by     {simulation.steps.ruling_limit}")
+        say(f"limited by     {simulation.steps.words_of_limit}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
             one = seconds_of_step(hub, simulation.count)
             after = step_after_motion(simulation)

@@ -344,6 +344,8 @@ def _run(options: argparse.Namespace) -> int:
     if script is None:
         command = "karamelo-py check" if options.checking else "karamelo-py"
         raise ScriptError("no script is named", expected=f"{command} SCRIPT")
+    if options.input and options.script:
+        raise ScriptError(f"two scripts: {options.script} and {script}", expected="one script")
     if launched()[0] > 1 and not options.checking:
         with leaving_at_once():  # before MPI
             import_module("karamelo_py.scene.hub")

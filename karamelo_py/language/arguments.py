@@ -16,7 +16,7 @@ from karamelo_py.script.syntax import Raw
 NULL = "NULL"
 _NAME = re.compile(r"[^\W\d]\w*")
 _QUOTED = re.compile(r'"([^"]*)"')
-_GAP = re.compile(r'[\w)"]\s+["\w.]|\w;')  # two words separated by a blank or ; only
+_GAP = re.compile(r'[\w)"]\s+(["\w.]|[-+][\w.(])|\w;')  # two words separated by a blank or ;
 _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 

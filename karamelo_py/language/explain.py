@@ -27,8 +27,8 @@ def wrong_count(
     elif len(arguments) < len(needed):
         hint = longer(name, arguments) or table()["otherwise"].get(name)
         missing = _named(needed[len(arguments) :], slots)
-    if gap := with_gap(arguments):
-        place, hint = gap.place, f"is a comma missing in '{gap.text}'?"
+    if with_gap(arguments):
+        hint = None
     elif left_out := _left_out(needed, arguments) if len(arguments) < len(needed) else []:
         before, filled = _filled(needed, arguments, left_out)
         place, missing = before.place, _named(left_out, slots)

@@ -20,7 +20,7 @@ from itertools import chain, repeat
 from typing import Any, Literal, get_type_hints
 
 from karamelo_py.language import explain, registry
-from karamelo_py.language.arguments import NULL, Argument
+from karamelo_py.language.arguments import NULL, Argument, with_gap
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.kinds import (
     AtLeast,
@@ -132,6 +132,8 @@ def call(
             raise ScriptError(message, hint="use larger cells or fewer points") from error
     except ScriptError as error:
         for wrong in () if error.complete else (error, *error.others):
+            if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
+                wrong.place, wrong.hint = gap.place, f"is a comma missing in '{gap.text}'?"
             wrong.place = wrong.place or explain.guilty(wrong, arguments, bound)
             wrong.command = wrong.command or name
         raise

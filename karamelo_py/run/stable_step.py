@@ -29,6 +29,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 BOX_WEIGHT = 6.0  # weight of a common drift in steps with boxes
+SLOWED = 1.2  # of the speed of waves: with viscosity above it, viscosity limits the step
 LONE = 0.9  # fraction of an isolated point's stable step: expanded points are stiffer
 DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
 
@@ -198,10 +199,13 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
     law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
     if not isinstance(parameter(law, "viscosity", Absent()), Absent):
         law, viscous = law._replace(viscosity=Absent()), True
-    if parameter(parameter(law, "strength"), "mu") > 0:
-        law, viscous = law._replace(strength=law.strength._replace(mu=0.0)), True
     kin = simulation.kin
-    return sqrt(float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))), viscous
+    whole = float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
+    if not parameter(parameter(law, "strength"), "mu") > 0:
+        return sqrt(whole), viscous
+    law = law._replace(strength=law.strength._replace(mu=0.0))
+    square = float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
+    return sqrt(square), viscous or whole > SLOWED**2 * square
 
 
 def stable_conduction(hub: Hub) -> float:

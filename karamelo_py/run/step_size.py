@@ -15,6 +15,7 @@ from karamelo_py.kernels.step import measure
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.stable_step import (
+    SLOWED,
     common_velocity,
     courant_number,
     elastic_speed,
@@ -30,6 +31,11 @@ from karamelo_py.schemes.traits import DEFAULT_SHARE
 from karamelo_py.script.errors import ScriptError
 
 NO_STRIDE = 1e9  # cells, further than points ever move
+
+EXPLAINED = {
+    "light_nodes": "light_nodes (nodes with little mass)",
+    "lone_points": "lone_points (points alone in their cells, with a transfer that stores moments)",
+}
 
 
 class StepPolicy(NamedTuple):
@@ -227,6 +233,10 @@ class StepSize:
         self.step.over_limit = 0
 
     @property
+    def words_of_limit(self) -> str:
+        return EXPLAINED.get(self.ruling_limit, self.ruling_limit)
+
+    @property
     def ruling_limit(self) -> str:
         """Name of the present limit of the step.
 
@@ -253,7 +263,7 @@ class StepSize:
         undeformed = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
         without = max(wave for wave, _ in undeformed)
         slowed = any(viscous for _, viscous in undeformed)
-        if slowed and 0 < without < (motion.rate - speed) / 1.2:
+        if slowed and 0 < without < (motion.rate - speed) / SLOWED:
             return "viscosity"
         if step.courant < 1:
             return "lone_points" if step.courant == lone_point(simulation.hub) else "light_nodes"

@@ -25,6 +25,7 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
         raise ScriptError(
             f"{plural(len(formulas), 'component')} in {plural(d, 'dimension')}",
             expected=wanted + " (NULL leaves a component alone)" * (not all_given),
+            code="arguments",
         )
     if len(formulas) > 3:
         message = f"{len(formulas)} components, and space has 3 directions"
