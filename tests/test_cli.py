@@ -250,6 +250,7 @@ def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
         ("help vonmises", "hint: the column seq of dumps and pictures"),
         ("in.a -restart r.2.h5 r.10.h5 r.7.h5", "there is no file r.10.h5"),
         ("in.a -restart r.2.h5 in.b", "one word too many: in.b"),
+        ("in.a -in in.b", "two scripts: in.a and in.b"),
     ],
 )  # fmt: skip
 def test_what_a_slip_of_the_pen_says(tmp_path, monkeypatch, capsys, words, says):

@@ -105,3 +105,6 @@ def test_an_explosive_that_nobody_lights_is_reported(run_interpreted):
     assert "nothing lights" not in run_interpreted(script.format("tnt", light)).err
     said = run_interpreted(script.format("soft", light)).err
     assert "no point of the group is explosive" in said
+    squeeze = "fix(squeeze, initial_stress, all, -1e6, NULL, NULL, NULL, NULL, NULL)"
+    result = run_interpreted(script.format("tnt", squeeze), status=1)  # it did nothing, in silence
+    assert "initial_stress: the stress of solid 'slab'" in result.err

@@ -173,6 +173,7 @@ COMMANDS = [
     ("group(g,\n  nodes,\n  region, bb, all)", 11, "unknown region 'bb'"),
     ("log_modify(custom, step, Ekk)", 26, "unknown"),
     ("log_modify(custom, stp)", 20, "did you mean 'step'?"),
+    ("log_modify(custom, steps)", 20, "did you mean 'step'?"),
     ("log_modify(custom, step, ke)", 26, "expected: one of step, dt, time, timestep\n"),
     ("compute(Ek, kinetic_energy, all)\nlog_modify(custom, kinetic_energy)", 20, "mean 'Ek'?"),
     ("compute(Ek, kinetic_energy, all)\na = kinetic + 1", 5, "mean 'Ek'?"),

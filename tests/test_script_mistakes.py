@@ -139,6 +139,7 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("units lj", "units(m, kg, s)"),
         ("write_data end.dat", "write_restart(end.dat)"),
         ("region(b, block, 0 1, 0, 1)", "is a comma missing in '0 1'?"),
+        ("fix(g, body_force, all, 0 -9.81)", "is a comma missing in '0 -9.81'?"),
         ("eos(e, shock, 7, K, 6, 0, 5, 4)", "eos(e, shock, 7, K, 6, 5, 4, 0, 0, 0, 0)"),
         ("eos(e, shock, 7, 6)", "eos(e, shock, rho0, K, c0, S, 0, 0, 0, 0, 0)"),
         (

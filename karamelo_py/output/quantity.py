@@ -52,8 +52,9 @@ class Quantity:
                 error.place = argument.place
             if error.code == "unknown-name" and error.name == text:
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
-                names = KEYWORDS if error.alike is None else cls.names(hub)
-                error.hint = meant(text, names) or error.hint
+                if error.alike != "time":
+                    names = KEYWORDS if error.alike is None else cls.names(hub)
+                    error.hint = meant(text, names) or error.hint
                 if text in hub.fields.particle_names():
                     error.hint = (
                         f"{text} differs from point to point: dump(...) writes it, and "

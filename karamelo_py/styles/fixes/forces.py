@@ -292,12 +292,14 @@ class InitialStress(Fix):
         super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
         for solid in hub.solids.values():
-            if group.touches(solid) and not can(elastic_law(solid.material.whole), with_stress):
+            law = solid.material.whole
+            follows = not can(elastic_law(law), with_stress) or can(law, ignited)
+            if group.touches(solid) and follows:
                 raise ScriptError(
                     f"the stress of solid '{solid.id}' follows from its deformation "
                     "and cannot be set",
                     argument="group",
-                    expected="points of a material in rate form, such as linear or eos-strength",
+                    expected="a material in rate form, such as linear, or eos-strength but for jwl",
                 )
 
     def initial_integrate(self, points: PointsView) -> None:
