@@ -489,8 +489,7 @@ def _work_at_nodes(members, call, count):
             n = hooks.chosen[q]
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
-            counts = load != 0 and totals.counts(control.ranks, n)
-            counts = counts and not _is_of_rigid(hooks, n)
+            counts = load != 0 and totals.counts(control.ranks, n) and not _is_of_rigid(hooks, n)
             later = velocity[n, c] if again else update[n, c]
             moved = update[n, c] - update[n, change + c] + later
             terms[q] = 0.5 * dt * load * moved if counts else 0.0

@@ -196,10 +196,9 @@ def fastest_wave(simulation: SceneState) -> float:
 
 def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
     """Return an undeformed solid's wave speed without viscosity, and if it is viscous."""
-    law, viscous = law_on(solid.material.whole, solid.h, solid.T0), False
-    if not isinstance(parameter(law, "viscosity", Absent()), Absent):
-        law, viscous = law._replace(viscosity=Absent()), True
-    kin = simulation.kin
+    law, kin = law_on(solid.material.whole, solid.h, solid.T0), simulation.kin
+    viscous = not isinstance(parameter(law, "viscosity", Absent()), Absent)
+    law = law._replace(viscosity=Absent()) if viscous else law
     whole = float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
     if not parameter(parameter(law, "strength"), "mu") > 0:
         return sqrt(whole), viscous

@@ -32,10 +32,7 @@ from karamelo_py.script.errors import ScriptError
 
 NO_STRIDE = 1e9  # cells, further than points ever move
 
-EXPLAINED = {
-    "light_nodes": "light_nodes (nodes with little mass)",
-    "lone_points": "lone_points (points alone in their cells, with a transfer that stores moments)",
-}
+EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
 
 
 class StepPolicy(NamedTuple):
@@ -234,17 +231,11 @@ class StepSize:
 
     @property
     def words_of_limit(self) -> str:
-        return EXPLAINED.get(self.ruling_limit, self.ruling_limit)
+        return self.ruling_limit + EXPLAINED.get(self.ruling_limit, "")
 
     @property
     def ruling_limit(self) -> str:
-        """Name of the present limit of the step.
-
-        ``set_dt`` and ``end`` (of the run) are no stability limits. ``conduction``: heat;
-        ``viscosity``: waves slowed by viscosity; ``speed``: points faster than waves;
-        ``light_nodes``: usl and :mod:`karamelo_py.run.light_nodes`; ``lone_points``: points with
-        moments; ``waves``: the rest.
-        """
+        """Name of the present limit of the step (docs/energy.md); of stability but set_dt, end."""
         simulation, step, motion = self.simulation, self.step, self.motion
         dt, heat = self.control.values[DT], self.control.heat[0]
         if step.fixed_dt > 0:

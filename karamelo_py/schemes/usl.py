@@ -59,7 +59,6 @@ known_failure(
     cure="scheme(musl), or a spline basis",
 )
 
-
 known_failure(
     USL,
     "light next to heavy",
