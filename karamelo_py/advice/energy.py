@@ -33,10 +33,8 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     keeping = stable_step.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if share > 1 + 1e-9:
-        return (
-            f"time step is {share:.3g} x the stability limit",
-            step_size.own_step_instead(simulation),
-        )
+        above = f"time step is {share:.3g} x the stability limit"
+        return above, step_size.own_step_instead(simulation)
     if update.boundary == "reflect" and simulation.bounces:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
@@ -84,10 +82,8 @@ def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
     if method.fields_per_solid:
         return "contact that opens and closes from step to step", smaller
     if method.frame.moves and method.basis.traits.gradient_jumps:
-        return (
-            f"points crossing cells: the gradient of a {method.basis_name} basis is discontinuous",
-            f"quadratic-spline, method tlmpm, or {smaller}",
-        )
+        jumps = f"the gradient of a {method.basis_name} basis is discontinuous"
+        return f"points crossing cells: {jumps}", f"quadratic-spline, method tlmpm, or {smaller}"
     return "large strains or rotations within a step", smaller
 
 
@@ -151,10 +147,8 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
             "quadratic-spline, or method tlmpm for a solid",
         )
     if update.scheme.traits.implicit:
-        return (
-            "vibrations or rotations that cells and time steps do not resolve",
-            "finer cells, or a smaller time step",
-        )
+        cause = "vibrations or rotations that cells and time steps do not resolve"
+        return cause, "finer cells, or a smaller time step"
     if method.frame.moves:
         return (
             "waves and fronts that the cells do not resolve (the grid does not see velocity "
@@ -173,10 +167,8 @@ def collides(hub: Hub) -> tuple[str, str] | None:
             "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
         )
     if hub.update.method.fields_per_solid:
-        return (
-            "collisions: nodes of a surface lose their velocity of approach",
-            "finer cells, which reduce the loss in a collision",
-        )
+        cause = "collisions: nodes of a surface lose their velocity of approach"
+        return cause, "finer cells, which reduce the loss in a collision"
     return None
 
 

@@ -307,9 +307,7 @@ def _column_of_laws(name: str, laws: NamedTuple) -> Callable | None:
 
 
 def _column(field: np.ndarray, k: int) -> np.ndarray:
-    if k >= field.shape[1]:
-        return np.zeros(len(field))
-    return field[:, k].astype(float)
+    return np.zeros(len(field)) if k >= field.shape[1] else field[:, k].astype(float)
 
 
 def _von_mises(s: np.ndarray) -> np.ndarray:

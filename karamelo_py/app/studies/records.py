@@ -199,6 +199,4 @@ def read(path: Path) -> list[dict[str, str]]:
 
 def value(each: Row, name: str) -> float | None:
     cell = each.get(name)
-    if cell is None or isinstance(cell, float):
-        return cell
-    return number_of(str(cell))
+    return cell if cell is None or isinstance(cell, float) else number_of(str(cell))

@@ -11,13 +11,7 @@ from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import worded
 from karamelo_py.app.studies.records import recorded, value, write
-from karamelo_py.app.studies.sampling import (
-    KINDS,
-    Random,
-    described,
-    needs_scipy,
-    random_variables,
-)
+from karamelo_py.app.studies.sampling import KINDS, Random, described, needs_scipy, random_variables
 from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
 from karamelo_py.app.studies.uncertainty import RESAMPLED, SURE, Interval
 from karamelo_py.script.errors import ScriptError, plural
