@@ -31,6 +31,8 @@ from karamelo_py.script.formula import BLOCK, ROWS, STACK, call_evaluate
 # Each bare number would be a type.
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
+# Rows of the evaluator's stack, free once formulas are evaluated.
+TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)
 END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # task for the members of a hook
@@ -379,15 +381,14 @@ def _change_nodes(members, call, count):
                 total, work, before = _change_update(members, call, c, q)
             else:
                 total, work, before = _change_velocity(members, call, c, q), 0.0, 0.0
-            # From here, the rows of the formulas hold the terms to sum.
             counted = totals.counts(control.ranks, hooks.chosen[q])
-            hooks.scratch[VALUE, q] = total if counted else 0.0
-            hooks.scratch[BEFORE, q] = work if counted else 0.0
+            hooks.scratch[TERMS, q] = total if counted else 0.0
+            hooks.scratch[WORKS, q] = work if counted else 0.0
             if counted and before != 0:
                 totals.add_to(control.totals, slot + c, before)
-        totals.add_many(control.totals, totals.WORK, hooks.scratch[BEFORE], count)
+        totals.add_many(control.totals, totals.WORK, hooks.scratch[WORKS], count)
         if slot >= 0:
-            totals.add_many(control.totals, slot + c, hooks.scratch[VALUE], count)
+            totals.add_many(control.totals, slot + c, hooks.scratch[TERMS], count)
 
 
 def _called(call, state, force, values):
@@ -483,7 +484,7 @@ def _work_at_nodes(members, call, count):
     """
     update, change = members.nodes.update, arrays.of_change(members.kin)
     velocity, again = members.nodes.velocity, members.target == LOADS_AGAIN
-    hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[VALUE]
+    hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[WORKS]
     for c in range(members.kin.dimension):
         for q in range(count):
             n = hooks.chosen[q]
