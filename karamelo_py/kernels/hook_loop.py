@@ -31,8 +31,7 @@ from karamelo_py.script.formula import BLOCK, ROWS, STACK, call_evaluate
 # Each bare number would be a type.
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
-# Rows of the evaluator's stack, free once formulas are evaluated.
-TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)
+TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)  # rows of the stack, free after evaluation
 END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # task for the members of a hook
@@ -363,10 +362,6 @@ def _is_of_rigid(hooks, n):
     return rigid.size > 0 and rigid[n // (hooks.loads.shape[0] // rigid.size)]
 
 
-def _is_taken(rigid, n):
-    return rigid is not None and rigid[n, arrays.MASS] > 0
-
-
 @noinline
 def _change_nodes(members, call, count):
     hooks, control, slot = call.hooks, call.control, call.hooks.table[call.h].slot
@@ -432,7 +427,8 @@ def _change_update(members, call, c, q):
     # Contact may still change the velocity of a free node, a rigid body of any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
-    if late and (hook.holds == 0 or _is_taken(rigid, n)):
+    is_taken = rigid is not None and rigid[n, arrays.MASS] > 0
+    if late and (hook.holds == 0 or is_taken):
         hooks.loads[n, c] += impulse / dt  # see _work_at_nodes
     elif not _is_of_rigid(hooks, n):
         work = 0.5 * impulse * moved
