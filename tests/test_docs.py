@@ -405,7 +405,15 @@ def _tried(lines, dimension, folder):
             h = STAGES[dimension][0].split()[-1]
             interpreter.run_text("material(lead, rigid, 1)")
             interpreter.run_text(f"solid({words[3]}, region, disk, 2, lead, {h}, 0)")
-        kind = "nodes" if words[2] in ("body_force",) or "_nodes" in line else "particles"
+        if "pore_pressure" in words[2]:
+            wet = "pore_water(wet, n=0.4, permeability=1)\nsolid(wet, region, disk, 2, wet, h, 0)"
+            wet = wet.replace("h,", f"{STAGES[dimension][0].split()[-1]},")
+            interpreter.run_text(f"material(wet, linear, 1000, 1000, 0.3)\n{wet}")
+        kind = (
+            "nodes"
+            if words[2] in ("body_force", "pore_pressure") or "_nodes" in line
+            else "particles"
+        )
         if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
             interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")
         if words[2] in ("union", "intersection", "difference"):

@@ -11,7 +11,7 @@ PAGE = (Path(__file__).parent.parent / "docs" / "limits.md").read_text("utf-8")
 ROWS = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", PAGE, re.M)[1:]
 # What a row calls missing: styles that would end it, as (family, part of a name).
 STYLES = {
-    "water in pores": [("command", "pore"), ("fix", "pore"), ("material", "pore")],
+    "pores that are partly": [("command", "unsaturated"), ("fix", "suction")],
     "inflow, outflow": [("fix", "inflow"), ("fix", "outflow"), ("fix", "absorbing")],
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],

@@ -265,9 +265,9 @@ def element(
     if can(material.law, constrained_velocity):
         message = f"material '{material.id}' is rigid: it has no strain and no stress"
         raise ScriptError(message, argument="material", expected="a material that deforms")
-    law, kin = material.whole, KINEMATICS.get(kinematics)
+    law, kin = material.filled, KINEMATICS.get(kinematics)
     if kin is None:
-        law = ThinInLargeIncrements(law)
+        law = ThinInLargeIncrements(material.whole)
         kin = PlaneStrain() if kinematics == "plane-stress" else Line()
     point = Point(law, kin)
     paths = (first, *more)

@@ -251,6 +251,7 @@ POST_HEAT_TO_GRID = 7
 SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
 POST_CONTACT = 10  # damping, of the forces of contact as well
+POST_WATER_TO_GRID = 11  # what accelerates nodes, on the water in their pores
 
 # Where in the node arrays a hook acts.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2

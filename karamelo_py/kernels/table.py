@@ -256,7 +256,32 @@ _SAYS: dict[type, Any] = {
 
 
 def says(row: Any, setup: Any) -> str | None:
-    return _SAYS[type(row)](row, setup) if type(row) in _SAYS else None
+    """Describe a row with what joins it in a scene; None if it does nothing there."""
+    told = [row] if isinstance(row, SceneTask) else in_scene.find((type(row),))(row, setup)
+    texts = [_SAYS[type(one)](one, setup) for one in told if type(one) in _SAYS]
+    return "; ".join(text for text in texts if text) or None
+
+
+class NoCompany(NamedTuple):
+    """Company of a task or quantity: none."""
+
+    before = ()  # rows before it
+    first = ()  # tasks or quantities in the same visit, before it
+    then = ()  # and after it
+
+
+@point_function(otherwise=True)
+def company_of(tag: Any, s: Setup) -> Any:
+    """Return what accompanies a task or quantity in this scene: a tag like `NoCompany`."""
+    return NoCompany()
+
+
+def _joined(tags: tuple, s: Setup) -> tuple:
+    joined: tuple = ()
+    for tag in tags:
+        company = company_of(tag, s)
+        joined = (*joined, *company.first, tag, *company.then)
+    return joined
 
 
 @point_function(otherwise=True)
@@ -270,10 +295,23 @@ def _rows_of_scene(row, s):
     return plain(row.rows(s), s)
 
 
+@in_scene.on(NodeTask)
+def _after_others(row, s):
+    return (*company_of(row.task, s).before, row) if row.at is None else (row,)
+
+
 @in_scene.on(Sweep)
-def _with_averages(row, s):
-    """F-bar adds a visit before strains."""
-    return (*average_volumes(row), row) if isinstance(s.averaging, fbar.FBar) else (row,)
+def _in_company(row, s):
+    """Add what joins the visit, and rows before it; F-bar adds a visit before strains."""
+    averages = average_volumes(row) if isinstance(s.averaging, fbar.FBar) else ()
+    if row.at is not None:
+        return (*averages, row)
+    before: tuple = ()
+    for task in row.visit.tasks if row.gathers else ():
+        before = (*before, *company_of(task, s).before)
+    tasks, quantities, weights = row.visit
+    visit = Visit(_joined(tasks, s), _joined(quantities, s), weights)
+    return (*averages, *before, row._replace(visit=visit))
 
 
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:

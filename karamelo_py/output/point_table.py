@@ -226,7 +226,8 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
         of_method = [method.frame, method.averaging(hub), method.basis, method]
     frame, averaging, *others = of_method
     owners = [frame, update.transfer, averaging, contact, heat, grids]
-    return [*owners, *hub.fixes.values(), update, update.scheme, *others]
+    laws = (solid.material.law for solid in hub.solids.values())
+    return [*owners, *hub.fixes.values(), update, update.scheme, *others, *laws]
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:

@@ -45,6 +45,8 @@ def unknown_work(hub: Hub) -> str:
     for solid in hub.solids.values():
         if can(solid.material.law, constrained_velocity) and apart and solid not in free:
             return f"rigid solid '{solid.id}'"
+        if solid.material.fluid is not None:
+            return f"the water in solid '{solid.id}'"
         if hub.update.thermal and can(solid.material.law, initial_heat):
             return "heat"
     return ""

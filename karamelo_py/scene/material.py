@@ -1,6 +1,6 @@
 """Named materials and their parts: entries of catalogues."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import Named
@@ -34,6 +34,7 @@ class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
     thin = False
+    fluid: Any = None  # in its pores: ``around(law)`` wraps the law, ``check(hub)`` refuses scenes
 
     @property
     def whole(self) -> NamedTuple:
@@ -42,7 +43,12 @@ class Material(MaterialPart):
 
     @property
     def law(self) -> NamedTuple:
-        return Thin(self.whole) if self.thin else self.whole
+        return Thin(self.whole) if self.thin else self.filled
+
+    @property
+    def filled(self) -> NamedTuple:
+        """Law in 3D, with the fluid in its pores."""
+        return self.whole if self.fluid is None else self.fluid.around(self.whole)
 
     @property
     def words(self) -> str:

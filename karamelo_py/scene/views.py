@@ -439,15 +439,21 @@ class PointsView(View):
                 impose_stress(arrays.matter_of(s.kin, block), np.asarray(rows), flags, stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
-        self._impose(impose_temperature, values)
+        self.impose(impose_temperature, values)
 
     def ignite(self, since: np.ndarray) -> None:
         """Light explosives, times (n,) ago; below 0 later."""
-        self._impose(impose_lighting, since)
+        self.impose(impose_lighting, since)
 
-    def _impose(self, kernel: Callable, values: np.ndarray) -> None:
+    def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
+        """Call ``kernel(matter, rows, numbers)`` with a number (n,) of each point.
+
+        Only for points whose law is a `law`.
+        """
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
+            if not isinstance(block.laws, law):
+                continue
             numbers = np.ascontiguousarray(values[places], s.nodes.sums.dtype)
             kernel(arrays.matter_of(s.kin, block), np.asarray(rows), numbers)
 

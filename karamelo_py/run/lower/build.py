@@ -91,6 +91,9 @@ def check_scene(hub: Hub) -> None:
         raise
     if hub.update.boundary != "error":
         boundary.check(hub)
+    for solid in hub.solids.values():
+        if solid.material.fluid is not None:
+            solid.material.fluid.check(hub)
     if hub.update.scheme.traits.implicit:
         implicit.check(hub)
     # Domains of rigid points would deform.

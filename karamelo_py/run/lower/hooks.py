@@ -92,6 +92,7 @@ class _Builder:
         laws = (solid.material.law for solid in hub.solids.values())
         self.rigid = any(can(law, constrained_velocity) for law in laws)
         self.whole: list[Tag] = []  # of hooks on whole points
+        self.wet = any(solid.material.fluid is not None for solid in hub.solids.values())
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
@@ -110,7 +111,7 @@ class _Builder:
         holds = hook.holds and (slot >= 0 or not hook.on_nodes)
         uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
-        uses = map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))
+        uses = [*map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))]
         late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
         apart = self.hub.update.method.fields_per_solid
         apart = apart or any(other.body for other in self.hub.fixes.values())
@@ -122,6 +123,9 @@ class _Builder:
         programs = list(map(self._program, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
         self.programs.append([*programs, self._program(fix.wall_friction)])
+        if fix.accelerates and self.wet:
+            self.rows.append((address, arrays.POST_WATER_TO_GRID, begin, end, -1, *uses))
+            self.programs.append(self.programs[-1])
         self.uses_first |= not hook.on_nodes and any(f.names & FIRST for f in formulas)
         if hook.holds and hook.on_nodes:
             self.holding.append(fix)

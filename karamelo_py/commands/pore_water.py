@@ -1,0 +1,115 @@
+"""Command pore_water: fill the pores of a material."""
+
+from typing import Annotated
+
+from karamelo_py.language.signature import Positive
+from karamelo_py.points.laws import is_rigid
+from karamelo_py.run.lower.pore_water import PoreWater
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.material import Material
+from karamelo_py.script.errors import ScriptError
+
+LEAST, MOST = 0.01, 0.9  # porosities
+SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
+
+
+def pore_water(
+    hub: Hub, material: Material, *,
+    n: float,
+    permeability: Annotated[float, Positive] | None = None,
+    intrinsic: Annotated[float, Positive] | None = None,
+    viscosity: Annotated[float, Positive] = 1e-3,
+    K: Annotated[float, Positive] = 2.2e9,
+    rho: Annotated[float, Positive] = 1000.0,
+    gravity: Annotated[float, Positive] = 9.81,
+    kozeny: bool = False,
+) -> None:  # fmt: skip
+    """Fill the pores of a material with water: consolidation, seepage, undrained loads.
+
+    Parameters
+    ----------
+    material
+        The skeleton: any law of a solid. Its density is the dry density, (1 - n) times the
+        density of the grains. Its stress is the effective stress.
+    n
+        Porosity before deformation, from 0.01 to 0.9.
+    permeability
+        Hydraulic conductivity k in m/s, from Darcy's law: porosity times velocity of the water
+        relative to the soil is k times the gradient of the head.
+    intrinsic, viscosity
+        Instead of it the permeability of the soil in m^2, and the viscosity of the water in Pa s.
+    K, rho
+        Bulk modulus and density of the water.
+    gravity
+        Gravity that the conductivity refers to. It is no load: see fix body_force.
+    kozeny
+        Whether the permeability follows the porosity as n^3/(1 - n)^2 (Kozeny & Carman).
+
+    Example
+    -------
+    material(clay, linear, 1590, 1e7, 0)
+    pore_water(clay, n=0.4, permeability=1e-3)
+    pore_water(sand, n=0.42, intrinsic=1e-11, viscosity=1e-3, kozeny=true)
+
+    Notes
+    -----
+    Points move with the soil and carry the water in their pores; nodes have a velocity of the soil
+    and one of the water (Jassim, Stolle & Vermeer 2013; Bandara & Soga 2015). Columns of dumps and
+    computes: ``pore_pressure``, ``porosity``, ``water_content`` (mass of the water per volume
+    before deformation), and ``wx``, ``wy``, ``wz``, the velocity of the water relative to the soil;
+    times the porosity it is the velocity of Darcy's law.
+
+    Surfaces are impermeable, except at nodes of a fix pore_pressure. A traction or pressure on a
+    surface acts on the soil; a fix that holds nodes holds the soil, and its reaction
+    includes the water. The fix body_force acts on both.
+
+    The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit at
+    each node and never shortens it. Consolidation to Tv = 1 takes about L c/c_v cells of steps,
+    with length L of the drainage path: with 1e-9 m/s, scale density or time.
+
+    Before the solid of the material. Needs method ulmpm or tlmpm with FLIP or PIC and linear,
+    quadratic-spline or cubic-spline, scheme musl, and bodies of 1D, plane strain or 3D on one
+    process without a GPU. With ulmpm and linear, strains above 10 % are less accurate.
+
+    See Also
+    --------
+    fix pore_pressure, fix initial_pore_pressure, material
+    """
+    if (permeability is None) == (intrinsic is None):
+        message = "the permeability is given " + ("twice" if intrinsic else "nowhere")
+        expected = "permeability=... in m/s, or intrinsic=... in m^2"
+        raise ScriptError(message, argument="permeability", expected=expected)
+    if not LEAST <= n <= MOST:
+        message = f"the porosity is {n:g}"
+        expected = f"a number from {LEAST:g} to {MOST:g}: pores over the whole volume"
+        raise ScriptError(message, argument="n", expected=expected)
+    if is_rigid(material.whole):
+        raise ScriptError(
+            f"material '{material.id}' is rigid, and water would not flow through it",
+            argument="material",
+            expected="a material that deforms",
+        )
+    if material.thin:
+        message = "thin bodies have no pore water"
+        raise ScriptError(message, argument="material", expected="plane strain or 1D strain")
+    for solid in hub.solids.values():
+        if solid.material is material:
+            raise ScriptError(
+                f"solid '{solid.id}' has this material already",
+                argument="material",
+                expected="pore_water before the solid",
+                code="too-late",
+            )
+    drag = rho * gravity / permeability if permeability else viscosity / (intrinsic or 1.0)
+    conductivity = rho * gravity / drag
+    if not SLOWEST <= conductivity <= FASTEST:
+        given = "permeability" if permeability else "intrinsic"
+        other = (
+            "intrinsic=..., the permeability in m^2" if permeability else "permeability=... in m/s"
+        )
+        hub.warn(
+            f"the hydraulic conductivity is {conductivity:.3g} m/s, outside of all soils, from "
+            f"{SLOWEST:g} to {FASTEST:g}",
+            hint=f"{other}, if {given} is in the wrong unit",
+        )
+    material.fluid = PoreWater(n, drag, K, rho, float(kozeny))

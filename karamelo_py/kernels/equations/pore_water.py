@@ -1,0 +1,464 @@
+"""Water in the pores: what points give to nodes, drag in the nodes, and the flux back to points.
+
+One layer of points moves with the soil; the nodes have a second velocity (Jassim, Stolle & Vermeer
+2013; Bandara & Soga 2015). Per node i: mass of the water m = sum N m_w, its momentum, the volume V
+and the pores, the force of the pressure P = sum p V g and the outward area B = sum V g. The water
+takes the fraction n = pores / V of P - B p_b, the soil the rest, with p_b the given pressure at
+open nodes, else the mean pressure. Where a node is not open, no flux crosses B.
+
+The flux j = m / V (v_w - v_s) is made at the nodes. Rate and force use the same gradients: at the
+cell centre with a linear basis, so that all points of a cell have one pressure rate, else at the
+points.
+
+With splines, pressures that no node sees would build up: p loses the part R = 1/20 of (1 - S)^2 p
+in a step, with S the mean through the nodes and back. The volume of pores follows, not the water.
+
+Drag D acts over the step as for a solid of constant acceleration: with b = dt D / m and f = (1 -
+exp(-b)) / b, the relative velocity w becomes w exp(-b) + (dt f_w / m - dv_s) f. A node then behaves
+like one of mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w, which is what fixes see:
+any fix that holds it has the reaction of soil and water.
+"""
+
+from math import exp, inf
+from typing import NamedTuple
+
+from karamelo_py.compiler import real, where
+from karamelo_py.compiler.fields import Field, StepField, SummedField, field, store, vector
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.equations.strain import increment
+from karamelo_py.kernels.records import row
+from karamelo_py.points import laws
+from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.basis.product import digits
+from karamelo_py.points.frames import force_stress, spatial_increment
+from karamelo_py.points.kinematics import I, det, nothing, outer, zero
+from karamelo_py.points.kinematics import total as sum_of
+from karamelo_py.points.laws.pore_water import (
+    Saturated,
+    drag_per_volume,
+    pore_pressure,
+    porosity,
+    water_content,
+)
+from karamelo_py.points.transfers import nodal_momentum, updated_velocity
+
+RIM = 0.5  # of V / h: |B| above which a node of a spline is at the surface
+SMOOTHING = 0.05  # R
+SMALL = 1e-4  # b below which (1 - exp(-b)) / b is a series
+
+
+# --- fields ---------------------------------------------------------------------------------------
+
+
+class RelativeVelocity(Field):
+    """Velocity of the water relative to the soil."""
+
+    shape = vector
+    columns = ("wx", "wy", "wz")
+
+    @staticmethod
+    def needed(law):
+        return isinstance(law, Saturated)
+
+
+class UnseenPressure(Field):
+    """Pressure less its mean through the nodes and back, one step earlier (splines)."""
+
+    needed = RelativeVelocity.needed
+
+
+class WaterSums(SummedField):
+    """Mass and momentum of the water at a node, and the force on it, as in `Nodes.sums`."""
+
+    shape = eq.RigidSums.shape
+
+
+class PoreSums(SummedField):
+    """Volume, volume of pores, volume times pressure, and its unseen part, drag, at a node."""
+
+    @staticmethod
+    def shape(kin):
+        return 5
+
+
+class PoreForce(SummedField):
+    """Force of the pressure at a node."""
+
+    shape = vector
+
+
+class PoreArea(SummedField):
+    """Outward area of the saturated soil at a node."""
+
+    shape = vector
+
+
+class WaterAgain(SummedField):
+    """Momentum of the water mapped again after the move."""
+
+    shape = vector
+
+
+class WaterUpdate(StepField):
+    """w* after the update, w* - w, and the mass of the soil."""
+
+    @staticmethod
+    def shape(kin):
+        return 2 * kin.dimension + 1
+
+
+class Flux(Field):
+    """Mass flux at a node; what does not leave there, per volume, and what does; mean pressures."""
+
+    @staticmethod
+    def shape(kin):
+        return kin.dimension + 4
+
+
+class GivenPressure(StepField):
+    """Pressure given at a node; NaN: none."""
+
+    start = float("nan")
+
+
+Saturated.point_fields = (RelativeVelocity, UnseenPressure)  # type: ignore[attr-defined]
+Saturated.node_fields = (  # type: ignore[attr-defined]
+    WaterSums, PoreSums, PoreForce, PoreArea, WaterAgain, WaterUpdate, Flux, GivenPressure,
+)  # fmt: skip
+
+
+# --- points to nodes ------------------------------------------------------------------------------
+
+
+def _is_wet(pt):
+    return isinstance(pt.w.laws, Saturated)
+
+
+def pore_N(node):
+    """Weight for volumes of water: at the cell centre with a linear basis."""
+    if not isinstance(node.w.basis, Linear):
+        return node.N
+    return real(0.5**node.kin.dimension, node.N)
+
+
+def pore_grad(node):
+    """Gradient for pressure and flux: at the cell centre with a linear basis."""
+    if not isinstance(node.w.basis, Linear):
+        return node.grad_N
+    d = node.kin.dimension
+    slope = real(0.5 ** (d - 1), node.N) * node.w.grid.inv_h
+    signs = [2 * digit - 1 for digit in digits(node.k, 2, d)]
+    return node.grad_N._make([slope if sign > 0 else -slope for sign in signs])
+
+
+@eq.reads("mass", "state", "material")
+def water(pt):
+    """Mass of the water of a point, (m,); () if it is dry."""
+    if not _is_wet(pt):
+        return ()
+    law, state = pt.law_and_state
+    volume = eq.mass(pt) * laws.specific_volume(law)
+    return (volume * water_content(law, pt.kin, state),)
+
+
+@eq.reads("v", "relative velocity")
+def water_v(pt):
+    """Velocity of the water (d,); () if the point is dry."""
+    return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
+
+
+@eq.reads("mass", "state", "material", "deformation gradient", "unseen pressure")
+def pores(pt):
+    """Volume, pores, volume times pressure, drag, pressure, and volume as a stress; or ()."""
+    if not _is_wet(pt):
+        return ()
+    law, state, f = pt.law_state_F
+    reference = eq.mass(pt) * laws.specific_volume(law)
+    volume, p = reference * laws.jacobian(law, pt.kin, state), pore_pressure(law, pt.kin, state)
+    drag = volume * drag_per_volume(law, pt.kin, state)
+    one = nothing(pt.kin) + laws.jacobian(law, pt.kin, state) * I
+    area = reference * force_stress(pt.w.frame, pt.kin, one, f)
+    unseen = volume * pt.of(UnseenPressure)[0, pt.p]
+    sums = volume, volume * porosity(law, pt.kin, state), volume * p, unseen, drag
+    return sums, p, area
+
+
+def _sums_at(pt, node):
+    if not len(pt.pores):
+        return ()
+    *volumes, drag = pt.pores[0]
+    return (*[pore_N(node) * one for one in volumes], node.N * drag)
+
+
+def _area_at(pt, node):
+    return pt.pores[2].dot(pore_grad(node)) if len(pt.pores) else ()
+
+
+def _force_at(pt, node):
+    return pt.pores[1] * _area_at(pt, node) if len(pt.pores) else ()
+
+
+class OfWater(NamedTuple):
+    mass: arrays.Number
+    v: tuple
+    moment: tuple
+
+
+def _momentum_at(pt, node):
+    if not len(pt.water):
+        return ()
+    return nodal_momentum(node.transfer, OfWater(pt.water[0], pt.water_v, ()), node)
+
+
+class WaterMomentum(eq.NodalQuantity):
+    """Scatter mass and momentum of the water."""
+
+    says = "water to grid"
+    takes = eq.of_point(water=water, water_v=water_v)
+    gives = (
+        eq.Sum(
+            eq.MASS._replace(array=WaterSums),
+            lambda pt, node: tuple([node.N * m for m in pt.water]),
+        ),
+        eq.Sum(eq.MOMENTUM._replace(array=WaterSums), _momentum_at),
+    )
+
+
+class WaterForce(eq.NodalQuantity):
+    """Scatter volumes, drag, and the force of the pressure."""
+
+    says = "pore pressure to grid"
+    takes = eq.of_point(pores=pores)
+    gives = (
+        eq.Sum(eq.whole(PoreSums), _sums_at),
+        eq.Sum(eq.whole(PoreForce), _force_at),
+        eq.Sum(eq.whole(PoreArea), _area_at),
+    )
+
+
+class WaterMomentumAgain(eq.NodalQuantity):
+    says = "momentum of the water to grid"
+    takes = eq.of_point(water=water, water_v=water_v)
+    gives = (eq.Sum(eq.whole(WaterAgain), _momentum_at),)
+
+
+# --- at the nodes ---------------------------------------------------------------------------------
+
+
+def _taken_up(b):
+    """exp(-b), and (1 - exp(-b)) / b."""
+    e = exp(-b)
+    return e, (1 - e) / b if b > SMALL else 1 - 0.5 * b * (1 - b / 3)
+
+
+def _is_rim(nodes, kin, n, rim):
+    area, V = field(nodes.fields, PoreArea), field(nodes.fields, PoreSums)[n, 0]
+    squared = real(0, V)
+    for k in range(kin.dimension):
+        squared += area[n, k] * area[n, k]
+    return squared >= rim * rim * V * V
+
+
+def _is_closed(nodes, kin, n, rim):
+    given = field(nodes.fields, GivenPressure)[n, 0]
+    return given != given and _is_rim(nodes, kin, n, rim)
+
+
+def _is_wet_node(nodes, n):
+    water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
+    return nodes.sums[n, arrays.MASS] > 0 and water[n, arrays.MASS] > 0 and sums[n, 0] > 0
+
+
+@node_task
+class ShareForces(NamedTuple):
+    """Force on the water, and the node as fixes see it: with the water that drag carries along."""
+
+    rim: float  # |B| / V of nodes that are closed
+    surface: float  # and of nodes at the surface
+
+    says = "forces on soil and water"
+    goes_through = ("sums", "water sums", "pore sums", "pore force", "pore area", "water update")
+
+    def at_node(task, kin, nodes, n, dt):
+        if not _is_wet_node(nodes, n):
+            return
+        water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
+        force, area = field(nodes.fields, PoreForce), field(nodes.fields, PoreArea)
+        given = field(nodes.fields, GivenPressure)[n, 0]
+        m, m_s = water[n, arrays.MASS], nodes.sums[n, arrays.MASS]
+        V, D = sums[n, 0], sums[n, 4]
+        p = along = real(0, m)
+        if given == given:
+            p = given
+        elif _is_closed(nodes, kin, n, task.rim):
+            p = sums[n, 2] / V
+        if _is_closed(nodes, kin, n, task.surface):
+            # A wall carries the weight of its water, which is not in the mean pressure.
+            squared = real(0, m)
+            for k in range(kin.dimension):
+                along += water[n, arrays.of_force(kin) + k] * area[n, k]
+                squared += area[n, k] * area[n, k]
+            along /= squared
+        share = sums[n, 1] / V
+        _, taken = _taken_up(dt * D / m)
+        whole = m_s + m * (1 - taken)
+        for k in range(kin.dimension):
+            of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
+            by_pressure = share * (force[n, k] - area[n, k] * p)
+            carried = along * area[n, k]
+            on_water = water[n, of_force] - carried + by_pressure
+            v = nodes.sums[n, of_momentum] / m_s
+            w = water[n, of_momentum] / m - v
+            rest = nodes.sums[n, of_force] + carried + force[n, k] - by_pressure
+            water[n, of_force] = on_water
+            nodes.sums[n, of_force] = rest + (1 - taken) * on_water + D * taken * w
+            nodes.sums[n, of_momentum] = whole * v
+        nodes.sums[n, arrays.MASS] = whole
+        field(nodes.fields, WaterUpdate)[n, 2 * kin.dimension] = m_s
+
+
+@node_task
+class DragWater(NamedTuple):
+    """Relative velocity after the step, from what the soil does, which has its mass again."""
+
+    says = "drag"
+    goes_through = ("sums", "update", "water sums", "pore sums", "water update")
+
+    def at_node(task, kin, nodes, n, dt):
+        out, d = field(nodes.fields, WaterUpdate), kin.dimension
+        if not _is_wet_node(nodes, n):
+            for k in range(2 * d):
+                out[n, k] = 0
+            return
+        water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
+        m, m_s, whole = water[n, arrays.MASS], out[n, 2 * d], nodes.sums[n, arrays.MASS]
+        left, taken = _taken_up(dt * sums[n, 4] / m)
+        for k in range(d):
+            of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
+            dv = nodes.update[n, arrays.of_change(kin) + k]
+            w = water[n, of_momentum] / m - (nodes.update[n, k] - dv)
+            new = left * w + taken * (dt * water[n, of_force] / m - dv)
+            out[n, k] = new
+            out[n, d + k] = new - w
+            water[n, of_force] = 0
+            nodes.sums[n, of_momentum] *= m_s / whole
+        nodes.sums[n, arrays.MASS] = m_s
+
+
+@node_task
+class MakeFlux(NamedTuple):
+    """Mass flux from the velocities mapped again."""
+
+    rim: float
+
+    says = "flux of the water"
+    goes_through = ("sums", "velocity", "water sums", "water again", "pore sums", "flux")
+
+    def at_node(task, kin, nodes, n, dt):
+        flux, d = field(nodes.fields, Flux), kin.dimension
+        across = real(0, dt)
+        if not _is_wet_node(nodes, n):
+            for k in range(d + 4):
+                flux[n, k] = 0
+            return
+        m, V = field(nodes.fields, WaterSums)[n, arrays.MASS], field(nodes.fields, PoreSums)[n, 0]
+        again, area = field(nodes.fields, WaterAgain), field(nodes.fields, PoreArea)
+        for k in range(d):
+            j = (again[n, k] - m * nodes.velocity[n, k]) / V
+            flux[n, k] = j
+            across += j * area[n, k]
+        closed = _is_closed(nodes, kin, n, task.rim)
+        for k in range(2):
+            flux[n, d + 2 + k] = field(nodes.fields, PoreSums)[n, 2 + k] / V
+        flux[n, d] = across / V if closed else real(0, dt)
+        flux[n, d + 1] = real(0, dt) if closed else across
+
+
+# --- nodes to points ------------------------------------------------------------------------------
+
+
+class MoveWater(eq.Task):
+    """Gather w* and its change after `Move`; update the velocity of the water."""
+
+    says = "velocity of the water"
+    reads = ("x", "v", "state", "material", "relative velocity")
+    writes = ("relative velocity", "v")
+
+    def empty(task, w, x):
+        return x - x, x - x
+
+    def gathered(task, node, total):
+        if not isinstance(node.w.laws, Saturated):
+            return total
+        w, dw = total
+        d = node.kin.dimension
+        both = row(node.of(WaterUpdate), node.i, 0, (*w, *dw))
+        return w + node.N * w._make(both[:d]), dw + node.N * w._make(both[d:])
+
+    def updated(task, pt, total, totals, fastest):
+        if not _is_wet(pt):
+            return eq.Report(real(0, pt.dt), fastest)
+        at_nodes, change = total
+        law, state = pt.law_and_state
+        new = updated_velocity(pt.w.transfer, pt.load(RelativeVelocity, pt.v), at_nodes, change)
+        # What the nodes do not see is dragged here, at constant momentum of the point.
+        per_mass = laws.specific_volume(law)
+        m = per_mass * water_content(law, pt.kin, state)
+        drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
+        b = pt.w.kick * drag * (1 + m) / m
+        unseen = (b / (1 + b)) * (new - at_nodes)
+        store(pt.of(RelativeVelocity), pt.p, new - unseen)
+        store(pt.w.points.v, pt.p, pt.v + (m / (1 + m)) * unseen)
+        return eq.Report(real(0, pt.dt), fastest)
+
+
+class Seep(eq.Task):
+    """Gather the flux before `Strain`; update water and pores, and the velocity of the water."""
+
+    says = "water that comes and goes"
+    reads = ("x", "state", "material", "deformation gradient", "v", "relative velocity")
+    writes = ("state", "relative velocity", "unseen pressure")
+
+    def empty(task, w, x):
+        none = real(0, x[0])
+        return zero(w.kin, x[0]), zero(w.kin, x[0]), none, (none, none)
+
+    def gathered(task, node, total):
+        if not isinstance(node.w.laws, Saturated):
+            return total
+        spread, gradient, kept, means = total
+        d, g = node.kin.dimension, pore_grad(node)
+        (*j, stays, _, mean, again) = row(node.of(Flux), node.i, 0, (*g[:d], kept, kept, *means))
+        return (
+            spread + outer(node.v._make(j), g),
+            gradient + outer(node.v, g),
+            kept + pore_N(node) * stays,
+            (means[0] + node.N * mean, means[1] + node.N * again),
+        )
+
+    def updated(task, pt, total, totals, fastest):
+        if not _is_wet(pt):
+            return eq.Report(real(0, pt.dt), fastest)
+        spread, gradient, kept, (mean, again) = total
+        law, old, f = pt.law_state_F
+        frame, kin = pt.w.frame, pt.kin
+        # Per volume before deformation.
+        leaving = sum_of(spatial_increment(frame, kin, spread, f).diagonal())
+        lost = laws.jacobian(law, kin, old) * (leaving - kept)
+        content = old.content - pt.dt * lost / law.rho
+        grown = det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
+        pores = old.pores * grown + (1 - law.n) * (grown - 1)
+        if not isinstance(pt.w.basis, Linear):
+            part = real(SMOOTHING, mean) / law.K
+            pores = pores * (1 + part * (pt.of(UnseenPressure)[0, pt.p] - again))
+            store(pt.of(UnseenPressure), pt.p, (pore_pressure(law, kin, old) - mean,))
+        new = old._replace(content=content, pores=pores)
+        store(pt.w.points.state, pt.p, new)
+        v = pt.v
+        ratio = old.content / content  # the water retains its momentum
+        w = pt.load(RelativeVelocity, v)
+        store(pt.of(RelativeVelocity), pt.p, ratio * (v + w) - v)
+        good = (content > 0) & (pores > 0)
+        return eq.Report(where(good, real(0, content), real(inf, content)), fastest)

@@ -1,0 +1,112 @@
+"""Rows of water in the pores, and what else a scene with it needs of kernels."""
+
+from typing import NamedTuple
+
+from karamelo_py.compiler import at_hand, index, kernel, point_function
+from karamelo_py.compiler.fields import field, store
+from karamelo_py.kernels import arrays, hook_loop
+from karamelo_py.kernels.clock import kick
+from karamelo_py.kernels.equations import pore_water as pores
+from karamelo_py.kernels.equations.internal_force import InternalForce
+from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
+from karamelo_py.kernels.equations.move import Move
+from karamelo_py.kernels.equations.node_updates import NodalUpdate
+from karamelo_py.kernels.equations.strain import Strain
+from karamelo_py.kernels.table import NoCompany, NodeTask, Processor, company_of, take
+from karamelo_py.kernels.views import state_at
+from karamelo_py.points.basis.linear import Linear
+from karamelo_py.points.laws.pore_water import with_pore_pressure
+
+
+class AtWater(NamedTuple):
+    """Fixes that accelerate nodes act on the water."""
+
+
+@point_function(otherwise=True)
+def at_water(hooks, s):
+    """Apply fixes to the water of the nodes."""
+
+
+@at_water.on(arrays.Hooks)
+def _at_water_hooks(hooks, s):
+    here = arrays.with_items(
+        s, nodes=arrays.with_items(s.nodes, sums=field(s.nodes.fields, pores.WaterSums))
+    )
+    members = hook_loop.hooked_nodes(here, arrays.ON_SUMS, 0.0)
+    hook_loop.node_hooks(arrays.POST_WATER_TO_GRID, members, hooks, here, kick(s))
+
+
+@take.on(AtWater, Processor)
+def _at_water(row, s, step):
+    at_water(step.hooks, s)
+
+
+def _rim(s):
+    # Hats: every node. Splines: inside, B is what the places of points leave of 0.
+    return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
+
+
+def _surface(s):
+    return pores.RIM / s.control.step[0].spacing
+
+
+def share_forces(s):
+    return pores.ShareForces(_rim(s), _surface(s))
+
+
+def make_flux(s):
+    return pores.MakeFlux(_rim(s))
+
+
+for _function, _task in ((share_forces, pores.ShareForces), (make_flux, pores.MakeFlux)):
+    _function.goes_through, _function.says = _task.goes_through, _task.says  # type: ignore[attr-defined]
+
+
+class WithMomentum(NoCompany):
+    then = (pores.WaterMomentum(),)
+
+
+class WithForce(NoCompany):
+    then = (pores.WaterForce(),)
+
+
+class WithMomentumAgain(NoCompany):
+    then = (pores.WaterMomentumAgain(),)
+
+
+class WithUpdate(NoCompany):
+    before = (AtWater(), NodeTask(share_forces))
+
+
+class WithMove(NoCompany):
+    before = (NodeTask(pores.DragWater()),)
+    then = (pores.MoveWater(),)
+
+
+class WithStrain(NoCompany):
+    before = (NodeTask(make_flux),)
+    first = (pores.Seep(),)
+
+
+def _accompany(kind: type, company: NoCompany) -> None:
+    @company_of.on(kind)
+    def _with_water(tag, s):
+        return NoCompany() if field(s.nodes.fields, pores.WaterSums) is None else company
+
+
+_accompany(MassMomentum, WithMomentum())
+_accompany(InternalForce, WithForce())
+_accompany(MomentumAgain, WithMomentumAgain())
+_accompany(NodalUpdate, WithUpdate())
+_accompany(Move, WithMove())
+_accompany(Strain, WithStrain())
+
+
+@kernel
+def impose_pore_pressure(matter, rows, pressure):
+    """Set the pressure of the water of the points in these rows."""
+    kin, points, laws = at_hand(matter)
+    for k in range(rows.size):
+        p = index(rows[k])
+        law, state = state_at(kin, points, laws, p)
+        store(points.state, p, with_pore_pressure(law, kin, state, pressure[k]))

@@ -1,0 +1,139 @@
+"""Saturated soil: any law as the skeleton, and water in its pores.
+
+Stresses are effective. The state has two numbers more, per volume before deformation: the volume of
+the water at no pressure, and of the pores. Water is compressed where it does not fit: p = K
+ln(content / pores). `advance` alone is undrained; in a run the flux through the nodes changes the
+content (:mod:`karamelo_py.kernels.equations.pore_water`).
+"""
+
+from math import sqrt
+from typing import Any, NamedTuple
+
+from karamelo_py.compiler.powers import exponential, logarithm
+from karamelo_py.points import laws
+
+
+class Saturated(NamedTuple):
+    """A law whose pores are full of water; `law` is the skeleton."""
+
+    law: Any
+    n: float  # porosity before deformation
+    drag: float  # force per volume of pores and velocity of the water: rho g / permeability
+    K: float  # bulk modulus of the water
+    rho: float  # density of the water at no pressure
+    kozeny: float  # 1: the permeability follows the porosity, 0: it does not
+
+    in_lanes = True
+    traits = laws.LawTraits(wraps=True)
+
+
+class State(NamedTuple):
+    skeleton: Any
+    content: Any
+    pores: Any
+
+
+@laws.initial_state.on(Saturated)
+def _initial_state_saturated(law, kin, like):
+    return State(laws.initial_state(law.law, kin, like), law.n, law.n)
+
+
+@laws.advance.on(Saturated)
+def _advance_saturated(law, kin, state, dl, dt):
+    old = laws.jacobian(law.law, kin, state.skeleton)
+    skeleton = laws.advance(law.law, kin, state.skeleton, dl, dt)
+    grown = laws.jacobian(law.law, kin, skeleton) - old
+    return State(skeleton, state.content, state.pores + grown)
+
+
+@laws.advance_fbar.on(Saturated)
+def _advance_in_run(law, kin, state, step):
+    return state._replace(skeleton=laws.advance_fbar(law.law, kin, state.skeleton, step))
+
+
+laws.hand_on(
+    Saturated, "law", "skeleton", (
+        laws.jacobian, laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain,
+        laws.energy_density, laws.dissipated_energy, laws.damage, laws.damage_initiation,
+        laws.plastic_strain, laws.specific_volume, laws.shear_part, laws.by_rates, laws.shown_by,
+    ),
+)  # fmt: skip
+
+
+@laws.with_stress.on(Saturated)
+def _with_stress_saturated(law, kin, state, stress):
+    return state._replace(skeleton=laws.with_stress(law.law, kin, state.skeleton, stress))
+
+
+def _terms(law, kin, state, of_skeleton):
+    """Squared speed of the skeleton, and trace and determinant of both phases without drag."""
+    dry = 1 / (laws.specific_volume(law) * laws.jacobian(law, kin, state))
+    n = porosity(law, kin, state)
+    slow, water = of_skeleton(law.law, kin, state.skeleton), law.K / n
+    trace = slow + water * ((1 - n) * (1 - n) / dry + n / law.rho)
+    return trace, slow * law.K / law.rho
+
+
+@laws.wave_speed_squared.on(Saturated)
+def _wave_speed_squared_saturated(law, kin, state):
+    # Larger eigenvalue of the two phases: no drag makes a wave faster.
+    trace, product = _terms(law, kin, state, laws.wave_speed_squared)
+    return 0.5 * (trace + sqrt(max(trace * trace - 4 * product, 0)))
+
+
+@laws.wave_speed_bound.on(Saturated)
+def _wave_speed_bound_saturated(law, kin, state):
+    return _terms(law, kin, state, laws.wave_speed_bound)[0]
+
+
+@laws.number
+@laws.point_function()
+def pore_pressure(law, kin, state):
+    """Pressure of the water in the pores; undefined for dry laws."""
+
+
+@pore_pressure.on(Saturated)
+def _pore_pressure_saturated(law, kin, state):
+    return law.K * logarithm(state.content / state.pores)
+
+
+@laws.number
+@laws.point_function()
+def porosity(law, kin, state):
+    """Volume of the pores over the present volume; undefined for dry laws."""
+
+
+@porosity.on(Saturated)
+def _porosity_saturated(law, kin, state):
+    return state.pores / (state.pores + (1 - law.n))
+
+
+@laws.number
+@laws.point_function()
+def water_content(law, kin, state):
+    """Mass of the water per volume before deformation."""
+
+
+@water_content.on(Saturated)
+def _water_content_saturated(law, kin, state):
+    return law.rho * state.content
+
+
+def with_pore_pressure(law, kin, state, p):
+    """State with the pressure `p` of the water."""
+    return state._replace(content=state.pores * exponential(p / law.K))
+
+
+def drag_per_volume(law, kin, state):
+    """Force per volume and relative velocity: n^2 rho g / k, with the present k."""
+    n = porosity(law, kin, state)
+    k = n * n * n / ((1 - n) * (1 - n)) * ((1 - law.n) * (1 - law.n) / (law.n * law.n * law.n))
+    return law.drag * n * n / (1 + law.kozeny * (k - 1))
+
+
+for _name, _function in (
+    ("pore_pressure", pore_pressure),
+    ("porosity", porosity),
+    ("water_content", water_content),
+):
+    laws.column(Saturated, _name, _function)

@@ -1,0 +1,258 @@
+"""Water in the pores, against exact solutions and balances."""
+
+import re
+from math import pi
+
+import numpy as np
+import pytest
+from conftest import INPUTS
+
+from comparisons.results import read_log
+
+COLUMN = """
+    N = 16
+    method(tlmpm, FLIP, linear, 1)
+    dimension(1, 0, 1, 1/N)
+    region(layer, block, 0, 1)
+    material(clay, linear, 0.6*2650, 1e7, 0)
+    pore_water(clay, n=0.4, permeability=1e-2)
+    solid(clay, region, layer, 2, clay, 1/N, 0)
+    region(bottom, block, -INF, 1e-6)
+    region(top, block, 1 - 1e-6, INF)
+    group(bottom, nodes, region, bottom, all)
+    group(top, nodes, region, top, all)
+    fix(base, velocity_nodes, bottom, 0)
+    dt_factor(0.5)
+"""
+BODY = """
+    method({way})
+    dimension({domain})
+    region(body, block, {body})
+    material(clay, neo-hookean, 1590, 1e7, 0.2)
+    pore_water(clay, n=0.4, permeability=1e-2, kozeny=true)
+    solid(body, region, body, 2, clay, 0.25, 0)
+    fix(v, initial_velocity_particles, all, {v})
+    dt_factor(0.5)
+    run(10)
+"""
+same_kernels = pytest.mark.xdist_group("pore water")
+
+
+def terzaghi(T, depth=1.0):
+    """Degree of consolidation, and pressure over the load at a depth below the drain (1923)."""
+    M = pi * (np.arange(400) + 0.5)
+    decay = np.exp(-M * M * T)
+    return 1 - np.sum(2 / M**2 * decay), np.sum(2 / M * np.sin(M * depth) * decay)
+
+
+def last(result):
+    return {name: column[-1] for name, column in result.log.items()}
+
+
+@same_kernels
+@pytest.mark.parametrize("k", ["1e-3", "1e-9"])
+def test_consolidation_is_that_of_terzaghi(run_script, k):
+    """Scaled densities: the drag of 1e-9 m/s is as fast as that of 1e-3, and the step the same."""
+    log = run_script(INPUTS / "in.terzaghi", "-var", "k", k, "-var", "Tv", "1").log
+    assert log["Step"][-1] < 58500
+    for T in (0.02, 0.1, 0.5, 1.0):
+        at = np.argmin(abs(log["T"] - T))
+        U, p = terzaghi(log["T"][at], 1 - 1 / 64)
+        assert abs(log["U"][at] - U) < (0.0045 if T < 0.1 else 0.002)
+        # The wave of the drain, opened at once, still rings at 0.02.
+        assert abs(log["p0"][at] - p) < (0.02 if T < 0.1 else 0.002)
+    assert abs(log["base_x"][-1] - 1000) < 1
+    assert log["drain_s"][-1] > 0
+
+
+@same_kernels
+def test_a_restarted_column_has_the_same_bits(run_script):
+    text = (INPUTS / "in.terzaghi").read_text("utf-8")
+    text = text.replace("run_time(Tv*H^2/cv)", "run(300)\nwrite_restart(half.h5)\nrun(200)\nDUMP")
+    text = text.replace(
+        "DUMP", "dump(d, all, particle, 1, d.*.txt, x, vx, wx, pore_pressure)\nrun(1)"
+    )
+    whole = run_script(text, folder="run")
+    kept = (whole.folder / "d.501.txt").read_text("utf-8")
+    again = run_script(text, "-restart", "half.h5", folder="run")
+    assert (again.folder / "d.501.txt").read_text("utf-8") == kept
+    threads = run_script(text, "--threads", "2", folder="threads")
+    assert (threads.folder / "d.501.txt").read_text("utf-8") == kept
+
+
+@same_kernels
+def test_steady_seepage_follows_darcy(run_script):
+    """1000 Pa across 1 m of 1e-2 m/s: 1e-2 (1000/9810) m/s; each wall takes half of the force."""
+    log = last(
+        run_script(
+            COLUMN
+            + """
+            fix(lid, velocity_nodes, top, 0)
+            fix(drain, pore_pressure, top, 0)
+            fix(source, pore_pressure, bottom, 1000)
+            fix(start, initial_pore_pressure, all, 1000*(1 - x0))
+            log_modify(custom, step, time, drain_s, source_s, base_x, lid_x)
+            set_output(15000)
+            run(15000)
+            """
+        )
+    )
+    assert abs(log["drain_s"] / (1000 * 1e-2 * 1000 / 9810) - 1) < 1e-4
+    assert abs(log["drain_s"] + log["source_s"]) < 1e-5
+    assert abs(log["base_x"] - 500) < 0.1
+    assert abs(log["lid_x"] + 500) < 0.1
+
+
+@same_kernels
+def test_water_and_soil_rest_under_gravity(run_script):
+    """The reaction is the weight of both; the wall carries the water next to it."""
+    log = last(
+        run_script(
+            COLUMN
+            + """
+            fix(weight, body_force, all, -9.81)
+            fix(drain, pore_pressure, top, 0)
+            fix(water, initial_pore_pressure, all, 9810*(1 - x0))
+            fix(soil, initial_stress, all, -990*9.81*(1 - x0), 0, 0, 0, 0, 0)
+            compute(w, probe, all, wx, vx)
+            log_modify(custom, step, time, base_x, drain_s, w_wx, w_vx)
+            set_output(500)
+            run(500)
+            """
+        )
+    )
+    assert abs(log["base_x"] / (9.81 * 1990) - 1) < 1e-5
+    assert max(abs(log["w_wx"]), abs(log["w_vx"])) < 1e-6
+
+
+@same_kernels
+def test_a_wave_has_the_speed_of_the_undrained_soil(run_script):
+    """A first mode between walls: c^2 = (M + K/n)/rho with drag, and of two phases without."""
+    M, water, dry, wet = 1e7, 2.2e9 / 0.4, 1590.0, 400.0
+    trace = M / dry + water * (0.6**2 / dry + 0.4**2 / wet)
+    free = np.sqrt((trace + np.sqrt(trace**2 - 4 * M * water * 0.4**2 / (dry * wet))) / 2)
+    for k, c in (("1e-6", np.sqrt((M + water) / (dry + wet))), ("10", free)):
+        log = run_script(
+            COLUMN.replace("1e-2)", f"{k})")
+            + f"""
+                fix(lid, velocity_nodes, top, 0)
+                fix(v, initial_velocity_particles, all, 1e-3*sin(PI*x0))
+                compute(p, probe, all, pore_pressure, x=0)
+                log_modify(custom, step, time, p)
+                set_output(1)
+                run_time({4.25 / c:.9g})
+                """
+        ).log
+        t, p = log["Time"], log["p"]
+        k = np.flatnonzero(p[:-1] * p[1:] < 0)
+        zeros = t[k] - p[k] * (t[k + 1] - t[k]) / (p[k + 1] - p[k])
+        zeros = zeros[zeros > 0.5 / c]
+        assert abs(1 / (zeros[-1] - zeros[0]) * (len(zeros) - 1) / c - 1) < 0.008
+
+
+WAYS = {
+    "ulmpm, FLIP, linear, 1": "2, -1, 1, -1, 1, 0.25",
+    "ulmpm, FLIP, quadratic-spline, 0.99": "2, -1, 1, -1, 1, 0.25",
+    "tlmpm, PIC, linear": "3, -1, 1, -1, 1, -1, 1, 0.25",
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("boxes", [False, True])
+def test_water_and_momentum_are_conserved(state_interpreted, way, boxes):
+    """Of a free body with random velocities; water in ulmpm with splines to 1e-6."""
+    domain = WAYS[way]
+    v = "0.3*sin(13*x0 + 7*y0), 0.3*cos(11*x0 - 5*y0)" + ", 0.1" * (domain[0] == "3")
+    body = ", ".join(["-0.25, 0.25"] * int(domain[0]))
+    script = BODY.format(way=way, domain=domain, body=body, v=v)
+    names = "vx", "vy", "wx", "wy", "water_content", "pore_pressure"
+    before, after = (
+        state_interpreted(text, *names, boxes=boxes)
+        for text in (script.replace("run(10)", "run(0)"), script)
+    )
+    volume = 0.125 ** int(domain[0])
+
+    def sums(state):
+        water = volume * state["water_content"]
+        v, w = (np.stack([state[f"{one}x"], state[f"{one}y"]]) for one in "vw")
+        return water.sum(), (1590 * volume * v + water * (v + w)).sum(axis=1), water * abs(v[0])
+
+    (water, momentum, scale), (left, moved, _) = sums(before), sums(after)
+    assert np.ptp(after["pore_pressure"]) > 1e3
+    assert abs(left / water - 1) < (1e-6 if "spline" in way else 1e-14)
+    assert np.abs(moved - momentum).max() < 1e-13 * scale.sum()
+
+
+def test_an_element_is_undrained(run_interpreted):
+    """K_w/n times the volume that the pores lose, and the effective stress of the skeleton."""
+    result = run_interpreted(
+        """
+        material(clay, linear, 1590, 1e7, 0.25)
+        pore_water(clay, n=0.4, permeability=1e-9)
+        load_path(squeeze, 10, exx=-1e-5, eyy=-1e-5, ezz=-1e-5)
+        element(clay, clay, squeeze)
+        """
+    )
+    table = {n: c[-1] for n, c in read_log(result.folder / "element_clay.txt").items()}
+    assert abs(table["pore_pressure"] / (2.2e9 / 0.4 * 3e-5) - 1) < 2e-4
+    assert abs(table["sxx"] / (-1e7 / (3 * 0.5) * 3e-5) - 1) < 1e-3
+
+
+REFUSED = {
+    "method(ulmpm, APIC, quadratic-spline)": "transfer APIC",
+    "method(ulmpm, FLIP, cpgimp, 1)": "the basis cpgimp",
+    "method(ulcpdi, FLIP, linear, 1, R4)": "method ulcpdi",
+    "method(ulmpm, FLIP, linear, 1)\nscheme(usl)": "scheme usl",
+    "method(ulmpm, FLIP, linear, 1)\nscheme(quasi-static)": "scheme quasi-static",
+    "method(ulmpm, FLIP, linear, 1)\nanti_volumetric_locking(true)": "anti_volumetric_locking",
+    "method(ulmpm, FLIP, linear, 1)\nboundary(reflect)": "boundary(reflect)",
+    "method(ulmpm, FLIP, linear, 1)\nprecision(single)": "precision(single)",
+}
+SCENE = """
+    {head}
+    dimension(2, 0, 1, 0, 1, 0.25)
+    {kind}
+    region(body, block, 0.25, 0.75, 0.25, 0.75)
+    material(clay, linear, 1590, 1e7, 0.25)
+    {water}
+    solid(body, region, body, 2, clay, 0.25, 0)
+    {tail}
+"""
+USUAL = {
+    "head": "method(ulmpm, FLIP, linear, 1)",
+    "kind": "",
+    "water": "pore_water(clay, n=0.4, permeability=1e-3)",
+    "tail": "run(1)",
+}
+
+
+@pytest.mark.parametrize("head", REFUSED)
+def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, head):
+    err = run_interpreted(SCENE.format(**USUAL | {"head": head}), status=1).err
+    assert f"pore_water does not support {REFUSED[head]}" in err
+
+
+MISTAKES = [
+    ({"kind": "axisymmetric(true)"}, (), "does not support axisymmetric scenes"),
+    ({}, ("--gpu",), "does not support --gpu"),
+    ({"water": "pore_water(clay, n=1, permeability=1e-3)"}, (), "the porosity is 1"),
+    ({"water": "pore_water(clay, n=0.4)"}, (), "the permeability is given nowhere"),
+    ({"water": "pore_water(clay, n=0.4, permeability=0)"}, (), "above 0"),
+    ({"water": ""}, (), ""),
+    ({"water": "", "tail": "pore_water(clay, n=0.4, permeability=1)"}, (), "has this material"),
+    ({"water": "", "tail": "fix(p, initial_pore_pressure, all, 0)"}, (), "no solid has water"),
+]
+
+
+@pytest.mark.parametrize(("change", "options", "told"), MISTAKES)
+def test_mistakes_get_one_message(run_interpreted, change, options, told):
+    status = 1 if told else 0
+    err = run_interpreted(SCENE.format(**USUAL | change), *options, status=status).err
+    assert told in err
+    assert err.count("error:") == status
+
+
+def test_a_permeability_in_the_wrong_unit_is_doubted(run_interpreted):
+    script = SCENE.format(**USUAL | {"water": "pore_water(clay, n=0.4, permeability=1e-14)"})
+    err = run_interpreted(script).err
+    assert re.search(r"conductivity is 1e-14 m/s.*\n(.*\n)*.*intrinsic=", err)
