@@ -33,12 +33,12 @@ class Noise(NamedTuple):
 
 
 class Lag(NamedTuple):
-    share: float = 0.0  # of the angular velocity
+    fraction: float = 0.0  # of the angular velocity
     turns: float = 0.0
 
     @property
     def percent(self) -> float:
-        return 100 * self.share
+        return 100 * self.fraction
 
 
 def rings(law: Any) -> bool:

@@ -29,11 +29,11 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     moves, jumps = method.frame.moves, method.basis.traits.gradient_jumps
     if simulation.implicit:
         return _gain_of_implicit_steps(hub)
-    share = simulation.dt / step_size.stable_step(simulation, simulation.steps.limit)
+    fraction = simulation.dt / step_size.stable_step(simulation, simulation.steps.limit)
     keeping = stable_step.keeping_share(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
-    if share > 1 + 1e-9:
-        above = f"time step is {share:.3g} x the stability limit"
+    if fraction > 1 + 1e-9:
+        above = f"time step is {fraction:.3g} x the stability limit"
         return above, step_size.own_step_instead(simulation)
     if update.boundary == "reflect" and simulation.bounces:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
@@ -57,11 +57,11 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
         return "F-bar in the updated frame", "remove anti_volumetric_locking"
-    if keeping < stable_step.DEFAULT_SHARE and share > keeping * (1 + 1e-9):
+    if keeping < stable_step.DEFAULT_SHARE and fraction > keeping * (1 + 1e-9):
         points = " with one point per cell" if stable_step.sparse(hub) else ""
         return (
             f"points crossing cells: {transfer} and {scheme} with {basis}{points} at "
-            f"{share:.2g} x the stability limit",
+            f"{fraction:.2g} x the stability limit",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
     if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbours lose contact
@@ -72,7 +72,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return largest.reason, largest.cure
     if moves and jumps:
         return f"points crossing cells: the gradient of {basis} is discontinuous", smooth
-    if share > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
+    if fraction > 0.3 and (hub.update.fixed_dt or hub.update.dt_factor):
         return "time step too large", f"{_step_of(hub, simulation, 0.3)} or less"
     return "", "compare with another basis, transfer or scheme"
 
@@ -87,10 +87,10 @@ def _gain_of_implicit_steps(hub: Hub) -> tuple[str, str]:
     return "large strains or rotations within a step", smaller
 
 
-def _step_of(hub: Hub, simulation: Simulation, share: float) -> str:
+def _step_of(hub: Hub, simulation: Simulation, fraction: float) -> str:
     if hub.update.fixed_dt is not None:
-        return f"set_dt({share * simulation.steps.limit:.3g})"
-    return f"dt_factor({share:g})"
+        return f"set_dt({fraction * simulation.steps.limit:.3g})"
+    return f"dt_factor({fraction:g})"
 
 
 def swelling(points: PointTable) -> np.ndarray:
@@ -116,8 +116,8 @@ def taken_by(hub: Hub) -> list[str]:
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
     # Nodal velocities lack unresolved motion.
     if flip_coefficient(transfer) < 1:
-        share = f" {transfer.alpha:g}" if transfer.traits.retains else ""
-        takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{share}")
+        coefficient = f" {transfer.alpha:g}" if transfer.traits.retains else ""
+        takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{coefficient}")
     return takers
 
 
@@ -172,10 +172,10 @@ def collides(hub: Hub) -> tuple[str, str] | None:
     return None
 
 
-def words_of_change(hub: Hub, share: float) -> str:
+def words_of_change(hub: Hub, fraction: float) -> str:
     takers, by = taken_by(hub), ""
     words = "the largest since the first step (kinetic + stored + dissipated - work)"
-    if takers and share < -1:
+    if takers and fraction < -1:
         transfer = hub.update.transfer
         often = flip_coefficient(transfer) < 1 and not transfer.traits.per_time
         if collides(hub):
@@ -183,6 +183,6 @@ def words_of_change(hub: Hub, share: float) -> str:
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
     # The sum of losses may exceed the largest energy.
-    share = round(share, 2) + 0.0  # no -0.00
-    much = f"{share:+.2f} % of" if share > -100 else f"{share / 100:+.2f} times"
+    fraction = round(fraction, 2) + 0.0  # no -0.00
+    much = f"{fraction:+.2f} % of" if fraction > -100 else f"{fraction / 100:+.2f} times"
     return f"{much} {words}{by}"

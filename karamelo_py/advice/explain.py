@@ -102,14 +102,14 @@ def _gained(hub: Hub, simulation: Simulation) -> Trouble:
 
 def _heated(hub: Hub, simulation: Simulation) -> Trouble:
     step, heat = simulation.control.step[0], simulation.control.heat[0]
-    share = step.last_dt / heat.heat_limit
+    fraction = step.last_dt / heat.heat_limit
     message = (
         f"temperatures are between {heat.T_low:.6g} and {heat.T_high:.6g}; initial state, fixes "
         f"and sources allow {heat.coldest:.6g} to {heat.hottest + heat.own_heat:.6g} "
         f"({when(simulation)})"
     )
-    if share > 1:
-        cause = f"time step is {share:.3g} x the stability limit of conduction"
+    if fraction > 1:
+        cause = f"time step is {fraction:.3g} x the stability limit of conduction"
         return Trouble(message, own_step_instead(simulation), "temperature", cause)
     return Trouble(message, _smaller_step(hub, simulation), "temperature")
 

@@ -61,8 +61,8 @@ class SceneFacts(BasicFacts):
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
     # Step over the stable step, and over the limit for neighbours of different density.
-    share = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
-    share_of_uneven = property(lambda self: self.share * self.uneven.of_step)
+    fraction = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
+    fraction_of_uneven = property(lambda self: self.fraction * self.uneven.of_step)
     fastest = cached_property(lambda self: self.simulation.fastest())  # velocity component
     turns = property(lambda self: self.turn > TURN)
     # Largest velocity over wave speed; strain by impacts and weight.

@@ -15,11 +15,11 @@ def own_step(simulation: Simulation, *, still: bool = False) -> float:
     """The default step now: at rest, or as if points had moved."""
     control, steps = simulation.control, simulation.steps
     motion, spacing = control.motion[0], control.step[0].spacing
-    courant, share = own_step_of_waves(simulation.hub, still=still)
+    courant, fraction = own_step_of_waves(simulation.hub, still=still)
     weight = own_weight_of_drift(simulation.hub)
     rate = motion.rate if weight == motion.weight else steps.rate_with(weight)
     limit = courant * spacing / rate if rate > 0 else inf
-    step = min(share * limit, DEFAULT_SHARE * control.heat[0].heat_limit)
+    step = min(fraction * limit, DEFAULT_SHARE * control.heat[0].heat_limit)
     speed = simulation.fastest() if weight != 1 else 0.0
     return float(min(step, STRIDE * spacing / speed) if speed > 0 else step)
 
@@ -76,8 +76,8 @@ def own_step_instead(simulation: Simulation, command: str = "") -> str:
     update = simulation.hub.update
     if command == "set_dt" or (not command and update.fixed_dt is not None):
         return f"set_dt({own_step(simulation):.3g}) or less, or remove set_dt"
-    share = own_step(simulation) / simulation.steps.limit_moving
-    return f"dt_factor({share:.3g}) or less" + ", or remove dt_factor" * bool(update.dt_factor)
+    fraction = own_step(simulation) / simulation.steps.limit_moving
+    return f"dt_factor({fraction:.3g}) or less" + ", or remove dt_factor" * bool(update.dt_factor)
 
 
 def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
@@ -88,8 +88,8 @@ def words_of_share(simulation: Simulation) -> str:
     hub, steps = simulation.hub, simulation.steps
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
     if hub.update.fixed_dt is not None:
-        share = hub.update.fixed_dt / stable_step(simulation, steps.limit)
-        words = f"{share:.3g} of the stable step"
+        fraction = hub.update.fixed_dt / stable_step(simulation, steps.limit)
+        words = f"{fraction:.3g} of the stable step"
     elif asked is None:
         step = simulation.control.step[0]
         of_heat = steps.ruling_limit == "conduction"
@@ -99,9 +99,9 @@ def words_of_share(simulation: Simulation) -> str:
         far = f"; {after:.2g} of that once points have gone a quarter of a cell"
         return words if after == 1 else words + far
     else:
-        share = asked
-        words = f"{share:g} of the stable step, by dt_factor"
+        fraction = asked
+        words = f"{fraction:g} of the stable step, by dt_factor"
     # `large_steps` warns of a fraction above 1.
-    if max(keeping, 1e-9) * (1 + 1e-9) < share <= 1 and keeping < DEFAULT_SHARE:
+    if max(keeping, 1e-9) * (1 + 1e-9) < fraction <= 1 and keeping < DEFAULT_SHARE:
         return words + f": above {keeping:g} a body that drifts gains energy"
     return words

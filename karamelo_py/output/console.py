@@ -154,13 +154,13 @@ class Console:
             progress.stop()
 
     def _describe(self, step: int, time_: float, fraction: float | None, now: float) -> str:
-        begun, first, share = self._begin
+        begun, first, done = self._begin
         elapsed = max(now - begun, 1e-9)
         parts = [f"step {step}", f"time {time_:.6g}", f"{(step - first) / elapsed:.3g} steps/s"]
         if fraction is not None:
             parts.insert(0, f"{100 * fraction:3.0f} %")
-            if fraction > share:
-                parts.append(f"{duration(elapsed * (1 - fraction) / (fraction - share))} left")
+            if fraction > done:
+                parts.append(f"{duration(elapsed * (1 - fraction) / (fraction - done))} left")
         return ", ".join(parts)
 
     def _release(self) -> None:

@@ -157,7 +157,7 @@ class Fields(PointTable):
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
         """Largest value of a function of points, and the first point that has it."""
 
-        def own() -> tuple[float, int]:
+        def of_rank() -> tuple[float, int]:
             best = -inf, 0
             for some in self.some(None):
                 values = of(some)
@@ -166,7 +166,7 @@ class Fields(PointTable):
                 best = max(best, (float(value), -int(first)))
             return best
 
-        value, number = max(self.comm.allgather(own()))
+        value, number = max(self.comm.allgather(of_rank()))
         return value, -number
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
@@ -350,20 +350,20 @@ class ShownColumn(ColumnFormula):
         return word if word is not None and word.isidentifier() else cls(hub, argument)
 
 
-def check_columns(columns: Sequence[str], known: Sequence[str], *, first: int) -> None:
+def check_columns(columns: Sequence[str], names: Sequence[str], *, first: int) -> None:
     """Refuse unknown names; `first` is the argument index of the first."""
     for index, name in enumerate(columns):
-        if name not in known:
-            raise unknown_column(f"unknown column '{name}'", name, known, argument=first + index)
+        if name not in names:
+            raise unknown_column(f"unknown column '{name}'", name, names, argument=first + index)
 
 
-def unknown_column(message: str, name: str, known: Iterable[str], **where: Any) -> ScriptError:
-    known = list(known)
-    error = unknown(message, name, known, code="unknown-column", **where)
-    error.expected = one_of(name, known, page="docs/reference/columns.md")
+def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) -> ScriptError:
+    names = list(names)
+    error = unknown(message, name, names, code="unknown-column", **where)
+    error.expected = one_of(name, names, page="docs/reference/columns.md")
     others = table()["columns"].items()
     quantity = next((columns for columns, words in others if name.lower() in words), "")
-    if meant := [column for column in quantity.split() if column in known]:
+    if meant := [column for column in quantity.split() if column in names]:
         error.hint, error.alike = f"did you mean {', '.join(meant)}?", meant[0]
     component = re.fullmatch(r"(s|sigma|stress|e|eps|strain)_?([xyz123])([xyz123])", name.lower())
     if component is not None:

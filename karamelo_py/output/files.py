@@ -196,7 +196,7 @@ class Claim:
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# By device and inode: simulations of one process share a claim.
+# By device and inode: simulations of one process have one claim.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 

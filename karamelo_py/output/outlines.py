@@ -52,9 +52,9 @@ def outlines(x: np.ndarray) -> list[np.ndarray]:
     at = (x - lo) / cell
     filled = smoothed(scattered(at, tuple((at.max(axis=0) + 6).astype(int))))
     within = _largest(filled, 2)
-    share = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
+    fraction = np.divide(filled, within, out=np.zeros_like(filled), where=within > 0)
     across, up = (low + cell * np.arange(n) for low, n in zip(lo, filled.shape, strict=True))
-    return _contours(across, up, share.T, 0.5)
+    return _contours(across, up, fraction.T, 0.5)
 
 
 def _contours(x: np.ndarray, y: np.ndarray, z: np.ndarray, level: float) -> list[np.ndarray]:

@@ -284,11 +284,11 @@ class Picture:
         out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
         if out <= MARGIN or not self.axes.axison or not label.get_text():
             return
-        box, share = self.axes.get_position(), out / self.figure.bbox.width
-        self.axes.set_position((box.x0 + share, box.y0, box.width - share, box.height))
+        box, fraction = self.axes.get_position(), out / self.figure.bbox.width
+        self.axes.set_position((box.x0 + fraction, box.y0, box.width - fraction, box.height))
         self.figure.draw_without_rendering()
 
-    def _pixels_per_unit(self) -> float:
+    def _points_per_unit(self) -> float:
         """Points (1/72 inch) on paper per unit of x."""
         box = self.axes.get_position()
         lo, hi = self.axes.get_xlim()
@@ -311,10 +311,10 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
     return float(lo), float(hi if hi > lo else lo + unit)
 
 
-def within(values: np.ndarray, share: float) -> np.ndarray:
-    """Finite values, or their quantiles `share` and 1 - `share`."""
+def within(values: np.ndarray, fraction: float) -> np.ndarray:
+    """Finite values, or their quantiles `fraction` and 1 - `fraction`."""
     finite = values[np.isfinite(values)]
-    return np.quantile(finite, [share, 1 - share]) if share and len(finite) else finite
+    return np.quantile(finite, [fraction, 1 - fraction]) if fraction and len(finite) else finite
 
 
 def in_window(columns: dict[str, np.ndarray], window: Window) -> dict[str, np.ndarray]:
@@ -408,7 +408,7 @@ class PlanePicture(Picture):
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
         # As large as its material, with a minimum that is larger for few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
-        size = max(ROUND * side * self._pixels_per_unit(), least) * self.options.pointsize
+        size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
         if not self.options.solids:
             values = (values - self.limits[0]) / (self.limits[1] - self.limits[0])

@@ -139,9 +139,9 @@ class Output:
         return [*plots, *self.hub.dumps.values()] if self.writes else []
 
     def _write(self, item: Rhythmic) -> None:
-        what = "write" if self.hub.settings.comm.leads else "take_part"
-        with _reported(item, what):
-            getattr(item, what)()
+        hook = "write" if self.hub.settings.comm.leads else "take_part"
+        with _reported(item, hook):
+            getattr(item, hook)()
 
     def _items(self) -> list[Rhythmic]:
         if not self.takes_part:
@@ -150,8 +150,8 @@ class Output:
 
 
 @contextmanager
-def _reported(item: Rhythmic | Plots, what: str) -> Iterator[None]:
-    naming = as_script_error(f"dump {item.style}", what, type(item), item.place)
+def _reported(item: Rhythmic | Plots, hook: str) -> Iterator[None]:
+    naming = as_script_error(f"dump {item.style}", hook, type(item), item.place)
     try:
         with naming if item.style else nullcontext():
             yield

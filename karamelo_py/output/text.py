@@ -62,10 +62,10 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
                 if done == total:
                     break
             i, k = divmod(done, width)
-            own = b"%d" % integers[i, k] if is_integer[k] else b"%.9g" % numbers[i, k]
-            own += b"\n" if k == width - 1 else b" "
-            text[at : at + len(own)] = np.frombuffer(own, np.uint8)
-            done, at = done + 1, at + len(own)
+            written = b"%d" % integers[i, k] if is_integer[k] else b"%.9g" % numbers[i, k]
+            written += b"\n" if k == width - 1 else b" "
+            text[at : at + len(written)] = np.frombuffer(written, np.uint8)
+            done, at = done + 1, at + len(written)
         yield text[:at].tobytes()
 
 

@@ -29,13 +29,13 @@ SLOPE = 1e-3  # relative to the largest; smaller slopes are zero, as sums would 
 class Pieces(NamedTuple):
     number: np.ndarray  # (n,) of the box, ascending
     middle: np.ndarray  # (n, d) centroids
-    share: np.ndarray  # (n,) volume fractions of the box
+    fraction: np.ndarray  # (n,) volume fractions of the box
     # (m,) fraction of each box in smallest parts that are not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
         """Smallest thickness resolved by boxes of this size; 0: all."""
-        mostly = self.rough.sum() > MOSTLY * self.share.sum()
+        mostly = self.rough.sum() > MOSTLY * self.fraction.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
@@ -61,16 +61,16 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
     edge = np.flatnonzero(passed)
     at = x[edge]
     corner = np.maximum(at - half, lo)
-    share, moment, rough = _measure(region, corner, np.minimum(at + half, hi) - corner, size)
-    middle = moment / np.maximum(share, NOTHING)[:, None]
-    kept[edge] = share > NOTHING
-    left = kept[edge] & (share <= 1 - NOTHING)
-    return kept, Pieces(first + edge[left], middle[left], share[left], rough)
+    fraction, moment, rough = _measure(region, corner, np.minimum(at + half, hi) - corner, size)
+    middle = moment / np.maximum(fraction, NOTHING)[:, None]
+    kept[edge] = fraction > NOTHING
+    left = kept[edge] & (fraction <= 1 - NOTHING)
+    return kept, Pieces(first + edge[left], middle[left], fraction[left], rough)
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
     """Merge small pieces into the nearest larger one in an adjacent box (fraction 0 then)."""
-    small = np.flatnonzero(pieces.share < LEAST)
+    small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
     nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
@@ -80,7 +80,7 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
         number = boxes.beside(pieces.number[small], step * lean)
         row = np.minimum(np.searchsorted(pieces.number, number), len(pieces.number) - 1)
         is_piece = pieces.number[row] == number
-        large = is_piece & (pieces.share[row] >= LEAST)
+        large = is_piece & (pieces.fraction[row] >= LEAST)
         at = pieces.middle[row]
         other = np.flatnonzero(~is_piece & (number >= 0))
         at[other] = boxes.middles(number[other])
@@ -96,16 +96,16 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
     new = np.setdiff1d(taker, pieces.number)
     order = np.argsort(np.concatenate([pieces.number, new]), kind="stable")
     number = np.concatenate([pieces.number, new])[order]
-    share = np.concatenate([pieces.share, np.ones(len(new))])[order]
+    fraction = np.concatenate([pieces.fraction, np.ones(len(new))])[order]
     middle = np.concatenate([pieces.middle, boxes.middles(new)])[order]
     giver = np.searchsorted(number, pieces.number[small])
     taker = np.searchsorted(number, taker)
-    moment = middle * share[:, None]
+    moment = middle * fraction[:, None]
     np.add.at(moment, taker, moment[giver])
-    np.add.at(share, taker, share[giver])
-    share[giver] = 0
-    middle[taker] = moment[taker] / share[taker][:, None]
-    return Pieces(number, middle, share, pieces.rough)
+    np.add.at(fraction, taker, fraction[giver])
+    fraction[giver] = 0
+    middle[taker] = moment[taker] / fraction[taker][:, None]
+    return Pieces(number, middle, fraction, pieces.rough)
 
 
 def _measure(
@@ -145,12 +145,12 @@ def _measure(
             bent[:] = False
         # Simpson's rule for the mean.
         done = ~bent
-        share, middle = _plane((mean + 2 * inmost)[done] / 3, slopes[:, done])
-        share *= volume[done]
-        sums[0] += np.bincount(box[done], share, n)
+        fraction, middle = _plane((mean + 2 * inmost)[done] / 3, slopes[:, done])
+        fraction *= volume[done]
+        sums[0] += np.bincount(box[done], fraction, n)
         for k in range(d):
             along = lo[k, done] + edges[k, done] * middle[k]
-            sums[1 + k] += np.bincount(box[done], share * along, n)
+            sums[1 + k] += np.bincount(box[done], fraction * along, n)
         edges, parts = edges[:, bent] / 2, len(corners)
         lo = lo[:, None, bent] + corners.T[:, :, None] * edges[:, None, :]
         lo, edges, box = lo.reshape(d, -1), np.tile(edges, parts), np.tile(box[bent], parts)
@@ -175,8 +175,8 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
             depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
             depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
             slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)
-            share = _plane(depth.mean(axis=0), slopes)[0] if d > 1 else depth[0] > 0
-            covered.append(share.reshape(n, -1).mean(axis=1))
+            fraction = _plane(depth.mean(axis=0), slopes)[0] if d > 1 else depth[0] > 0
+            covered.append(fraction.reshape(n, -1).mean(axis=1))
         area[:, k] = (covered[0] - covered[1]) * size ** (d - 1)
     length = np.maximum(np.linalg.norm(area, axis=1, keepdims=True), np.finfo(float).tiny)
     return area, x + region.depth(x, 2 * size)[:, None] * area / length
@@ -186,14 +186,14 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Fraction (n,) and centroid (d, n) of a unit cube's part with mean + slopes (x - 1/2) > 0."""
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
-    share, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
+    fraction, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
     ways = (1 << np.arange(len(m))) @ steep
     for way in range(1, 1 << len(m)):
         rows = np.flatnonzero(ways == way)
         if len(rows):
             here = np.ix_(np.array([k for k in range(len(m)) if way >> k & 1]), rows)
-            share[rows], middle[here] = _simplices(mean[rows], m[here])
-    return share, np.where(slopes > 0, 1 - middle, middle)
+            fraction[rows], middle[here] = _simplices(mean[rows], m[here])
+    return fraction, np.where(slopes > 0, 1 - middle, middle)
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,13 +201,13 @@ def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     those at the other corners, outside the cube."""
     d = len(m)
     top = mean + m.sum(axis=0) / 2
-    share, moment = np.zeros(len(mean)), np.zeros(m.shape)
+    fraction, moment = np.zeros(len(mean)), np.zeros(m.shape)
     unit = 1 / (math.factorial(d) * m.prod(axis=0))
     for corner in itertools.product((0, 1), repeat=d):
         height = np.maximum(top - np.array(corner, float) @ m, 0)
         volume = (-1) ** sum(corner) * height**d * unit
-        share += volume
+        fraction += volume
         for k in range(d):
             moment[k] += volume * (corner[k] + height / ((d + 1) * m[k]))
-    share = np.clip(share, 0, 1)
-    return share, np.clip(moment / np.maximum(share, NOTHING), 0, 1)
+    fraction = np.clip(fraction, 0, 1)
+    return fraction, np.clip(moment / np.maximum(fraction, NOTHING), 0, 1)

@@ -114,10 +114,10 @@ class Filled:
         return x[low - begin * m : high - begin * m] if bits is None else x[rows - begin * m]
 
 
-def lattice_of(region: Region, domain: Domain, h: float, *, own: bool) -> Lattice:
-    """Cells of the domain's grid, or `own` cells from the corner of the region's bounding box."""
+def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Lattice:
+    """Cells of the domain's grid, or apart, from the corner of the region's bounding box."""
     d = domain.dimension
-    if not own:
+    if not apart:
         return Lattice(d, domain.lo, domain.hi, h)
     if region.unknown:
         return Lattice(d, domain.lo, domain.lo, h)
@@ -257,11 +257,11 @@ def _least(region: Region, domain: Domain, spacing: float, most: float) -> float
     for _ in range(LOOKS):
         x = lo + size * random.random((max(SAMPLE, places), domain.dimension))
         places, inside = places + len(x), inside + int(region.inside(x).sum())
-        share = inside / places
+        fraction = inside / places
         # Four standard deviations of the mean.
-        unsure = 4 * math.sqrt(max(share * (1 - share), 1 / places) / places)
-        least = (share - unsure) * whole
-        if least > most or (share + unsure) * whole <= most:
+        unsure = 4 * math.sqrt(max(fraction * (1 - fraction), 1 / places) / places)
+        least = (fraction - unsure) * whole
+        if least > most or (fraction + unsure) * whole <= most:
             break
     return least
 
@@ -276,18 +276,18 @@ def _cut_off(
     for kept, _ in left:
         some = slice(*np.searchsorted(pieces.number, [begin, begin + len(kept)]))
         number = pieces.number[some] - begin
-        kept[number] = pieces.share[some] > 0
+        kept[number] = pieces.fraction[some] > 0
         if len(number):
             rows.append(len(x0) - 1 + np.cumsum(kept)[number[kept[number]]])
         x0.keep(kept)
         begin += len(kept)
-    filled = pieces.share > 0
+    filled = pieces.fraction > 0
     row = np.concatenate(rows) if rows else np.empty(0, np.int64)
     x0.move(row, pieces.middle[filled])
-    share = np.ones((len(x0), 1))
-    share[row, 0] = pieces.share[filled]
+    fraction = np.ones((len(x0), 1))
+    fraction[row, 0] = pieces.fraction[filled]
     half = np.ones((len(x0), 1))
-    half[row, 0] = pieces.share[filled] ** (1 / d)
+    half[row, 0] = pieces.fraction[filled] ** (1 / d)
     return placed._replace(
-        volume=placed.volume * share[:, 0], half_size=size / 2 * half, missed=pieces.missed(size)
+        volume=placed.volume * fraction[:, 0], half_size=size / 2 * half, missed=pieces.missed(size)
     )

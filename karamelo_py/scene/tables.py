@@ -83,11 +83,11 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
             )
     stated = re.search(r'Properties="?([\w:]+)', lines[begin - 1])
     parts = (stated[1] if stated else "species:S:1:pos:R:3").split(":")
-    known = {"pos": "xyz", "velo": ["vx", "vy", "vz"], "mass": ["mass"], "masses": ["mass"]}
+    names = {"pos": "xyz", "velo": ["vx", "vy", "vz"], "mass": ["mass"], "masses": ["mass"]}
     columns: dict[str, int] = {}
     at = 0
     for name, width in zip(parts[::3], map(int, parts[2::3]), strict=True):
-        columns |= {of: at + k for k, of in enumerate(known.get(name, ()))}
+        columns |= {of: at + k for k, of in enumerate(names.get(name, ()))}
         at += width
     rows = [line.split() for line in lines[begin:]]
     for number, row in enumerate(rows, begin + 1):

@@ -66,7 +66,7 @@ known_failure(
     reason="solid '{scene.uneven.heavy}' is {scene.uneven.ratio:.3g} times as dense as solid "
     "'{scene.uneven.light}' next to it. At nodes that both reach, with little mass, usl needs a "
     "shorter step: bodies gain energy and break within some thousand steps",
-    cure="dt_factor({scene.share_of_uneven:.2g}), cpgimp or quadratic-spline",
+    cure="dt_factor({scene.fraction_of_uneven:.2g}), cpgimp or quadratic-spline",
 )
 
 

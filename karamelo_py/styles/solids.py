@@ -94,7 +94,7 @@ class RegionSolid(Solid):
         if points is None and (stepped or drawn) and not (corners or region.unknown):
             points = "cut"
         self.cut = points == "cut"
-        lattice = lattice_of(region, domain, self.h, own=own_grids(hub))
+        lattice = lattice_of(region, domain, self.h, apart=own_grids(hub))
         if points is None and hub.update.method.regular_points:
             points = "regular"
         if self.cut and corners:

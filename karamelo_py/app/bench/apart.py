@@ -137,11 +137,11 @@ def _share(job: Measurement, comm: MpiComm | None = None) -> dict[str, Any]:
 
 def line(row: Scaled, one: Scaled) -> str:
     who = f"{row.ranks} x {row.threads}" + (" (larger)" if row.weak else "")
-    shares = f"{'-':>9} {'-':>10}"
+    waits = f"{'-':>9} {'-':>10}"
     if row.ranks > 1:
-        shares = f"{100 * row.exchange:>7.1f} % {100 * row.imbalance:>8.1f} %"
+        waits = f"{100 * row.exchange:>7.1f} % {100 * row.imbalance:>8.1f} %"
     speed = f"{row.best / 1e6:>10.2f} {row.best / one.best:>10.2f}"
-    return f"  {who:<22}{row.points:>9} {speed} {shares}"
+    return f"  {who:<22}{row.points:>9} {speed} {waits}"
 
 
 def main() -> int:

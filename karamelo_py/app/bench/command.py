@@ -173,10 +173,10 @@ def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool
     for stage, per in stages.items():
         print(f"    {stage:<38} {1e9 * per / one.points:8.2f} ns")
     print(f"    {'together, in one compiled loop':<38} {1e9 / best:8.2f} ns")
-    shares = "sweeps are too short to be timed one by one"
+    fractions = "sweeps are too short to be timed one by one"
     if one.told_apart:
-        shares = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % outside"
-    print(f"  {'limited by':<34} {one.limit:>8} ({shares})")
+        fractions = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % outside"
+    print(f"  {'limited by':<34} {one.limit:>8} ({fractions})")
 
 
 def _print_solved(one: measure.Solved) -> None:
@@ -184,8 +184,8 @@ def _print_solved(one: measure.Solved) -> None:
     print(f"  {'seconds per load step':<34} {one.points / one.best:8.3f} (median "
           f"{one.points / one.median:.3f})")  # fmt: skip
     print(f"  {'corrections per load step':<34} {one.corrections:8.1f}")
-    for stage, share in one.stages.items():
-        print(f"    {stage:<38} {100 * share:6.1f} %")
+    for stage, fraction in one.stages.items():
+        print(f"    {stage:<38} {100 * fraction:6.1f} %")
 
 
 def commit() -> str | None:

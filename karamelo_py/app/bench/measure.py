@@ -225,13 +225,13 @@ def _solved(simulation: Simulation, seconds: float, lead: int) -> Solved:
     steps.seconds.clear()
     steps.corrections = 0
     taken = timed_steps(simulation, 5)
-    shares = {stage: spent / taken for stage, spent in steps.seconds.items()}
+    fractions = {stage: spent / taken for stage, spent in steps.seconds.items()}
     corrections = steps.corrections / (simulation.step - before)
     count, times = repeated(simulation, seconds, 0)
     rates = [simulation.count * count / spent for spent, _ in times]
-    shares["rest"] = 1 - sum(shares.values())
+    fractions["rest"] = 1 - sum(fractions.values())
     precision = simulation.hub.settings.precision
-    return Solved(simulation.count, rates, steps.unknowns, corrections, shares, precision)
+    return Solved(simulation.count, rates, steps.unknowns, corrections, fractions, precision)
 
 
 def repeated(

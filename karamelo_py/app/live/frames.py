@@ -42,10 +42,10 @@ def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
     small = counts * POINTS < least * len(ids)
-    share = least / np.maximum(counts, 1)
-    share[~small] = (POINTS - least[small].sum()) / counts[~small].sum()
+    fraction = least / np.maximum(counts, 1)
+    fraction[~small] = (POINTS - least[small].sum()) / counts[~small].sum()
     chance = np.random.default_rng(0).random(ids.max() + 1, np.float32)
-    return chance[ids] < share[solids]
+    return chance[ids] < fraction[solids]
 
 
 class KeptFrames:

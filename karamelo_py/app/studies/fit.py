@@ -86,7 +86,7 @@ class NoDerivatives(ScriptError):
 class End:
     """End of a search: positions in the ranges (0 to 1), differences, slopes."""
 
-    share: np.ndarray
+    fraction: np.ndarray
     off: np.ndarray
     slopes: np.ndarray
 
@@ -108,13 +108,13 @@ class Search:
             raise ScriptError("there is no range to search", expected=expected)
         self.low, self.high = (np.array([end(ends) for ends in numbers]) for end in (min, max))
 
-    def case(self, share: np.ndarray) -> dict[str, str]:
-        at = self.low + share * (self.high - self.low)
+    def case(self, fraction: np.ndarray) -> dict[str, str]:
+        at = self.low + fraction * (self.high - self.low)
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
-    def differences(self, *shares: np.ndarray) -> list[np.ndarray]:
+    def differences(self, *fractions: np.ndarray) -> list[np.ndarray]:
         """The differences at these positions; inf for a failed run."""
-        cases, results = [self.case(share) for share in shares], []
+        cases, results = [self.case(fraction) for fraction in fractions], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:
                 if row["status"] != "done":
@@ -130,18 +130,18 @@ class Search:
             results.append(off)
         return results
 
-    def slopes(self, share: np.ndarray, both: bool = False) -> np.ndarray:
+    def slopes(self, fraction: np.ndarray, both: bool = False) -> np.ndarray:
         """Derivatives (n, variables) towards the middle, or over `both` sides.
 
         Raises NoDerivatives if runs on both sides fail.
         """
-        moves = np.diag(np.where(share < 0.5, STEP, -STEP))
-        first, *ahead = self.differences(share, *(share + moves))
+        moves = np.diag(np.where(fraction < 0.5, STEP, -STEP))
+        first, *ahead = self.differences(fraction, *(fraction + moves))
         columns = []
         for k, off in enumerate(ahead):
-            points = [(share, first), (share + moves[k], off)]
+            points = [(fraction, first), (fraction + moves[k], off)]
             if both or not np.isfinite(off).all():
-                back = np.clip(share - moves[k], 0, 1)
+                back = np.clip(fraction - moves[k], 0, 1)
                 points.append((back, *self.differences(back)))
             done = sorted((at[k], tuple(off)) for at, off in points if np.isfinite(off).all())
             (low, below), (high, above) = done[0], done[-1]
@@ -158,7 +158,7 @@ class Search:
             return None
         try:
             result = least_squares(
-                lambda share: self.differences(share)[0], start, jac=self.slopes,
+                lambda fraction: self.differences(fraction)[0], start, jac=self.slopes,
                 bounds=(0, 1), max_nfev=most, ftol=ENOUGH, xtol=ENOUGH,
             )  # fmt: skip
         except NoDerivatives:
@@ -172,12 +172,12 @@ class Search:
         """
 
         def nearby(*moves: np.ndarray) -> list[End]:
-            near = [np.clip(end.share + s * move, 0, 1) for move in moves for s in (1, -1)]
+            near = [np.clip(end.fraction + s * move, 0, 1) for move in moves for s in (1, -1)]
             results = self.differences(*near)
             return [End(at, off, end.slopes) for at, off in zip(near, results, strict=True)]
 
-        ends = nearby(*np.diag([STEP] * len(end.share)))
-        end.slopes = self.slopes(end.share, both=True)
+        ends = nearby(*np.diag([STEP] * len(end.fraction)))
+        end.slopes = self.slopes(end.fraction, both=True)
         weak = STEP * np.linalg.eigh(end.slopes.T @ end.slopes)[1][:, 0]
         return min([end, *ends, *nearby(weak, 2 * weak)], key=lambda one: one.left)
 
@@ -215,11 +215,11 @@ def run(options: Namespace) -> int:
             apart.append(end)
     if apart:
         half[:] = np.nan
-    at_end = (best.share <= NEAR) | (best.share >= 1 - NEAR)
+    at_end = (best.fraction <= NEAR) | (best.fraction >= 1 - NEAR)
     half[at_end | np.isinf(half)] = np.nan
     table = plain_table(["variable"], ["value", "+-"])
     for k, name in enumerate(search.names):
-        value = shown(float(search.case(best.share)[name]))
+        value = shown(float(search.case(best.fraction)[name]))
         table.add_row(name, value, shown(float(half[k] * (search.high - search.low)[k])))
     terminal().print(table)
     for k, name in enumerate(search.names):
@@ -239,7 +239,7 @@ def run(options: Namespace) -> int:
     earlier = len(study.rows) - study.ran
     before = f", and {earlier} of an earlier study (-again repeats them)" if earlier else ""
     print(f"what remains is {left} in the mean, after {plural(study.ran, 'run')}{before}")
-    print(command_of(options.script, search.case(best.share)))
+    print(command_of(options.script, search.case(best.fraction)))
     return 0
 
 
@@ -252,13 +252,13 @@ def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[E
         if lower.left > best.left * (1 - ENOUGH):
             break
         others.append(best)
-        best = min(search.down(lower.share, most) or lower, lower, key=lambda end: end.left)
+        best = min(search.down(lower.fraction, most) or lower, lower, key=lambda end: end.left)
     return best, others
 
 
 def disagree(best: End, other: End, half: np.ndarray) -> bool:
     """True if ends differ by more than both 95 % ranges."""
-    off = abs(best.share - other.share)
+    off = abs(best.fraction - other.fraction)
     wide = np.maximum(np.where(np.isnan(half), 0, 2 * half), NEAR)
     return bool((off > wide)[best.slopes.any(axis=0)].any())
 
@@ -266,7 +266,7 @@ def disagree(best: End, other: End, half: np.ndarray) -> bool:
 def tell_apart(search: Search, ends: Sequence[End]) -> None:
     print("The searches end at different values, so there is no +-:")
     for end in ends:
-        values = search.case(end.share)
+        values = search.case(end.fraction)
         text = ", ".join(f"{name} = {shown(float(values[name]))}" for name in search.names)
         print(f"  {text}: what remains is {end.left:.3g}")
     print("  Likely cause: a rough curve. Inertia makes curves rough: waves run through the body.")

@@ -12,7 +12,7 @@ from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 from karamelo_py.script.errors import codes
 
-SHARE = 0.2  # fraction of the run at both ends whose means are compared
+ENDS = 0.2  # fraction of the run at both ends whose means are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
 
@@ -36,14 +36,14 @@ class Kept(NamedTuple):
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
     """Verdict on `y` over `x`, and the mean of its last part over the first."""
-    span = SHARE * (x[-1] - x[0])
+    span = ENDS * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:
         return "gains", np.nan
-    share, ratio = growth(first, last, first), last / first
-    if not share <= within:  # also NaN
+    fraction, ratio = growth(first, last, first), last / first
+    if not fraction <= within:  # also NaN
         return "gains", ratio
-    return ("damps" if share < -within else "keeps"), ratio
+    return ("damps" if fraction < -within else "keeps"), ratio
 
 
 def look_at(

@@ -60,8 +60,8 @@ class Reduction:
         if not above.any() or "Time" not in log:
             raise ScriptError(f"{self.column} does not reach {self.level:g}")
         k = max(int(np.argmax(above)), 1)
-        share = (self.level - values[k - 1]) / (values[k] - values[k - 1])
-        return float(log["Time"][k - 1] + share * (log["Time"][k] - log["Time"][k - 1]))
+        fraction = (self.level - values[k - 1]) / (values[k] - values[k - 1])
+        return float(log["Time"][k - 1] + fraction * (log["Time"][k] - log["Time"][k - 1]))
 
 
 class Recorded:

@@ -247,8 +247,8 @@ class Map:
             energy = log.get(self.energy, np.empty(0))
             verdict["growth"] = factor = growth(energy)
             grows = f"{self.energy} grows {factor:.3g} times" if factor > self.bound else ""
-            share = remains(energy)
-            falls = f"{self.energy} falls to {share:.3g}" if share < 1 / self.bound else ""
+            fraction = remains(energy)
+            falls = f"{self.energy} falls to {fraction:.3g}" if fraction < 1 / self.bound else ""
         else:
             changes = [run.get("energy_change_percent") for run in runs]
             changes = [change for change in changes if change is not None]
@@ -295,8 +295,8 @@ class Map:
         for (before, low), (after, high) in pairwise(sorted(at_row.items())):
             for j in range(before + 1, after):
                 if len(points[j]) < 2 and not self.words[-1]:
-                    share = (self.y[j] - self.y[before]) / (self.y[after] - self.y[before])
-                    crossings[j] = low + share * (high - low)
+                    fraction = (self.y[j] - self.y[before]) / (self.y[after] - self.y[before])
+                    crossings[j] = low + fraction * (high - low)
         return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:

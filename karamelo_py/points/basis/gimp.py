@@ -162,7 +162,7 @@ def in_cell(lo, hi, j):
 def averaged_hats(cells, grid, first, lo, hi):
     """Hats from node `first`, averaged over [lo, hi] (in cells from it, within `cells`)."""
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
-    behind = [length - share for length, share in zip(lengths, ahead, strict=True)]
+    behind = [length - part for length, part in zip(lengths, ahead, strict=True)]
     between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
     falls = [lengths[j] - lengths[j + 1] for j in range(cells - 1)]
     k = 1 / total(lengths)

@@ -9,7 +9,7 @@ from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.transfers import flip_coefficient
 
 STRETCH = 0.3  # strain beyond which points a cell apart separate
-SMALL_SHARE = 0.3  # fraction of the stable step at which impacts conserve energy
+SMALL = 0.3  # fraction of the stable step at which impacts conserve energy
 PER_CELL = 0.17  # P falls by about exp(-0.17 N) if stressed material moves through N cells
 TOLD = 0.03  # loss of stress that gives a warning
 
@@ -42,9 +42,9 @@ known_failure(
 
 
 def _meet_again(basis, scene):
-    domain, share = scene.hub.domain, scene.hub.update.dt_factor
+    domain, factor = scene.hub.domain, scene.hub.update.dt_factor
     far = max(domain.hi[: scene.d] - domain.lo[: scene.d])
-    small = share is not None and share <= SMALL_SHARE
+    small = factor is not None and factor <= SMALL
     kept = scene.moves and flip_coefficient(scene.transfer) > 0.9 and not small
     return kept and len(scene.elastic) > 1 and scene.fastest * scene.duration > far
 
@@ -56,7 +56,7 @@ known_failure(
     reason="{scene.transfer_name} with a linear basis gains energy at each impact of elastic "
     "bodies, and there is time for many impacts (two disks in a box, 50 impacts: up to 1.1 times "
     "the energy; two to four times with a FLIP coefficient of 0.99)",
-    cure=f"quadratic-spline, or dt_factor({SMALL_SHARE:g})",
+    cure=f"quadratic-spline, or dt_factor({SMALL:g})",
 )
 CROSSING = "stress lost across cells"
 CURE = "cpgimp or quadratic-spline instead of linear, with FLIP 0.99 (pressure within 3 %)"

@@ -75,9 +75,10 @@ def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None
             within = getattr(law, part)
             if len(arguments) < 2:
                 return function(within, *arguments)
-            given, state, *others = arguments
-            known = given if kin is None else kin
-            made = function(within, known, getattr(state, kept), *others)
+            kinematics, state, *others = arguments
+            made = function(
+                within, kinematics if kin is None else kin, getattr(state, kept), *others
+            )
             return state._replace(**{kept: made}) if changes else made
 
     for function in functions:

@@ -230,9 +230,9 @@ def _class_of(kind: type, codes: dict, count: int) -> type:
     name = f"{kind.__name__}_{sha256(repr((codes, count)).encode()).hexdigest()[:16]}"
 
     def made() -> type:
-        known = (*FIELDS, *kind.directions)
-        fields = namedtuple(name, (*known, *[f"number{k}" for k in range(count)]))
-        traits = {**codes, "start": len(known), "__slots__": (), "__module__": __name__}
+        names = (*FIELDS, *kind.directions)
+        fields = namedtuple(name, (*names, *[f"number{k}" for k in range(count)]))
+        traits = {**codes, "start": len(names), "__slots__": (), "__module__": __name__}
         traits["in_lanes"] = kind.in_lanes and ONE_BY_ONE.isdisjoint(dict(codes["energy"]))
         return type(name, (kind, fields), traits)
 

@@ -126,15 +126,15 @@ def reference_temperatures(law: Any) -> dict[str, float]:
     heat, softening = parameter(law, "temperature"), parameter(law, "strength")
     if not hasattr(heat, "T0"):
         return {}
-    found = {"T0 of the temperature": heat.T0}
+    temperatures = {"T0 of the temperature": heat.T0}
     for name, part, counts in (
         ("Tr of the strength", parameter(softening, "softening"), 1.0),
         ("Tr of the damage", law.damage, parameter(law.damage, "d5")),
         ("Tr of the eos", law.eos, parameter(law.eos, "thermal")),
     ):
         if hasattr(part, "Tr") and counts:
-            found[name] = part.Tr
-    return found
+            temperatures[name] = part.Tr
+    return temperatures
 
 
 def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]]:
@@ -159,6 +159,6 @@ def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]
             )
 
 
-def _doubts_of_expansion(alpha: float, what: str) -> Iterator[tuple[str, str]]:
+def _doubts_of_expansion(alpha: float, right: str) -> Iterator[tuple[str, str]]:
     if not EXPANSION[0] < abs(alpha) < EXPANSION[1]:
-        yield f"it expands by {alpha:.3g} a kelvin", f"{what}; for steel it is 1.2e-5"
+        yield f"it expands by {alpha:.3g} a kelvin", f"{right}; for steel it is 1.2e-5"

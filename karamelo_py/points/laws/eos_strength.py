@@ -495,9 +495,9 @@ def _energy_density_eos_strength(law, kin, state):
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0
-    share = integrity_of(law, m.damage)
-    volume = where(tension, share * volume, volume)
-    return volume + J * (share * strengths.shear_energy(law.strength, kin, s))
+    fraction = integrity_of(law, m.damage)
+    volume = where(tension, fraction * volume, volume)
+    return volume + J * (fraction * strengths.shear_energy(law.strength, kin, s))
 
 
 @laws.elastic_strain.on(EosStrength)

@@ -171,16 +171,16 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 def _lags(transfer, scene):
     """Lag of 3 % or more, over a radian or more."""
     lag = scene.lag
-    return lag.share > LAG and 2 * pi * lag.turns > 1
+    return lag.fraction > LAG and 2 * pi * lag.turns > 1
 
 
 def _brakes(transfer, scene):
     """Energy loss of a free rotation: (1 - alpha) of the lag per step, twice."""
     lag, simulation = scene.lag, scene.simulation
-    if not lag.share > 0:
+    if not lag.fraction > 0:
         return None
     step = simulation.steps.limit if transfer.traits.per_time else simulation.dt
-    gone = 1 - exp(-2 * (1 - transfer.alpha) * lag.share * scene.duration / step)
+    gone = 1 - exp(-2 * (1 - transfer.alpha) * lag.fraction * scene.duration / step)
     return {"gone": 100 * gone} if gone > BRAKED else None
 
 

@@ -467,10 +467,10 @@ class _Merged:
                     f"{nodes[row, column]}, which is not defined",
                     argument="file",
                 )
-            own = self.count + np.arange(len(nodes))
-            self.blocks[kind].append((own, of_mesh))
+            rows = self.count + np.arange(len(nodes))
+            self.blocks[kind].append((rows, of_mesh))
             self.count += len(nodes)
-            numbered.append(np.stack([numbers, own]))
+            numbered.append(np.stack([numbers, rows]))
         pairs = np.concatenate(numbered, axis=1)
         elements = _Numbering(*pairs[:, np.argsort(pairs[0], kind="stable")])
         self.elements.numbering[body.name] = elements
@@ -489,8 +489,8 @@ class _Merged:
                     elements = self.elements.numbering[body.name].listed(np.array([int(of)]))
                 else:
                     of_body = f"{body.name}.{of}"
-                    known = of_body in self.elements.by_name
-                    elements = self.elements.members(of_body if known else of)
+                    in_body = of_body in self.elements.by_name
+                    elements = self.elements.members(of_body if in_body else of)
                 if re.fullmatch(r"S[1-6]", face):
                     for key in _names(body, name):
                         self.surfaces[key].append((int(face[1]) - 1, elements))

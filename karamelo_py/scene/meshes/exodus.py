@@ -41,16 +41,16 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
         with h5py.File(path, "r") as root:
             items = [(name, of) for name, of in root.items() if MESH.match(name)]
-            found = {name: (of[()], of.attrs.get("elem_type", "")) for name, of in items}
+            arrays = {name: (of[()], of.attrs.get("elem_type", "")) for name, of in items}
     else:
         from scipy.io import netcdf_file
 
         with netcdf_file(path, mmap=False) as root:
             items = [(name, of) for name, of in root.variables.items() if MESH.match(name)]
-            found = {name: (of.data.copy(), vars(of).get("elem_type", "")) for name, of in items}
+            arrays = {name: (of.data.copy(), vars(of).get("elem_type", "")) for name, of in items}
     return {
         name: (array, word.decode() if isinstance(word, bytes) else str(word))
-        for name, (array, word) in found.items()
+        for name, (array, word) in arrays.items()
     }
 
 
@@ -93,8 +93,8 @@ def read_exodus(path: Path) -> Mesh:
             cells.append(CellBlock(FACE_TYPES[len(corners)], faces))
             of_set.append(called)
     masks = {
-        name: [np.full(len(of.nodes), name in own) for of, own in zip(cells, of_set, strict=True)]
-        for name in dict.fromkeys(name for own in of_set for name in own)
+        name: [np.full(len(of.nodes), name in sets) for of, sets in zip(cells, of_set, strict=True)]
+        for name in dict.fromkeys(name for sets in of_set for name in sets)
     }
     nodes_of, points_of = each("node_ns"), {}
     for nodes, called in zip(nodes_of, names("ns", len(nodes_of)), strict=True):

@@ -55,11 +55,11 @@ class Dump(Rhythmic):
     def warn_of_absence(self) -> None:
         self.hub.warn(begins_anew(self.path()), place=self.place)
 
-    def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], what: str) -> None:
-        """Warn of columns that are 0 because no point or node (`what`) stores them."""
+    def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], owner: str) -> None:
+        """Warn of columns that are 0 because no point or node (`owner`) stores them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
-            self.hub.warn(f"dump: {', '.join(empty)} will be 0: {what} have no such field")
+            self.hub.warn(f"dump: {', '.join(empty)} will be 0: {owner} have no such field")
 
 
 POSITIONS = ("x", "y", "z")

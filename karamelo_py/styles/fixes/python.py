@@ -112,7 +112,7 @@ class Python(Fix):
 
     published = ("x", "y", "z", "")
     remembers = ("state",)
-    told = False
+    warned = False
 
     def __init__(
         self,
@@ -157,9 +157,9 @@ class Python(Fix):
     def filed(self) -> None:
         """Warn once of other values that the function has changed: files lack them."""
         keeper = self.keeper
-        forgotten = [] if self.told else keeper.forgotten()
+        forgotten = [] if self.warned else keeper.forgotten()
         if forgotten:
-            self.told = True
+            self.warned = True
             self.hub.warn(
                 f"fix python: {_name(self.function)} has changed {', '.join(forgotten)}, and "
                 "restart files do not contain that: a restarted run will differ",

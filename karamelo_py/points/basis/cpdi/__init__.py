@@ -62,7 +62,7 @@ BENT, SMALL = 0.2, 0.15  # strain; fraction of the stable step
 def _torn_by_bending(basis, scene):
     return (
         scene.moves and scene.elastic and scene.kept > 0.9
-        and scene.bending > BENT and scene.share > SMALL
+        and scene.bending > BENT and scene.fraction > SMALL
     )  # fmt: skip
 
 
@@ -71,7 +71,7 @@ known_failure(
     "domains in large bending",
     when=_torn_by_bending,
     reason="bending strains will be about {scene.bending:.1g} (from speed and weight); "
-    "CPDI domains with {scene.transfer_name} at {scene.share:.2g} of the stable step then gain "
+    "CPDI domains with {scene.transfer_name} at {scene.fraction:.2g} of the stable step then gain "
     "energy, fold or separate, sooner on fine grids (a soft cantilever with 16 cells of height: "
     "1.6 times the energy)",
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",

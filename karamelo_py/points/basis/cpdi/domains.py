@@ -296,9 +296,9 @@ def _means(place, d, p, q, r):
         first, second = (near, far) if x < 0 else (far, near)
         at = d[_at(y, z)]
         weights.append(first * at[0] + second * at[1])
-        share = [-half if sign < 0 else half for sign in (x, y, z)]
+        halves = [-half if sign < 0 else half for sign in (x, y, z)]
         u, v, w = p[_at(y, z)], q[_at(x, z)], r[_at(x, y)]
-        slope = [share[0] * u[i] + share[1] * v[i] + share[2] * w[i] for i in range(3)]
+        slope = [halves[0] * u[i] + halves[1] * v[i] + halves[2] * w[i] for i in range(3)]
         gradients.append(Space.Vector._make(slope))
     return tuple(corners), tuple(weights), tuple(gradients)
 

@@ -211,19 +211,19 @@ def _shocks(eos, scene):
     if not scene.moves or ratio < STEP:
         return None
     if scene.linear:
-        what = f"{scene.transfer_name} with a linear basis loses a third of the pressure or more"
+        loss = f"{scene.transfer_name} with a linear basis loses a third of the pressure or more"
     elif ratio < STRONG or scene.scheme.traits.bears_drift:
         return None
     else:
-        what = "this scheme, whose work is not the energy in its front, loses 3 to 15 % of it"
-    return {"place": scene.method.place, "ratio": ratio, "what": what}
+        loss = "this scheme, whose work is not the energy in its front, loses 3 to 15 % of it"
+    return {"place": scene.method.place, "ratio": ratio, "loss": loss}
 
 
 known_failure(
     IdealGas,
     "shocks in a gas",
     when=_shocks,
-    reason="pressures of 1 and {ratio:.3g} meet, and behind the shock {what}",
+    reason="pressures of 1 and {ratio:.3g} meet, and behind the shock {loss}",
     cure="method(ulmpm, FLIP, quadratic-spline, 1), scheme(usavg), and Q1=2, Q2=0.2 in eos "
     "ideal-gas: within 0.1 % for ratios up to 100000",
 )
@@ -400,8 +400,8 @@ def _compressed_jwl(eos, memory, step, heating):
     before, j, dt = step
     half, after = 0.5 * (j - before), memory._replace(since=memory.since + dt)
     F = burnt(eos, after)
-    known = pressure(eos, before, memory, ()) + F * cold(eos, j)[0]
-    return after._replace(E=(memory.E - half * known + heating) / (1 + half * F * eos.omega / j))
+    explicit = pressure(eos, before, memory, ()) + F * cold(eos, j)[0]
+    return after._replace(E=(memory.E - half * explicit + heating) / (1 + half * F * eos.omega / j))
 
 
 @pressure.on(Jwl)

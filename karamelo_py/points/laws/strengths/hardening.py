@@ -88,7 +88,7 @@ def _shear_response_linear_hardening(strength, kin, step, memory, heat):
 class FlowState(NamedTuple):
     memory: Any
     heat: Any  # `Warm` or ()
-    known: Any  # result of `precompute`
+    precomputed: Any
 
 
 def before_flow(strength, memory, heat):

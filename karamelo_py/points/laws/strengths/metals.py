@@ -169,14 +169,14 @@ def _precompute_johnson_cook(strength, memory, heat):
 def _first_guess_johnson_cook(strength, before, q, slope):
     if not isinstance(strength.rate, Absent):
         return real(0, q), real(0, q)  # the precomputed part is without the rate
-    hard, soft = before.known
+    hard, soft = before.precomputed
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, before.memory.ep, hard * soft, excess, slope)
 
 
 @flow_stress.on(JohnsonCook)
 def _flow_stress_johnson_cook(strength, before, increment, dt):
-    hard, soft = before.known
+    hard, soft = before.precomputed
     hard, slope = power_law(strength.B, strength.n, before.memory.ep, hard, increment)
     flow, slope = (strength.A + hard) * soft, slope * soft
     if isinstance(strength.rate, Absent):
@@ -236,7 +236,7 @@ def _precompute_swift(strength, memory, heat):
 
 @first_guess.on(Swift)
 def _first_guess_swift(strength, before, q, slope):
-    hard = before.known
+    hard = before.precomputed
     excess = q - strength.A - hard
     return power_law_guess(strength.n, before.memory.ep - strength.C, hard, excess, slope)
 
@@ -244,7 +244,7 @@ def _first_guess_swift(strength, before, q, slope):
 @flow_stress.on(Swift)
 def _flow_stress_swift(strength, before, increment, dt):
     strain = before.memory.ep - strength.C
-    hard, slope = power_law(strength.B, strength.n, strain, before.known, increment)
+    hard, slope = power_law(strength.B, strength.n, strain, before.precomputed, increment)
     return strength.A + hard, slope
 
 
@@ -333,7 +333,7 @@ def _precompute_zerilli_armstrong(strength, memory, heat):
 
 @flow_stress.on(ZerilliArmstrong)
 def _flow_stress_zerilli_armstrong(strength, before, increment, dt):
-    athermal, root, thermal = before.known
+    athermal, root, thermal = before.precomputed
     ep = before.memory.ep
     athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)
     root, root_slope = power_law(strength.C2, 0.5, ep, root, increment)

@@ -153,7 +153,7 @@ class ContactSurface(StiffTool):
         closing = ((velocity - points.velocity.astype(float)) * normal).sum(axis=1)
         push = np.where(depth > 0, SOFT * depth + points.contact_dt * closing, 0.0)
         touching = depth > 0
-        return self.press(points, push, touching, normal, velocity=velocity, seen=x, share=SOFT)
+        return self.press(points, push, touching, normal, velocity=velocity, seen=x, fraction=SOFT)
 
 
 known_failure(

@@ -28,12 +28,12 @@ class StiffTool(Gripping, ToolFix):
         velocity: Any,
         seen: np.ndarray,
         led: Any = 0.0,
-        share: float = 1.0,
+        fraction: float = 1.0,
     ) -> np.ndarray:
         """Forces (n, d) that move points by `push` (n,) along `normal` in a step: m push / dt^2.
 
         Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops the slip on a
-        tool of this `velocity`, and reverses the fraction `share` of a point's slip distance: of
+        tool of this `velocity`, and reverses `fraction` of a point's slip distance: of
         the positions (n, d) `seen`, minus the displacement `led` by the tool.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
@@ -46,7 +46,7 @@ class StiffTool(Gripping, ToolFix):
             before, one = grip[near].astype(float), stiffness[near, None]
             touched = before[:, d, None] > 0
             way = np.where(touched, led - (seen[near] - before[:, d + 2 :]), 0.0)
-            pull = share * one * way
+            pull = fraction * one * way
             # Velocities of points contain noise that does not move them.
             slip = way / (2 * points.kick - points.dt)
             slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
