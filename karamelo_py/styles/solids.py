@@ -21,9 +21,9 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
-MISSED = 0.01  # of the volume of a shape in a file
-COARSE = 0.08  # of the volume of a box or ball, which thin ones miss
-MANY = 10  # more points per cell and direction than useful
+MISSED = 0.01  # of a shape's volume
+COARSE = 0.08  # of a box's or ball's
+MANY = 10  # per cell and direction
 
 
 class RegionSolid(Solid):
@@ -88,7 +88,7 @@ class RegionSolid(Solid):
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*hub.update.method.basis.traits.shape}
         method = hub.update.method
-        # Whole boxes make stair-steps that affect contact; shapes from files have a known mass.
+        # Whole boxes make stair-steps; shapes from files have a known mass.
         stepped = method.fields_per_solid and not region.aligned
         drawn = region.from_file and not method.regular_points
         if points is None and (stepped or drawn) and not (corners or region.unknown):
@@ -131,7 +131,6 @@ class RegionSolid(Solid):
         return None if whole is None else (total, whole)
 
     def _warn_of_size(self, hub: Hub) -> None:
-        """The grid then sees hardly any deformation."""
         size = float((self.hi - self.lo).max()) if self.count > 1 else np.inf
         if size < (1 - 1e-6) * self.h:
             hub.warn(

@@ -76,9 +76,8 @@ def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None
             if len(arguments) < 2:
                 return function(within, *arguments)
             kinematics, state, *others = arguments
-            made = function(
-                within, kinematics if kin is None else kin, getattr(state, kept), *others
-            )
+            first = kinematics if kin is None else kin
+            made = function(within, first, getattr(state, kept), *others)
             return state._replace(**{kept: made}) if changes else made
 
     for function in functions:

@@ -218,7 +218,7 @@ def plastic_flow(law, q, p, pc):
 
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
-    # The residual stays 0: a Newton correction with its slopes gives the slopes of y and w.
+    # Newton correction with the slopes of the residual.
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0

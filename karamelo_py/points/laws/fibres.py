@@ -72,7 +72,6 @@ class Holzapfel(OfFibres, Fields):
 
 
 def _leans(law: Any, scene: Any) -> bool:
-    """Check whether the fibres together would shear a body in 2D or 1D out of its plane."""
     a, b = law[FIRST : FIRST + 3], law[FIRST + 3 : FIRST + 6]
     pairs = {1: ((0, 1), (0, 2), (1, 2)), 2: ((0, 2), (1, 2)), 3: ()}[scene.d]
     return any(abs(a[i] * a[j] + b[i] * b[j]) > LEANS for i, j in pairs)
@@ -116,8 +115,8 @@ def _kirchhoff_stress_of_fibres(law, kin, state):
 
 
 def stiffness_of_fibres(law, b, at):
-    """Bound of rho c^2 by the fibres: |a n|^2 is at most I4 for a unit vector n."""
-    # Slack fibres count with their stiffness at rest: the next step may stretch them.
+    """|a n|^2 is at most I4 for a unit vector n."""
+    # Slack fibres have their stiffness at rest: the next step may stretch them.
     at = (*at[:3], max(at[3], 1), max(at[4], 1))
     _, _, J, *squares = at
     high = b.largest_row_sum()

@@ -26,13 +26,13 @@ DPI = 100
 # Above, a width or height is in pixels.
 MOST_INCHES = 50
 LEAST_PIXELS, MOST_PIXELS = 20, 20000
-# Fast, and nearly as small as the best for pictures with few colours.
+# Fast; nearly as small as the best.
 PNG_COMPRESSION = 1
 # Components of either sign: a diverging colour map, grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # points, about, from which the typical size is measured
+SAMPLE = 1 << 16  # points of which the typical size is taken, about
 
 
 class PyPlot(Dump):
@@ -204,7 +204,7 @@ class PyPlot(Dump):
         self._picture.show(snapshot, self.side(snapshot), title, tools_of(fixes))
 
     def _make(self) -> Any:
-        # Importing Matplotlib takes 0.3 s: only for scenes with pictures.
+        # takes 0.3 s
         from karamelo_py.output import pictures
 
         units = self.hub.output.units
@@ -254,7 +254,6 @@ class PyPlot(Dump):
 
 
 def title_of(step: int, time: float, unit: str) -> str:
-    """Without a unit, the step and the time."""
     if unit:
         return f"t = {time_text(time, unit)}"
     return f"step {step}" + ("" if np.isnan(time) else f", time {time:.6g}")
@@ -286,7 +285,7 @@ def look_of(
     outlines: bool,
     **look: Any,
 ) -> dict[str, Any]:
-    """Options of a picture (`output.pictures`) from the words of a script or a command line."""
+    """From the words of a script or a command line."""
     for ends, low, high in (((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)):
         if None not in ends and ends[0] >= ends[1]:
             range_of = "colours" if low == "vmin" else "picture"
@@ -310,7 +309,6 @@ def look_of(
                 expected="viridis, coolwarm, magma, gray, jet ...",
                 hint=meant(cmap, colormaps),
             )
-    # With a colour limit of the user, colours are not centred about 0.
     symmetric = signed and (vmin, vmax) == (None, None)
     look |= {"limits": (vmin, vmax), "symmetric": symmetric, "log": log}
     look["outlines"] = outlines

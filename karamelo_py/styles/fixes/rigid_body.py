@@ -60,7 +60,7 @@ class Ways:
 
 
 def pieces(text: str) -> list[str]:
-    """Split ``(a, b)`` at the commas outside inner parentheses."""
+    """Split ``(a, b)`` at the outer commas."""
     if not (text.startswith("(") and text.endswith(")")):
         return [text]
     parts, level, begin, inner = [], 0, 0, text[1:-1]
@@ -161,7 +161,7 @@ class RigidBody(Fix):
         super().__init__(hub)
         kin, self.body = hub.domain.kin, solid
         if not hub.update.method.fields_per_solid:
-            self.node_fields = (RigidSums,)  # without mass on the grid of others
+            self.node_fields = (RigidSums,)
         d = kin.dimension
         if not can(solid.material.law, constrained_velocity):
             raise ScriptError(
@@ -251,7 +251,7 @@ class RigidBody(Fix):
             self.hub.values.array[slot] = self.state[column]
 
     def slots(self) -> np.ndarray:
-        """Slots of its values, and their columns in the state: (k, 2)."""
+        """(k, 2): slots of its values, and their columns in the state."""
         columns = dict(zip(("", "r", "v", "w", "f", "t"), COLUMNS, strict=True))
         names = [(name, columns[name[:-1]] + "xyz".index(name[-1])) for name in self.published]
         return np.array([(self.hub.values.slot(f"{self.id}_{n}"), k) for n, k in names])
@@ -263,7 +263,7 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, given: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """Components by axis, None if missing; of rotation if `ways` begin at 3."""
+        """By axis, None if missing; of rotation if `ways` begin at 3."""
         items: list[Expression | None] = [None] * size
         if given is None:
             return items
@@ -296,7 +296,6 @@ class RigidBody(Fix):
             self.led[WAYS.index(name)] = Expression(0.0)
 
     def _weigh(self, solid: Solid, mass: float | None, inertia: Components | None) -> None:
-        """Set mass, centre, principal moments and axes."""
         kin, d, m = self.hub.domain.kin, self.hub.domain.dimension, np.asarray(solid.mass, float)
         x, total = np.zeros((solid.count, 3)), float(m.sum())
         x[:, :d] = solid.x0
@@ -344,7 +343,6 @@ class RigidBody(Fix):
         c[kernel.AXES : kernel.AXES + 9] = axes.ravel()
 
     def _spin_up(self) -> None:
-        """Set the angular momentum from the spin."""
         R = self.state[kernel.R : kernel.R + 9].reshape(3, 3)
         axes = R @ self.constants[kernel.AXES : kernel.AXES + 9].reshape(3, 3)
         spin = self.state[kernel.W : kernel.W + 3]
@@ -352,7 +350,6 @@ class RigidBody(Fix):
         self.state[kernel.L : kernel.L + 3] = axes @ (moments * (axes.T @ spin))
 
     def _begin_points(self, solid: Solid) -> None:
-        """Give its points their initial velocities, for the first step and the first output."""
         d, arm = self.hub.domain.dimension, np.zeros((solid.count, 3))
         arm[:, :d] = solid.x0
         arm -= self.constants[kernel.START : kernel.START + 3]
@@ -362,7 +359,7 @@ class RigidBody(Fix):
 
 
 def principal(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments (3,) and axes (3, 3), by columns; x, y, z if principal."""
+    """By columns; x, y, z if principal."""
     off = np.abs(tensor - np.diag(np.diag(tensor))).max()
     if off <= NOT_ROUND * np.trace(tensor):
         return np.diag(tensor).copy(), np.eye(3)

@@ -16,7 +16,7 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_directio
 
 
 def prescribe(mass, v, v_star, force, value, before, kick, share):
-    """Set v* to the present value, and v to the value one step earlier, as at a symmetry plane.
+    """Set v to the value one step earlier, as at a symmetry plane.
 
     The total is the reaction.
     """
@@ -24,10 +24,7 @@ def prescribe(mass, v, v_star, force, value, before, kick, share):
 
 
 def prescribe_motion(mass, v, v_star, force, value, before, kick, share):
-    """Set v* to the present value, and leave v, so that FLIP points acquire the value.
-
-    The total is the reaction.
-    """
+    """Leave v, so that FLIP points acquire the value."""
     return v, value, force, mass * (value - v_star) / kick
 
 
@@ -42,10 +39,7 @@ def prescribe_at_most(mass, v, v_star, force, value, before, kick, share):
 
 
 def prescribe_mapped_at_most(mass, v, v_star, force, value, before, kick, share):
-    """Limit the re-mapped velocity likewise, and leave it on the bound if v* was limited.
-
-    Otherwise stress would do spurious work: a rebound would gain half of the energy.
-    """
+    """Otherwise stress would do spurious work: a rebound would gain half of the energy."""
     allowed = value if v_star == value else min(v, value)
     return allowed, allowed, force, 0.0
 
@@ -62,7 +56,7 @@ def prescribe_mapped_at_least(mass, v, v_star, force, value, before, kick, share
     return allowed, allowed, force, 0.0
 
 
-# By bound: functions after the momentum update, and after velocities are mapped again.
+# By bound: after the momentum update, and after velocities are mapped again.
 HOOKS = {
     bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
     for bound, update, mapped in (
@@ -154,12 +148,12 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all its directions drags material along; one at rest, or with a free
-        # direction, is a clamp, a roller or a plane of symmetry.
+        # A wall that moves in all its directions drags material along; others are clamps, rollers
+        # or planes of symmetry.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
-        drags = drags and len(group.nodes) < hub.fields.node_count  # all nodes are no wall
+        drags = drags and len(group.nodes) < hub.fields.node_count
         hooks = HOOKS["moves" if drags else self.bound]
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
         # Contact may move held nodes only as far as they give way.
@@ -190,7 +184,7 @@ class VelocityNodes(Fix):
         return next(iter(bounds), "")
 
     def defined(self) -> None:
-        """Refuse walls outside the domain; warn of nodes with two different velocities."""
+        """Refuse walls outside the domain; warn of two velocities of a node."""
         if self.hub.domain.h is None:
             return
         self.group.refuse_past_domain()

@@ -26,7 +26,7 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 def fields(hub: Hub) -> list[int]:
-    """Velocity field of each solid; glued solids have the same."""
+    """Glued solids have the same."""
     numbers: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
@@ -135,9 +135,9 @@ class ULMPMContacts(Method):
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """`nodes`, and all nodes around points of a body in cells with all corners in `nodes`.
+        """`nodes`, and those around points of a body in cells with all corners in `nodes`.
 
-        Splines and domains reach further nodes. If these moved, the contact normal would rotate.
+        Otherwise the contact normal would rotate: splines and domains reach further nodes.
         """
         if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes
@@ -211,7 +211,7 @@ class ULMPMContacts(Method):
                     prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Views of the last contact, which usf and usavg read at the start of a step."""
+        """usf and usavg read them at the start of a step."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
@@ -222,7 +222,6 @@ class ULMPMContacts(Method):
             contact.touched[touched, :fields] = before.touched[touched]
 
     def check(self, hub: Hub) -> None:
-        """Refuse two friction coefficients for a pair of velocity fields."""
         super().check(hub)
         by_pair: dict[frozenset, Fix] = {}
         for pair, fix in self._rubbing(hub):

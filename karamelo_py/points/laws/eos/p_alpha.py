@@ -133,8 +133,8 @@ def solid_pressure(eos, j, alpha, heat):
 
 @compressed.on(PAlpha)
 def _compressed_p_alpha(eos, memory, step, heating):
-    # The pressure p on the crush curve solves p = ps(j alpha0/alpha(p))/alpha(p): unique, since
-    # the right side falls with p. Cold: heat moves the curve only slightly.
+    # The solution is unique: ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat moves the curve only
+    # slightly.
     old = memory.alpha
     low = eos.ps - (eos.ps - eos.pe) * power((old - 1) / (eos.alpha0 - 1), 1 / eos.n)
     crushing = (solid_pressure(eos, step.j, old, ()) > low * old) & (old > 1)

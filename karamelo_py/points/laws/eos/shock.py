@@ -126,7 +126,6 @@ def tangent_from(eos, j):
 
 
 def cold_pressure(eos, j):
-    """Pressure of the Hugoniot curve; rho0 c0^2 mu in tension."""
     closed = 1 - j
     inside = min(closed, tangent_from(eos, j))
     y = eos.S * inside
@@ -139,7 +138,6 @@ def cold_pressure(eos, j):
 
 
 def with_heat(heat, p, Tr, factor):
-    """p + factor (T - Tr) above the temperature Tr; p without a temperature."""
     return p + max(heat.T - Tr, 0) * factor if len(heat) else p
 
 
@@ -172,7 +170,7 @@ def _compression_energy_shock(eos, j, memory):
     flat = 1 - y
     in_tension, near = closed < 0, y < 1e-3
     log_of = logarithm(where(in_tension, j, flat))
-    # From J to 1 rho0 c0^2 (1 - J) / J in tension; the closed form is a small difference near 1.
+    # The closed form is a small difference near 1.
     few = inside * inside * (0.5 + y * (2 / 3 + 0.75 * y))
     log_of_flat = log_of + ((1 - flat) - y) / flat  # corrects the rounding of 1 - y
     energy = where(near, few, (y / flat + log_of_flat) / where(near, 1, eos.S * eos.S))

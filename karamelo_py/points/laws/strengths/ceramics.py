@@ -133,7 +133,7 @@ def rate_factor(strength, step):
 
 
 def limits(strength, p, factor):
-    """Strength of intact and of broken material, at the pressure p."""
+    """Of intact and of broken material; P* + T*."""
     above = max(p + strength.T, 0) / strength.PHEL
     intact = strength.A * power(above, strength.N) * factor
     broken = strength.B * power(max(p, 0) / strength.PHEL, strength.M) * factor
@@ -145,7 +145,6 @@ def limits(strength, p, factor):
 def _respond_johnson_holmquist(strength, law, kin, step, memories):
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
-    # A gap closes before the point sustains pressure.
     lowest = -strength.T * (1 - memory.damage)
     whole = ratio_at_pressure(law.eos, lowest - memory.bulking, heat)
     opened = max(step.j / whole, 1)
@@ -157,7 +156,7 @@ def _respond_johnson_holmquist(strength, law, kin, step, memories):
     failure = max(strength.D1 * power(above, strength.D2), LEAST_STRAIN)
     damage = min(memory.damage + x / failure, 1)
     weaker = intact - damage * (intact - broken)
-    # Shear energy q^2/(6 G) that is released beyond the plastic work.
+    # Shear energy released beyond the plastic work.
     released = where(x > 0, (flow * flow - weaker * weaker) / (6 * strength.G), 0)
     K = stiffness_at_rest(law, memories)
     gained = where(p > 0, strength.beta * released, 0)

@@ -102,7 +102,6 @@ class DruckerPrager(NamedTuple):
         residual_phi: FromZero | None = None,
         softening: AboveZero | None = None,
     ):
-        """The cone sqrt(s:s / 2) <= cohesion + friction p."""
         soil = Soil(cohesion, phi, psi, residual_cohesion, residual_phi, softening)
         numbers = peak_and_residual(soil, lambda c, phi: cone(fit, c, phi, radians(psi)))
         return cls(G, *numbers[:3], inf if tension is None else tension, *numbers[3:])
@@ -118,8 +117,7 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # In plastic flow in plane strain s_zz = -2/3 dilation sqrt(J2): half the difference of the
-    # in-plane principal stresses is sqrt(J2) times:
+    # Half the difference of the in-plane principal stresses in flow, over sqrt(J2).
     in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
@@ -137,7 +135,7 @@ def _pressure_response_drucker_prager(strength, kin, trial, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # Beyond the apex of the cone the trial pressure counts again, see below.
+            # Beyond the apex of the cone the trial pressure counts, see below.
             p -= K * dilation * x
     if p < lowest:
         p = lowest

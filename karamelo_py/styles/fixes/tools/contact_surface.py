@@ -20,7 +20,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.tools.base import begin_behind
 from karamelo_py.styles.fixes.tools.stiff import StiffTool
 
-# Core seconds per point near a surface of some thousand faces, and near a simple shape.
+# Core seconds per point near some thousand faces, and near a simple shape.
 OF_FACES, OF_SHAPE = 1.5e-6, 5e-8
 
 
@@ -94,7 +94,7 @@ class ContactSurface(StiffTool):
             self.initial_integrate = touch_hook(self._touch)
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (d,) of the region so far, and its mean velocity (d,) in the next step."""
+        """Its displacement (d,) so far, and mean velocity (d,) in the next step."""
         values, times = self.hub.values, {"time": self.hub.update.time + np.array([0.0, dt])}
         ways = np.zeros((self.hub.domain.dimension, 2))
         for k, formula in enumerate(self.way):
@@ -109,7 +109,6 @@ class ContactSurface(StiffTool):
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
 
     def faces_of(self) -> np.ndarray | None:
-        """Present faces (m, d, d) of the region, if any."""
         skin = self.region.skin
         return None if skin is None else skin.faces + self.moved(1.0)[0]
 
@@ -127,7 +126,6 @@ class ContactSurface(StiffTool):
         return address_of_python(self._refuse, CALL)
 
     def _refuse(self, number: int) -> int:
-        """Refuse a point, by its number from 0, that has no way out."""
         raise ScriptError(
             f"{named(self.hub, number)} is so deep in region '{self.region.id}' of fix "
             f"'{self.id}' that no way out of it is the shortest",
@@ -138,7 +136,7 @@ class ContactSurface(StiffTool):
         )
 
     def forces(self, points: PointsView) -> np.ndarray:
-        """Forces (n, d) of a region without a kernel."""
+        """For a region without a kernel."""
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
         within, aside = self.depth(x), ASIDE * self.hub.domain.h
