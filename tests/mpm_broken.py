@@ -40,6 +40,17 @@ def heat_content(law, kin, state):
     """Known of no law."""
 
 
+def named(base: type, **classes: dict[str, Any]) -> None:
+    """Make classes of `base` here: the name of each, and what stands in it."""
+    for name, inside in classes.items():
+        globals()[name] = type(name, (base,), inside)
+
+
+def like(base: type, names: str) -> list[type]:
+    """Classes that have nothing but another name than `base`."""
+    return [type(name, (base,), {}) for name in names.split()]
+
+
 # --- hooks
 class Spring(Fix):
     def __init__(self, hub, group: ParticleGroup, k: float = 1.0):
@@ -60,10 +71,6 @@ def uncompilable(mass, v, x_old, x, value, before, dt, kick):
     return v * len(f"{value:.3e}"), x, 0.0
 
 
-class Light(Group):
-    post_grid_to_point = point_hook(uncompilable)
-
-
 def at_point(mass, v, x_old, x, value, before, dt, kick):
     return v, x, 1.0
 
@@ -72,32 +79,8 @@ def at_node(mass, v, v_star, force, value, before, kick, share):
     return v, v_star, force, 1.0
 
 
-class Misplaced(Group):
-    post_particles_to_grid = point_hook(at_point)
-
-
-class Swapped(Group):
-    final_integrate = node_hook(at_node)
-
-
-class Cold(Group):
-    supply_heat = point_hook(at_point)
-
-
-class Hot(Group):
-    initial_integrate = heat_hook(at_point)
-
-
 def too_few(mass, v, v_star, force, value, before, dt):
     return v, v_star, force, 0.0
-
-
-class Many(Group):
-    post_particles_to_grid = node_hook(too_few)
-
-
-class Few(Group):
-    initial_integrate = point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
 
 
 def whole(v, values, dt):
@@ -112,66 +95,46 @@ def counted(v, values, dt):
     return v * len(f"{dt:.3e}")
 
 
-class Wholly(Group):
-    initial_integrate = vector_hook(whole, reads=("velocity",), writes=("velocity",))
+def turned(v, values, dt):
+    return type(v)(-v[0])
 
 
-class Heavily(Group):
-    initial_integrate = vector_hook(laid, reads=("weight",), writes=("velocity",))
-
-
-class Unnamed(Group):
-    initial_integrate = vector_hook(
-        lambda v, values, dt: v, reads=("velocity",), writes=("velocity",)
-    )
-
-
-class Partly(Group):
-    post_particles_to_grid = vector_hook(
-        partial(laid, dt=0.0), reads=("force",), writes=("force",), nodes=True
-    )
-
-
-class Slightly(Group):
-    initial_integrate = point_hook(partial(laid, dt=0.0))
-
-
-class Fixing(Group):
-    initial_integrate = vector_hook(laid, reads=("velocity",), writes=("mass",))
-
-
-class Homeless(Group):
-    initial_integrate = vector_hook(laid, reads=(Force,), writes=(Force,))
-
-
-class Late(Group):
-    point_fields = (Force, WorkOfForces)
-    final_integrate = vector_hook(laid, reads=(Force,), writes=(Force,))
-
-
-class Slim(Group):
-    final_integrate = vector_hook(laid, reads=("mass", "velocity"), writes=("velocity",))
-
-
-class Nodeless(Group):
-    post_particles_to_grid = vector_hook(laid, reads=("position",), writes=("force",), nodes=True)
-
-
-class Early(Group):
-    post_update_grid_state = vector_hook(laid, reads=("force",), writes=("force",), nodes=True)
-
-
-class Elsewhere(Group):
-    final_integrate = vector_hook(laid, reads=("force",), writes=("force",), nodes=True)
-
-
-class Lawless(Group):
-    initial_integrate = vector_hook(laid, reads=(heat_content,), writes=("velocity",))
-
-
-class Dark(Group):
-    published = ()
-    initial_integrate = vector_hook(counted, reads=("velocity",), writes=("velocity",))
+V, F = ("velocity",), ("force",)
+named(
+    Group,
+    Light={"post_grid_to_point": point_hook(uncompilable)},
+    Misplaced={"post_particles_to_grid": point_hook(at_point)},
+    Swapped={"final_integrate": node_hook(at_node)},
+    Cold={"supply_heat": point_hook(at_point)},
+    Hot={"initial_integrate": heat_hook(at_point)},
+    Many={"post_particles_to_grid": node_hook(too_few)},
+    Few={
+        "initial_integrate": point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
+    },
+    Wholly={"initial_integrate": vector_hook(whole, reads=V, writes=V)},
+    Heavily={"initial_integrate": vector_hook(laid, reads=("weight",), writes=V)},
+    Unnamed={"initial_integrate": vector_hook(lambda v, values, dt: v, reads=V, writes=V)},
+    Partly={
+        "post_particles_to_grid": vector_hook(partial(laid, dt=0.0), reads=F, writes=F, nodes=True)
+    },
+    Slightly={"initial_integrate": point_hook(partial(laid, dt=0.0))},
+    Fixing={"initial_integrate": vector_hook(laid, reads=V, writes=("mass",))},
+    Homeless={"initial_integrate": vector_hook(laid, reads=(Force,), writes=(Force,))},
+    Late={
+        "point_fields": (Force, WorkOfForces),
+        "final_integrate": vector_hook(laid, reads=(Force,), writes=(Force,)),
+    },
+    Slim={"final_integrate": vector_hook(laid, reads=("mass", "velocity"), writes=V)},
+    Nodeless={
+        "post_particles_to_grid": vector_hook(laid, reads=("position",), writes=F, nodes=True)
+    },
+    Early={"post_update_grid_state": vector_hook(laid, reads=F, writes=F, nodes=True)},
+    Elsewhere={"final_integrate": vector_hook(laid, reads=F, writes=F, nodes=True)},
+    Lawless={"initial_integrate": vector_hook(laid, reads=(heat_content,), writes=V)},
+    Dark={"published": (), "initial_integrate": vector_hook(counted, reads=V, writes=V)},
+    Turning={"published": (), "initial_integrate": vector_hook(turned, reads=V, writes=V)},
+    Silent={"published": ("x",), "initial_integrate": point_hook(at_point, publishes=False)},
+)
 
 
 class Undirected(Fix):
@@ -216,20 +179,6 @@ class Blurred(Group):
     def initial_integrate(self, points): ...
 
     def post_update_grid(self, nodes): ...
-
-
-def turned(v, values, dt):
-    return type(v)(-v[0])
-
-
-class Turning(Group):
-    published = ()
-    initial_integrate = vector_hook(turned, reads=("velocity",), writes=("velocity",))
-
-
-class Silent(Group):
-    published = ("x",)
-    initial_integrate = point_hook(at_point, publishes=False)
 
 
 class Stop(Group):
@@ -313,41 +262,18 @@ class Second(Other):
     pass
 
 
-class Bare(Group):
-    point_fields = Other
-
-
-class Formless(Group):
-    point_fields = (Shapeless,)
-
-
-class OneWord(Group):
-    point_fields = (Wordy,)
-
-
-class Clashing(Group):
-    point_fields = (Taken,)
-
-
-class Doubled(Group):
-    point_fields = (Sized,)
-
-
-class Lost(Group):
-    node_fields = (Unshaped,)
-
-
-class Nodal(Group):
-    node_fields = (Taken,)
-
-
-class First(Group):
-    published = ()
-    point_fields = (Other,)
-
-
-class Again(Group):
-    point_fields = (Second,)
+named(
+    Group,
+    Bare={"point_fields": Other},
+    Formless={"point_fields": (Shapeless,)},
+    OneWord={"point_fields": (Wordy,)},
+    Clashing={"point_fields": (Taken,)},
+    Doubled={"point_fields": (Sized,)},
+    Lost={"node_fields": (Unshaped,)},
+    Nodal={"node_fields": (Taken,)},
+    First={"published": (), "point_fields": (Other,)},
+    Again={"point_fields": (Second,)},
+)
 
 
 # --- laws
@@ -358,21 +284,9 @@ class Law(NamedTuple):
     specific_volume = 1.0
 
 
-class Motionless(Law): ...
-
-
-class Growing(Law): ...
-
-
-class Raising(Law): ...
-
-
-class Short(Law): ...
-
-
-class Uncompiled(Law): ...
-
-
+Motionless, Growing, Raising, Short, Uncompiled, Hiding, Double = like(
+    Law, "Motionless Growing Raising Short Uncompiled Hiding Double"
+)
 for kind in (Motionless, Growing, Raising, Short, Uncompiled):
     initial_state.on(kind)(lambda law, kin, like: (like,))
     cauchy_stress.on(kind)(lambda law, kin, state: kin.Symmetric._make((state[0],) * 3))
@@ -397,12 +311,6 @@ def _wave_speed_squared_uncompiled(law, kin, state):
     return law.E * len(f"{law.E:.3e}")
 
 
-class Hiding(Law): ...
-
-
-class Double(Law): ...
-
-
 column(Hiding, "seq", energy_density)
 column(Double, "dose", energy_density)
 
@@ -425,19 +333,10 @@ flow_stress.on(Forgetful)(lambda strength, *others: (strength.G, strength.G))
 updated_memory.on(Forgetful)(lambda strength, memory, increment, dt: Less(memory.ep))
 
 
-class Endless(Forgetful): ...
-
-
-class Uncountable(Forgetful): ...
-
-
-class Lone(Forgetful): ...
-
-
-class Misnaming(Forgetful): ...
-
-
-class Renaming(Forgetful): ...
+# The last of them remembers nothing of its own.
+Endless, Uncountable, Lone, Misnaming, Renaming, Misshapen = like(
+    Forgetful, "Endless Uncountable Lone Misnaming Renaming Misshapen"
+)
 
 
 class Constant(NamedTuple):
@@ -452,11 +351,6 @@ for kind in (Lone, Misnaming, Renaming, Constant):
 flow_stress.on(Lone)(lambda strength, *others: strength.G)
 flow_stress.on(Misnaming)(lambda strength, before, *others: (before.memory.R1, strength.G))
 updated_memory.on(Renaming)(lambda strength, memory, *others: memory._replace(R1=0.0))
-
-
-class Misshapen(Forgetful): ...  # remembers nothing of its own
-
-
 shear_response.on(Misshapen)(lambda strength, kin, step, *others: (step.s, ()))
 flow_stress.on(Constant)(
     lambda strength, before, *others: (strength.G + before.memory.R, strength.G)
@@ -474,10 +368,9 @@ class Basis(NamedTuple):
     traits = BasisTraits(cells=1, least_nodes=2, steady_moment=True, steep_edge=True)
 
 
-class Pathless(Basis): ...
-
-
-class Tuple(Basis): ...
+Pathless, Tuple, Heavy, Slanted, Narrow, Precise = like(
+    Basis, "Pathless Tuple Heavy Slanted Narrow Precise"
+)
 
 
 class Vague(NamedTuple): ...
@@ -517,18 +410,6 @@ class Grounded(NamedTuple):
 register(Pathless, 2)
 register(Tuple, 2)
 along.on(Tuple)(lambda basis, kin, grid, place, direction: (0, 0.5, (0.5, 0.5), (-1.0, 1.0), ()))
-
-
-class Heavy(Basis): ...
-
-
-class Slanted(Basis): ...
-
-
-class Narrow(Basis): ...
-
-
-class Precise(Basis): ...
 
 
 def hats(weight=1.0, slope=1.0, nodes=2):

@@ -88,32 +88,22 @@ def test_init(hub):
         ("hot", "initial_integrate is a moment of points, and its hook was made for heated"),
         ("many", "post_particles_to_grid: too_few has to take the 8 arguments of a hook on nodes"),
         ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
-        (
-            "heavily",
-            "initial_integrate reads 'weight': 'mass', 'velocity', 'position', 'volume', a",
-        ),
+        ("heavily",
+         "initial_integrate reads 'weight': 'mass', 'velocity', 'position', 'volume', a"),
         ("fixing", "initial_integrate writes 'mass': 'velocity' or a class of a field"),
         ("homeless", "initial_integrate: points have no Force because of this fix: its author nam"),
         ("late", "final_integrate: forces on points are set in initial_integrate"),
-        (
-            "nodeless",
-            "post_particles_to_grid reads 'position': 'mass', 'velocity', 'velocity_updat",
-        ),
+        ("nodeless",
+         "post_particles_to_grid reads 'position': 'mass', 'velocity', 'velocity_updat"),
         ("early", "post_update_grid_state writes 'force': 'velocity_update' or a class of a field"),
         ("elsewhere", "final_integrate is a moment of points, and its hook was made for whole nod"),
         ("slim", "final_integrate: laid has to take the 4 arguments of a hook on whole points: v"),
-        (
-            "unnamed",
-            "initial_integrate takes a function with a name (def name(...): ...), not a <la",
-        ),
-        (
-            "partly",
-            "post_particles_to_grid takes a function with a name (def name(...): ...), not ",
-        ),
-        (
-            "slightly",
-            "initial_integrate takes a function with a name (def name(...): ...), not a p",
-        ),
+        ("unnamed",
+         "initial_integrate takes a function with a name (def name(...): ...), not a <la"),
+        ("partly",
+         "post_particles_to_grid takes a function with a name (def name(...): ...), not "),
+        ("slightly",
+         "initial_integrate takes a function with a name (def name(...): ...), not a p"),
         ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
         ("viewless", "initial_integrate has to take one argument, the view of the group"),
         ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),
@@ -124,7 +114,7 @@ def test_init(hub):
         ("clashing", "Taken: the column 'vx' is one of every scene"),
         ("nodal", "Taken: the column 'vx' is one of every scene"),
     ],
-)
+)  # fmt: skip
 def test_a_fix_that_cannot_be_meant(hub, style, message):
     with pytest.raises(ScriptError) as caught:
         run(hub, f"\nfix(s, {style}, all)")
@@ -221,7 +211,6 @@ def test_refresh(hub):
 
 # --- at a run -----------------------------------------------------------------------------------
 
-# Line 4 is the part that is tried.
 SCENE = """\
 {method}
 dimension(1, 0, 4, 0.5)
@@ -235,96 +224,64 @@ dump(d, all, particle, 1, d.*.LAMMPS, vx)
 set_dt(1e-3)
 run(2)
 """
+USUAL = {
+    "method": "method(ulmpm, FLIP, linear, 1)", "material": "material(m, linear, 3, 100, 0.3)",
+    "fix": "", "dump": "",
+}  # fmt: skip
+STRENGTH = "eos(e, linear, 3, 100)\n{}\nmaterial(m, eos-strength, e, s)"
 
 
-def scene(**lines):
-    usual = {
-        "method": "method(ulmpm, FLIP, linear, 1)",
-        "material": "material(m, linear, 3, 100, 0.3)",
-        "fix": "",
-        "dump": "",
-    }
-    return SCENE.format(**(usual | lines))
+def scene(line):
+    """A run with a line in its place, by the command of the line."""
+    kind = line.partition("(")[0].replace("compute", "dump")
+    if kind == "strength":
+        kind, line = "material", STRENGTH.format(line)
+    return SCENE.format(**(USUAL | {kind: line}))
 
 
 @pytest.mark.parametrize(
-    ("lines", "line", "part", "message"),
+    ("line", "part", "message"),
     [
-        ({"fix": "fix(s, spring, all)"}, 7, "fix spring", "initial_integrate: NameError: name 'mi"),
-        (
-            {"fix": "fix(s, wholly, all)"}, 7, "fix wholly",
-            "initial_integrate: whole has to return 1 number for velocity, not 2",
-        ),
-        (
-            {"fix": "fix(s, lawless, all)"}, 7, "fix lawless",
-            "initial_integrate: heat_content is not defined for (Linear",
-        ),
-        ({"fix": "fix(s, weigh, all)"}, 7, "fix weigh", "initial_integrate: ValueError: assign"),
-        ({"fix": "fix(s, leaving, all)"}, 7, "fix leaving", "initial_integrate: SystemExit: bye"),
-        ({"fix": "fix(s, silenced, all)"}, 7, "fix silenced", "initial_integrate: SystemExit: 0"),
-        ({"dump": "dump(t, all, torn, 1, t)"}, 9, "dump torn", "write: KeyError: 'lost' (mpm_bro"),
-        ({"material": "material(m, motionless, 1)"}, 4, "material motionless", "advance is not "),
-        ({"material": "material(m, raising, 1)"}, 4, "material raising", "name 'unknown' is not"),
-        (
-            {"material": "material(m, growing, 1)"}, 4, "material growing",
-            "what a point remembers is 1 numbers at first and 2 after a step",
-        ),
-        (
-            {"material": "material(m, short, 1)"}, 4, "material short",
-            "cauchy_stress has to return a symmetric tensor of 3, not a tuple of 2",
-        ),
-        (
-            {
-                "material": "eos(e, linear, 3, 100)\nstrength(s, forgetful, 50)\n"
-                "material(m, eos-strength, e, s)"
-            }, 5, "strength forgetful",
-            "updated_memory has to return a tuple of 2, not a Less of 1 (mpm_bro",
-        ),
-        (
-            {"method": "method(ulmpm, FLIP, pathless, 1)"}, 1, "basis pathless",
-            "along is not defined for (Pathless)",
-        ),
-        (
-            {"method": "method(ulmpm, FLIP, tuple, 1)"}, 1, "basis tuple",
-            "along has to return an Along",
-        ),
-        (
-            {"method": "method(ulmpm, FLIP, heavy, 1)"}, 1, "basis heavy",
-            "the weights of a point at 1.125 add up to 1.075, not to 1",
-        ),
-        (
-            {"method": "method(ulmpm, FLIP, slanted, 1)"}, 1, "basis slanted",
-            "the gradients, times h, of a point at 1.125 add up to 0.1, not to 0",
-        ),
-        (
-            {"method": "method(ulmpm, FLIP, narrow, 1)"}, 1, "basis narrow",
-            "along has to return 2 weights, not 3: register says so",
-        ),
-        (
-            {"method": "method(ulmpm, FLIP, precise, 1)\nprecision(single)"}, 1, "basis precise",
-            "a weight is a double (float64) in a run of precision(single)",
-        ),
-        (
-            {"method": "method(ulmpm, absent, linear)"}, 1, "transfer absent",
-            "updated_velocity is None for some point, no number",
-        ),
-        (
-            {
-                "material": "eos(e, linear, 3, 100)\nstrength(s, endless, 50)\n"
-                "material(m, eos-strength, e, s)"
-            }, 5, "strength endless", "flow_stress, or its slope, at a plastic strain of 0 is inf",
-        ),
-        (
-            {
-                "material": "eos(e, linear, 3, 100)\nstrength(s, uncountable, 50)\n"
-                "material(m, eos-strength, e, s)"
-            }, 5, "strength uncountable", "is nan for some point",
-        ),
+        ("fix(s, spring, all)", "fix spring", "initial_integrate: NameError: name 'mi"),
+        ("fix(s, wholly, all)", "fix wholly",
+         "initial_integrate: whole has to return 1 number for velocity, not 2"),
+        ("fix(s, lawless, all)", "fix lawless",
+         "initial_integrate: heat_content is not defined for (Linear"),
+        ("fix(s, weigh, all)", "fix weigh", "initial_integrate: ValueError: assign"),
+        ("fix(s, leaving, all)", "fix leaving", "initial_integrate: SystemExit: bye"),
+        ("fix(s, silenced, all)", "fix silenced", "initial_integrate: SystemExit: 0"),
+        ("dump(t, all, torn, 1, t)", "dump torn", "write: KeyError: 'lost' (mpm_bro"),
+        ("material(m, motionless, 1)", "material motionless", "advance is not "),
+        ("material(m, raising, 1)", "material raising", "name 'unknown' is not"),
+        ("material(m, growing, 1)", "material growing",
+         "what a point remembers is 1 numbers at first and 2 after a step"),
+        ("material(m, short, 1)", "material short",
+         "cauchy_stress has to return a symmetric tensor of 3, not a tuple of 2"),
+        ("strength(s, forgetful, 50)", "strength forgetful",
+         "updated_memory has to return a tuple of 2, not a Less of 1 (mpm_bro"),
+        ("method(ulmpm, FLIP, pathless, 1)", "basis pathless",
+         "along is not defined for (Pathless)"),
+        ("method(ulmpm, FLIP, tuple, 1)", "basis tuple", "along has to return an Along"),
+        ("method(ulmpm, FLIP, heavy, 1)", "basis heavy",
+         "the weights of a point at 1.125 add up to 1.075, not to 1"),
+        ("method(ulmpm, FLIP, slanted, 1)", "basis slanted",
+         "the gradients, times h, of a point at 1.125 add up to 0.1, not to 0"),
+        ("method(ulmpm, FLIP, narrow, 1)", "basis narrow",
+         "along has to return 2 weights, not 3: register says so"),
+        ("method(ulmpm, FLIP, precise, 1)\nprecision(single)", "basis precise",
+         "a weight is a double (float64) in a run of precision(single)"),
+        ("method(ulmpm, absent, linear)", "transfer absent",
+         "updated_velocity is None for some point, no number"),
+        ("strength(s, endless, 50)", "strength endless",
+         "flow_stress, or its slope, at a plastic strain of 0 is inf"),
+        ("strength(s, uncountable, 50)", "strength uncountable", "is nan for some point"),
     ],
 )  # fmt: skip
-def test_a_run_names_the_part(run_interpreted, lines, line, part, message):
-    text = run_interpreted(scene(**lines), status=1).err
-    assert f"in.script:{line}:1: error: {part} (of mpm-broken 0.1): " in text
+def test_a_run_names_the_part(run_interpreted, line, part, message):
+    script = scene(line)
+    at = script.splitlines().index(line.splitlines()[0]) + 1
+    text = run_interpreted(script, status=1).err
+    assert f"in.script:{at}:1: error: {part} (of mpm-broken 0.1): " in text
     assert message in text
     assert "internal error" not in text
 
@@ -349,7 +306,7 @@ def test_a_material_names_the_part(hub, style, message):
 
 def test_a_hook_makes_a_vector(run_interpreted):
     """Of the class of one that it is given."""
-    folder = run_interpreted(scene(fix="fix(s, turning, all)")).folder
+    folder = run_interpreted(scene("fix(s, turning, all)")).folder
     vx = [np.loadtxt(folder / f"d.{step}.LAMMPS", skiprows=11)[:, -1] for step in (0, 1, 2)]
     assert (vx[0] == 1).all()
     assert (vx[1] < 0).all()
@@ -357,40 +314,34 @@ def test_a_hook_makes_a_vector(run_interpreted):
 
 
 def test_a_compute_that_publishes_nothing_is_told(run_interpreted):
-    said = run_interpreted(scene(dump="compute(c, mute, all)\nlog_modify(custom, step, c_x)")).err
+    said = run_interpreted(scene("compute(c, mute, all)\nlog_modify(custom, step, c_x)")).err
     assert "in.script:9:1: warning: compute mute has measured and published nothing: c_x" in said
     assert said.count("published nothing") == 1
 
 
 def test_what_a_hook_changes_in_place_is_written(run_interpreted):
-    folder = run_interpreted(scene(fix="fix(s, stop, all)")).folder
+    folder = run_interpreted(scene("fix(s, stop, all)")).folder
     for step in (1, 2):
         vx = np.loadtxt(folder / f"d.{step}.LAMMPS", skiprows=11)[:, -1]
         assert (vx == 0).all()
 
 
 @pytest.mark.parametrize(
-    ("lines", "part"),
+    ("line", "part"),
     [
-        ({"fix": "fix(s, light, all)"}, "in.wrong:7:1: error: fix light"),
-        ({"fix": "fix(s, dark, all)"}, "in.wrong:7:1: error: fix dark"),
-        ({"material": "material(m, uncompiled, 1)"}, "in.wrong:4:1: error: material uncompiled"),
+        ("fix(s, light, all)", "in.wrong:7:1: error: fix light"),
+        ("fix(s, dark, all)", "in.wrong:7:1: error: fix dark"),
+        ("material(m, uncompiled, 1)", "in.wrong:4:1: error: material uncompiled"),
     ],
 )
-def test_the_command_line_tells_of_what_cannot_be_compiled(site, tmp_path, lines, part):
-    (tmp_path / "in.wrong").write_text(scene(**lines))
+def test_the_command_line_tells_of_what_cannot_be_compiled(site, tmp_path, line, part):
+    (tmp_path / "in.wrong").write_text(scene(line))
+    path = os.pathsep.join([str(site), os.environ["PYTHONPATH"]])
     done = subprocess.run(
-        [sys.executable, "-m", "karamelo_py.app.cli", "in.wrong"],
-        cwd=tmp_path,
-        env=os.environ
-        | {
-            "PYTHONPATH": os.pathsep.join([str(site), os.environ["PYTHONPATH"]]),
-            "NUMBA_DISABLE_JIT": "0",
-        },
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
+        [sys.executable, "-m", "karamelo_py.app.cli", "in.wrong"], cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": path, "NUMBA_DISABLE_JIT": "0"},
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
     assert done.returncode == 1
     assert f"{part} (of mpm-broken 0.1): " in done.stderr
     assert re.search(r"it cannot be compiled: .*\(mpm_broken.py:\d+\)", done.stderr)
@@ -416,7 +367,7 @@ class View(PointsView):
 
 def test_ids_are_those_of_dumps(run_interpreted):
     """They count from 1 in hooks, too."""
-    folder = run_interpreted(scene(fix="fix(s, ids, all)")).folder
+    folder = run_interpreted(scene("fix(s, ids, all)")).folder
     columns = np.loadtxt(folder / "d.2.LAMMPS", skiprows=11)
     np.testing.assert_array_equal(columns[:, -1], columns[:, 0])
 
