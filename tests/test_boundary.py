@@ -324,14 +324,11 @@ def test_nan_is_no_edge(run_interpreted):
     ("old", "new", "says"),
     [
         ("method(ulmpm, FLIP, linear, 1)", "method(tlmpm, FLIP, linear, 1)", "no point can leave"),
-        (
-            "method(ulmpm, FLIP, linear, 1)",
-            "method(ulcpdi, FLIP, linear, 1, mechanical, Q4)",
-            "boundary(reflect) cannot mirror Q4 domains",
-        ),
+        ("method(ulmpm, FLIP, linear, 1)", "method(ulcpdi, FLIP, linear, 1, mechanical, Q4)",
+         "boundary(reflect) cannot mirror Q4 domains"),
         ("boundary(reflect)", "boundary(bounce)", "must be one of error, delete, reflect"),
     ],
-)
+)  # fmt: skip
 def test_what_is_refused(run_interpreted, old, new, says):
     script = thrown(2, "reflect", "run(10)").replace(old, new)
     said = run_interpreted(script, status=1).err

@@ -339,19 +339,13 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(run_script, law,
         ('"I1 - 3"', "is text", "without quotes"),
         ("log(I1 - 3)", "no value at rest", ""),
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2", "I4 needs a direction", "fibre=(x, y, z)"),
-        (
-            "I1 - 3 - 2*log(J) + (J - 1)^2 + I4, fibre=(1, 0, 0)",
-            "the fibres have a stress",
-            "least for I4 = 1",
-        ),
+        ("I1 - 3 - 2*log(J) + (J - 1)^2 + I4, fibre=(1, 0, 0)", "the fibres have a stress",
+         "least for I4 = 1"),
         ("I1 - 3 - 2*log(J) + (J - 1)^2, fibre=(1, 0, 0)", "does not contain I4", "with I4"),
-        (
-            "I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2, fibre=(1, 0)",
-            "'(1, 0)' is no direction",
-            "(x, y, z)",
-        ),
+        ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2, fibre=(1, 0)", "'(1, 0)' is no direction",
+         "(x, y, z)"),
     ],
-)
+)  # fmt: skip
 def test_energies_that_make_no_law(run_interpreted, words, says, instead):
     line = f"mu = 1\nmaterial(m, hyperelastic, 1000, {words})\n"
     error = run_interpreted(line, status=1).err

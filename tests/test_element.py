@@ -199,36 +199,25 @@ def test_a_stress_beyond_yield_is_not_found(run_script):
         ("load_path(a, 2, gxy=1, exy=0)", "gxy and exy are the same strain"),
         ("load_path(a, 2, volumetric=0, sxx=0)", "sxx needs it free"),
         ("load_path(a, 2, volumetric=0, exx=0, eyy=0, ezz=0)", "the volume follows from them"),
-        (
-            "load_path(a, 2, exx=0, volumetric=0)\nelement(b, steel, a, kinematics=1D)",
-            "every normal strain that 1D has",
-        ),
+        ("load_path(a, 2, exx=0, volumetric=0)\nelement(b, steel, a, kinematics=1D)",
+         "every normal strain that 1D has"),
         ("load_path(a, 0, exx=0)", "'increments' must be a whole number above 0"),
         ("load_path(a, 2, exx=0)\nelement(b, lead, a)", "unknown material 'lead'"),
         ("element(b, steel, a)", "unknown load path 'a'"),
-        (
-            "load_path(a, 2, szz=0)\nelement(b, steel, a, kinematics=plane-strain)",
-            "plane-strain has no strain ezz",
-        ),
-        (
-            "load_path(a, 2, turn=1)\nelement(b, steel, a, kinematics=1D)",
-            "1D cannot rotate",
-        ),
+        ("load_path(a, 2, szz=0)\nelement(b, steel, a, kinematics=plane-strain)",
+         "plane-strain has no strain ezz"),
+        ("load_path(a, 2, turn=1)\nelement(b, steel, a, kinematics=1D)", "1D cannot rotate"),
         ("load_path(a, 2, exx=0)\nelement(b/c, steel, a)", "formulas could not name the values"),
         ("load_path(a, 2)", "no strain and no stress is prescribed"),
         ("load_path(a, 2, syx=0)", "did you mean 'sxy'?"),
-        (
-            "material(tool, rigid, 1)\nload_path(a, 2, exx=0)\nelement(b, tool, a)",
-            "material 'tool' is rigid",
-        ),
+        ("material(tool, rigid, 1)\nload_path(a, 2, exx=0)\nelement(b, tool, a)",
+         "material 'tool' is rigid"),
         # What follows from a wrong line is not told.
-        (
-            "load_path(a, 0, ezz=-0.1)\nelement(b, steel, a)\nprint(value(b_exx))",
-            "'increments' must be a whole number above 0",
-        ),
+        ("load_path(a, 0, ezz=-0.1)\nelement(b, steel, a)\nprint(value(b_exx))",
+         "'increments' must be a whole number above 0"),
         ("load_path(a, 1, exx=-2)\nelement(b, steel, a)", "turned inside out"),
     ],
-)
+)  # fmt: skip
 def test_what_is_refused(run_script, lines, says):
     result = run_script(STEEL + lines + "\n", status=1)
     assert says in result.err

@@ -357,13 +357,11 @@ def test_values_of_a_replaced_compute_are_forgotten():
         ("material(m, eos-strength, bulk, mld)", "unknown strength 'mld'"),
         ("material(m, eos-strength, mild, bulk)", "one of bulk"),
         ("material(m, eos-strength, 3, mild)", "'3' is not the ID of an eos"),
-        (
-            "material(m, eos-strength, bulk)",
-            "material(ID, eos-strength, eos, strength[, damage][, temperature][, strain="
-            "logarithmic])",
-        ),
+        ("material(m, eos-strength, bulk)",
+         "material(ID, eos-strength, eos, strength[, damage][, temperature][, strain="
+         "logarithmic])"),
     ],
-)
+)  # fmt: skip
 def test_mistakes(run_interpreted, line, says):
     assert says in run_interpreted(BLOCK + line + "\n", status=1).err
 

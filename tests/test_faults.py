@@ -172,18 +172,15 @@ def test_what_would_be_silent(hub, capsys, style, told):
         ("method(ulmpm, PIC, vague)", "basis vague", "Vague has no attribute traits"),
         ("method(ulmpm, lazy, linear)", "transfer lazy", "updated_velocity is not defined for"),
         ("method(ulmpm, loose, linear)", "transfer loose", "inverts_spread is one of its traits: "),
-        (
-            "method(ulmpm, PIC, distorted)",
-            "basis distorted",
-            "gradient_jump is one of its traits: traits = BasisTraits(gradient_jumps=...)",
-        ),
+        ("method(ulmpm, PIC, distorted)", "basis distorted",
+         "gradient_jump is one of its traits: traits = BasisTraits(gradient_jumps=...)"),
         ("strength(s, stray, 1)", "strength stray", "ring is one of its traits: traits = "),
         ("scheme(rowless)", "scheme rowless", "Rowless has no attribute rows"),
         ("scheme(wrong)", "scheme wrong", "'twice' in its rows is not a row of a scheme"),
         ("scheme(grounded)", "scheme grounded", "none of its rows is a Scatter"),
         ("forget()", "forget", "it: KeyError: 'it' (mpm_broken.py:"),
     ],
-)
+)  # fmt: skip
 def test_parts_that_are_not_whole(hub, line, part, message):
     with pytest.raises(ScriptError) as caught:
         run(hub, line)

@@ -397,31 +397,18 @@ def test_held_nodes_bear_the_weight(run_script):
 
 
 WRONG = [
-    (
-        HELD.replace("left, 0, NULL", "left, leq 0, NULL"),
-        "changes velocities by what they are",
-        "hold",
-    ),
-    (
-        HELD + "\n    fix(calm, local_damping, all, 0.8)",
-        "changes velocities by what they are",
-        "calm",
-    ),
+    (HELD.replace("left, 0, NULL", "left, leq 0, NULL"), "changes velocities by what they are",
+     "hold"),
+    (HELD + "\n    fix(calm, local_damping, all, 0.8)", "changes velocities by what they are",
+     "calm"),
     (HELD + "\n    fix(v, velocity_particles, all, 0, 0)", "knows no fix velocity_particles", "v"),
     ("fix(pull, body_force, all, 1, 0)", "solid 's' is held by nothing", ""),
-    (
-        "region(corner, block, -INF, 1e-6, -INF, 1e-6)\n    "
-        "group(corner, nodes, region, corner, all)"
-        "\n    fix(pull, velocity_nodes, corner, 0, 0)",
-        "solid 's' can rotate",
-        "",
-    ),
-    (
-        "fix(hold, velocity_nodes, left, 0, NULL)\n    fix(pull, body_force, all, 1, 0)",
-        "solid 's' is not held along y",
-        "",
-    ),
-]
+    ("region(corner, block, -INF, 1e-6, -INF, 1e-6)\n    "
+     "group(corner, nodes, region, corner, all)" "\n    fix(pull, velocity_nodes, corner, 0, 0)",
+     "solid 's' can rotate", ""),
+    ("fix(hold, velocity_nodes, left, 0, NULL)\n    fix(pull, body_force, all, 1, 0)",
+     "solid 's' is not held along y", ""),
+]  # fmt: skip
 
 
 def test_check_says_that_nothing_is_held(run_interpreted):
@@ -438,11 +425,8 @@ def test_refusals(run_script, lines, message, marked):
 
 
 METHODS = [
-    (
-        "method(kind, FLIP, basis, 1, domains)",
-        "method(ulmpm, APIC, quadratic-spline)",
-        "transfer APIC",
-    ),
+    ("method(kind, FLIP, basis, 1, domains)", "method(ulmpm, APIC, quadratic-spline)",
+     "transfer APIC"),
     ("scheme(quasi-static)", "scheme(quasi-static, tolerance=0)", "tolerance"),
     ("scheme(quasi-static)", "scheme(quasi-static, solver=cg)", "solver"),
     ("scheme(quasi-static)", "scheme(newmark)", "set_dt"),
@@ -450,7 +434,7 @@ METHODS = [
     ("scheme(quasi-static)", "scheme(newmark, rho=1.1)", "rho"),
     ("scheme(quasi-static)", "scheme(newmark, 0.25, rho=0.8)", "rho alone"),
     ("scheme(quasi-static)", "scheme(quasi-static)\n    precision(single)", "double precision"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("line", "wrong", "message"), METHODS)

@@ -268,13 +268,11 @@ def test_initial_velocities_of_points_are_told():
 @pytest.mark.parametrize(
     ("lines", "said"),
     [
-        (
-            HELD.replace("1e-4", "1e-4*sqrt(1.5-time)"),
-            "fix pull gets NaN from 0.0001*sqrt(1.5 - time)",
-        ),
+        (HELD.replace("1e-4", "1e-4*sqrt(1.5-time)"),
+         "fix pull gets NaN from 0.0001*sqrt(1.5 - time)"),
         (HELD + "\n    fix(w, body_force, all, 1/(2-time), 0)", "fix w gets inf"),
     ],
-)
+)  # fmt: skip
 def test_a_formula_that_gives_no_number_is_named(run_interpreted, lines, said):
     """As explicit steps do, with the line of the fix."""
     result = run_interpreted(coarse(lines), status=1)

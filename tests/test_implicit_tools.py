@@ -129,13 +129,11 @@ def test_a_block_lies_on_a_plane(run_script):
 @pytest.mark.parametrize(
     ("line", "name"),
     [
-        (
-            "fix(wall, contact/minimize_penetration/plane, block, 0, 0.6, 0, 0, 1, 0, 0)",
-            "contact/minimize_penetration/plane",
-        ),
+        ("fix(wall, contact/minimize_penetration/plane, block, 0, 0.6, 0, 0, 1, 0, 0)",
+         "contact/minimize_penetration/plane"),
         ("fix(h, contact/hertz, block, ground)", "contact/hertz"),
     ],
-)
+)  # fmt: skip
 def test_forces_that_follow_points_are_refused(run_script, line, name):
     text = LYING.format(lines=line).replace("rock, rigid, 1", "rock, linear, 1, 1, 0")
     result = run_script(text, status=1)

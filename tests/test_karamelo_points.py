@@ -140,14 +140,10 @@ def test_solids_as_in_2020(run_interpreted):
         ("solid(s, rectangle, 0, 1, 0, 1, 2, m, 0.1)", "and solid(s, region, box, 2, m, 0.1)"),
         ("solid(s, sphere)", "solid(ID, region, box, ppc"),
         ("solid(s, block, box, 9, 6, rubber, 0.1)", "solid(s, region, box, 1, rubber, 0.1), or"),
-        (
-            "strength(s, JC, 1, 2, 3, 4, 5, 6)",
-            "strength(s, johnson_cook, 1, 2, 3, 4, 5, 6, 0, 0, 1)",
-        ),
-        (
-            "fix(f, indent, all, sphere, 9, 0, 1, 2, 3)",
-            "fix(f, indent, all, sphere, 9, 3, 0, 1, 2)",
-        ),
+        ("strength(s, JC, 1, 2, 3, 4, 5, 6)",
+         "strength(s, johnson_cook, 1, 2, 3, 4, 5, 6, 0, 0, 1)"),
+        ("fix(f, indent, all, sphere, 9, 0, 1, 2, 3)",
+         "fix(f, indent, all, sphere, 9, 3, 0, 1, 2)"),
         ("damage(d, damage_johnson_cook, 1, 2, 3, 4, 5, 6, 7)", "1, 2, 3, 4, 0, 5, 6, 7)"),
         ("region(r, block, INF, INF, 0.5, INF, INF, INF)", "too many in 2D"),
         ("region(r, block, 0, H, INF, INF, op)", "hint: region(r, block, 0, H, INF, INF)"),
@@ -156,7 +152,7 @@ def test_solids_as_in_2020(run_interpreted):
         ("eos(e, shock, 2, 100, 10, 1.5, 2, 1)", "eos(ID, shock, rho0, K, c0, S, Gamma, cv, Tr"),
         ("strength(s, johnson_cook, 1, 1, 1, 1, 1, 1)", "johnson_cook, G, A, B, n, epsdot0, C, m"),
     ],
-)
+)  # fmt: skip
 def test_words_of_2020_say_what_to_write(run_interpreted, line, says):
     result = run_interpreted(block(2, line), status=1)
     assert says in result.err

@@ -143,10 +143,8 @@ def test_curves_that_are_refused(run_interpreted, curve, message):
     [
         ("plastic, 80, 0.4, 0.5", "0.4 + 0.5*ep"),
         ("swift, 80, 0.4, 0.5, 0.01, 0.5", "0.4 + 0.5*sqrt(max(ep - 0.01, 0))"),
-        (
-            "johnson_cook, 80, 0.4, 0.3, 0.3, 1, 0.05, 1.1, 300, 1300",
-            "(0.4 + 0.3*ep^0.3)*(1 + 0.05*log(max(epdot, 1)))*(1 - (max(T - 300, 0)/1000)^1.1)",
-        ),
+        ("johnson_cook, 80, 0.4, 0.3, 0.3, 1, 0.05, 1.1, 300, 1300",
+         "(0.4 + 0.3*ep^0.3)*(1 + 0.05*log(max(epdot, 1)))*(1 - (max(T - 300, 0)/1000)^1.1)"),
         (f"tabulated, 80, {', '.join(str(v) for v in np.ravel(POINTS))}",
          "if(ep < 0.01, 0.4 + 10*ep, if(ep < 0.1, 0.5 + (ep - 0.01)*10/9, 0.6 - (ep - 0.1)/4))"),
     ],

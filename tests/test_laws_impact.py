@@ -198,16 +198,12 @@ def test_a_flyer_spalls_a_plate(run_script):
         ("eos(r, p-alpha, solid, 0.9, 1, 2)", "a distension of 0.9 leaves no pores"),
         ("eos(r, p-alpha, solid, 1.2, 3, 2)", "pores are gone at 2 before they are crushed at 3"),
         ("eos(r, p-alpha, gas, 1.2, 1, 2)", "eos 'gas' is no equation of state of a solid"),
-        (
-            "strength(c, johnson-holmquist-2, 9, 1, 1, 1, 1, 0, 1, 1, 2, 3, 1, 1)",
-            "the elastic limit 2 is not above its pressure 3",
-        ),
-        (
-            "strength(c, johnson-holmquist-2, 9, 1, 1, 1, 1, 0, 1, 1, 3, 2, 1, 1, 2)",
-            "a fraction of 2 is not possible",
-        ),
+        ("strength(c, johnson-holmquist-2, 9, 1, 1, 1, 1, 0, 1, 1, 2, 3, 1, 1)",
+         "the elastic limit 2 is not above its pressure 3"),
+        ("strength(c, johnson-holmquist-2, 9, 1, 1, 1, 1, 0, 1, 1, 3, 2, 1, 1, 2)",
+         "a fraction of 2 is not possible"),
     ],
-)
+)  # fmt: skip
 def test_constants_that_are_not_possible(run_interpreted, line, says):
     start = "eos(solid, linear, 1, 9)\neos(gas, ideal-gas, 1, 1.4, p=1)\n"
     assert says in run_interpreted(start + line, status=1).err

@@ -210,10 +210,8 @@ def test_compiled_is_the_same(run_script, run_interpreted):
         ("strength(s, mohr-coulomb, 80, -1, 30)", "'cohesion' must be a number"),
         ("strength(s, mohr-coulomb, 80, 1, 30, 0, softening=1)", "needs a residual strength"),
         ("strength(s, mohr-coulomb, 80, 1, 30, 0, residual_phi=20)", "softening=plastic strain"),
-        (
-            "strength(s, mohr-coulomb, 80, 1, 30, 0, residual_phi=40, softening=1)",
-            "the residual phi 40 is above its peak, 30",
-        ),
+        ("strength(s, mohr-coulomb, 80, 1, 30, 0, residual_phi=40, softening=1)",
+         "the residual phi 40 is above its peak, 30"),
         ("strength(s, drucker-prager, 80, 1, 30, 0, fit=outer)", "'fit' must be one of"),
         ("strength(s, drucker-prager, 80, 1, 30, 0, tension=-1)", "'tension' must be a number"),
         ("damage(d, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 300, 300)", "is not above Tr = 300"),
@@ -229,7 +227,7 @@ def test_compiled_is_the_same(run_script, run_interpreted):
         ("material(m, eos-strength, bulk, hard, warm, warm)", "are both a temperature"),
         ("material(m, eos-strength, bulk, hard, 3)", "unknown damage or temperature '3'"),
     ],
-)
+)  # fmt: skip
 def test_mistakes(run_interpreted, line, says):
     script = f"method(ulmpm, FLIP, linear, 1)\n{HEAD}{COPPER}{line}\n"
     assert says in run_interpreted(script, status=1).err

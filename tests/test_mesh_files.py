@@ -60,16 +60,10 @@ def volume(path, dimension, group=None):
         (SQUARES + BOTH + "*ELSET, ELSET=G, GENERATE\n1, 2\n", "G", 2),
         (SQUARES.replace("0\n", "0,\n").lower() + BOTH.lower(), "a", 1),
         (SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2,\n5, 4\n2, 2, 3, 6, 5\n", None, 2),
-        (
-            "*NODE\n1, 0, 0\n5, 4, 0\n11, 0, 1\n15, 4, 1\n*NGEN\n1, 5, 1\n11, 15, 1\n"
-            "*ELEMENT, TYPE=CPE4R\n1, 1, 2, 12, 11\n*ELGEN, ELSET=ROW\n1, 4, 1, 1\n",
-            "ROW", 4,
-        ),
-        (
-            "*NODE, NSET=LOW\n1, 0, 0\n2, 1, 0\n*NODE, NSET=HIGH\n31, 0, 3\n32, 1, 3\n*NFILL\n"
-            "LOW, HIGH, 3, 10\n*ELEMENT, TYPE=CPS4\n1, 11, 12, 22, 21\n",
-            None, 1,
-        ),
+        ("*NODE\n1, 0, 0\n5, 4, 0\n11, 0, 1\n15, 4, 1\n*NGEN\n1, 5, 1\n11, 15, 1\n"
+         "*ELEMENT, TYPE=CPE4R\n1, 1, 2, 12, 11\n*ELGEN, ELSET=ROW\n1, 4, 1, 1\n", "ROW", 4),
+        ("*NODE, NSET=LOW\n1, 0, 0\n2, 1, 0\n*NODE, NSET=HIGH\n31, 0, 3\n32, 1, 3\n*NFILL\n"
+         "LOW, HIGH, 3, 10\n*ELEMENT, TYPE=CPS4\n1, 11, 12, 22, 21\n", None, 1),
         (  # a sector of 90 degrees between radii 1 and 2, by straight edges
             "*NODE, SYSTEM=C\n1, 1, 0\n2, 2, 0\n3, 2, 90\n4, 1, 90\n"
             "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n",

@@ -77,10 +77,8 @@ def test_the_paper_script_is_understood():
         ("f(a, b)", ["a", "b"]),
         ("f()", []),
         ("f( )", []),
-        (
-            "f(velocity_nodes, particle/gz, neo-hookean, dump.*.gz, ../out/plot.pdf)",
-            ["velocity_nodes", "particle/gz", "neo-hookean", "dump.*.gz", "../out/plot.pdf"],
-        ),
+        ("f(velocity_nodes, particle/gz, neo-hookean, dump.*.gz, ../out/plot.pdf)",
+         ["velocity_nodes", "particle/gz", "neo-hookean", "dump.*.gz", "../out/plot.pdf"]),
         ("fix(f, g, atan2(1,1), 0, NULL)", ["f", "g", "atan2(1,1)", "0", "NULL"]),
         ("f(max(1,min(2,3)), (4))", ["max(1,min(2,3))", "(4)"]),
         ('f("a, b", "c#d", "e(")', ['"a, b"', '"c#d"', '"e("']),
@@ -88,7 +86,7 @@ def test_the_paper_script_is_understood():
         ("f(GlueToSolid=s1, a == b)", ["GlueToSolid=s1", "a == b"]),
         ("\tf\t(\ta\t)\t", ["a"]),
     ],
-)
+)  # fmt: skip
 def test_arguments_are_split_at_outer_commas_only(text, expected):
     assert arguments(text) == expected
 

@@ -215,12 +215,10 @@ def test_mistakes_behind_a_run_are_found_before_it(run_interpreted):
         ("run(100)", [[]]),
         ("element(e, rubber, pull)\nrun(100)", [[]]),
         ("element(e, rubber, pull)\nrun(100)\nrun(200)", [[200], []]),
-        (
-            "scheme(quasi-static)\nrun(1)\nrun(1)\nscheme(musl)\nrun(100)\nrun(200)",
-            [[100, 200], [100, 200], [200], []],
-        ),
+        ("scheme(quasi-static)\nrun(1)\nrun(1)\nscheme(musl)\nrun(100)\nrun(200)",
+         [[100, 200], [100, 200], [200], []]),
     ],
-)
+)  # fmt: skip
 def test_advice_knows_the_runs_behind_each(runs, later, tmp_path, monkeypatch):
     """How many steps the explicit runs behind each have: advice counts them as time to come."""
     monkeypatch.chdir(tmp_path)

@@ -142,29 +142,18 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("fix(g, body_force, all, 0 -9.81)", "is a comma missing in '0 -9.81'?"),
         ("eos(e, shock, 7, K, 6, 0, 5, 4)", "eos(e, shock, 7, K, 6, 5, 4, 0, 0, 0, 0)"),
         ("eos(e, shock, 7, 6)", "eos(e, shock, rho0, K, c0, S, 0, 0, 0, 0, 0)"),
-        (
-            "strength(s, johnson_cook, 1, 2, 3, n, 4, C)",
-            "(s, johnson_cook, 1, 2, 3, n, 4, C, 0, 0, 1)",
-        ),
-        (
-            "damage(d, damage_johnson_cook, 1, 1, 1, 0, 1)",
-            "damage(d, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 0, 1)",
-        ),
+        ("strength(s, johnson_cook, 1, 2, 3, n, 4, C)",
+         "(s, johnson_cook, 1, 2, 3, n, 4, C, 0, 0, 1)"),
+        ("damage(d, damage_johnson_cook, 1, 1, 1, 0, 1)",
+         "damage(d, damage_johnson_cook, 1, 1, 1, 0, 0, 1, 0, 1)"),
         ("fix(f, indent/pinball, all)", "indent/minimize_penetration"),
-        (
-            "fix(f, indent/pinball, all, sphere, K, R, x1, 0, 0, u, 0, 0)",
-            "fix(f, indent/minimize_penetration, all, sphere, R, x1, 0, 0, u, 0, 0, 0)",
-        ),
+        ("fix(f, indent/pinball, all, sphere, K, R, x1, 0, 0, u, 0, 0)",
+         "fix(f, indent/minimize_penetration, all, sphere, R, x1, 0, 0, u, 0, 0, 0)"),
         ("fix(f, indent, all, 0, 1, 0, R, 1e3)", "fix(f, indent, all, sphere, 1e3, R, 0, 1, 0)"),
-        (
-            "fix(f, body_force_current_config, all, 0, -9.81)",
-            "fix(f, body_force, all, 0, -9.81)",
-        ),
+        ("fix(f, body_force_current_config, all, 0, -9.81)", "fix(f, body_force, all, 0, -9.81)"),
         ("material(tool, rigid)", "material(tool, rigid, 1000)"),
-        (
-            "temperature(t, plastic_work, 0.9, 8960, 385)",
-            "temperature(t, plastic_work, 0.9, 385, 0, 0, T0, Tm)",
-        ),
+        ("temperature(t, plastic_work, 0.9, 8960, 385)",
+         "temperature(t, plastic_work, 0.9, 385, 0, 0, T0, Tm)"),
         ("my speed = 3", "a name has no blanks: my_speed = ..."),
         ("x AND y", "write and"),
         ("w = sin(t)", "did you mean 'time'?"),
@@ -176,7 +165,7 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("run_time(2*Pi)", "did you mean 'PI'?"),
         ('run("100")', "write numbers without quotes: 100"),
     ],
-)
+)  # fmt: skip
 def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):
     """In one step: of LAMMPS, and of Karamelo's older forms."""
     err = run_interpreted(f"dimension(2, 0, 1, 0, 1, 0.1)\n{line}\n", status=1).err
@@ -256,18 +245,15 @@ def test_slips_in_a_plot(run_interpreted, line, hint):
 @pytest.mark.parametrize(
     ("lines", "wrong"),
     [
-        (
-            "method(ulmpm, FLIP, lin, 1)\ndimension(2, 0, 1, 0, 1, 0.1)\nregion(b, blok, 0, 1)\n"
-            "fix(v, bodyforce, all, 0)\nfix(w, body_force, nobody, 0)\nset_outptu(20)",
-            [1, 3, 4, 6],
-        ),
+        ("method(ulmpm, FLIP, lin, 1)\ndimension(2, 0, 1, 0, 1, 0.1)\nregion(b, blok, 0, 1)\n"
+         "fix(v, bodyforce, all, 0)\nfix(w, body_force, nobody, 0)\nset_outptu(20)", [1, 3, 4, 6]),
         ("dimension(2, 0, 1, 0)\nregion(b, cilinder, 0, 0, 1)\nrun_tim(0.4)", [1, 2, 3]),
         ("R = 0.2 +\nmethod(ulmpm, FLIP, linear, 1)\nfoo(3)\nb = 2*\nc = R", [1, 3, 4]),
         ("method(ULMPM, flip, Linear, 7)\nfoo(3)", [1, 1, 1, 2]),
         ("method(ulmpm, FLIP)\nfoo(3)\nquit\nrun_tim(0.4)", [1, 2]),
         ("method(ulmpm, FLIP)\nstyle = 3\ncompute(e, style, all)\nstyle(3)", [1]),
     ],
-)
+)  # fmt: skip
 def test_names_of_commands_and_styles_depend_on_nothing(run_interpreted, lines, wrong):
     assert [line for line, _ in places(run_interpreted(lines, status=1).err)] == wrong
 

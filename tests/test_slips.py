@@ -27,79 +27,43 @@ OF = "material(rubber, eos-strength, e, s"
              "fix(f, force_nodes, far, 1, 0)"], "",
             "fix force_nodes 'f' acts on nodes that no point reaches", "reaches into the body",
         ),
-        (
-            ["compute(Ek, kinetic_energy, all)", "plot(p, 1, time, Ek)"], "",
-            "plot 'p' is drawn nowhere: the script has no save_plot", "save_plot(curves.png)",
-        ),
-        (
-            [], "eos(e, linear, 1000, 1e6)\nstrength(s, linear, 1e9)",
-            "bulk modulus 1e+06 and shear modulus 1e+09 make Poisson's ratio -0.996", "2.17e+09",
-        ),
-        (
-            [], "eos(e, linear, 1000, 1e6)\nstrength(s, plastic, 1e5, 4e5)",
-            "yields at 4e+05, above its shear modulus 1e+05", "the shear modulus comes first",
-        ),
-        (
-            [], "eos(e, linear, 1000, 1e6)\nstrength(s, swift, 1e5, 4e5, 1e5, 0.01, 0.2)",
-            "above its shear modulus 1e+05", "the shear modulus comes first",
-        ),
-        (
-            [], "eos(e, linear, 1000, 1e6)\nstrength(s, mohr-coulomb, 1e5, 100, 0.5)",
-            "its angle of friction is about 0.5 degrees", "not in radians",
-        ),
-        (
-            [], "material(rubber, linear, 2.1e11, 7800, 0.3)",
-            "waves of it move at 0.000224, since its density 2.1e+11", "before the modulus",
-        ),
-        (
-            [], "eos(e, linear, 8000, 160e9)\nstrength(s, plastic, 80e9, 4e8, 5e12)",
-            "flow stress at a plastic strain of 1 is 5e+12, above its modulus", "in the units of",
-        ),
-        (
-            [], "eos(e, linear, 8000, 160e9)\n"
-            "strength(s, johnson_cook, 80e9, 4e8, 5e8, 0.3, 1, 10, 0, 300, 1300)",
-            "rises by 10 times itself for e times the rate", "0.01",
-        ),
-        (
-            [], "eos(e, linear, 2000, 1e8)\nstrength(s, mu-i, 1e7, 20, 38, 0.279, 5e-4, 2450)",
-            "its coefficient of friction is 20", "tangents",
-        ),
-        (
-            ["fix(e, erosion, all, ep > 0.1 && x > 0)"], "",
-            "ep will be 0: points have no such field", "",
-        ),
-        (
-            [], f"{METAL}damage(d, damage_johnson_cook, 54, 489, -3, 0, 0, 1, 300, 1300)\n{OF}, d)",
-            "it fails in shear at a plastic strain of 543", "not in per cent",
-        ),
-        (
-            [], f"{METAL}damage(d, damage_johnson_cook, 0.1, 3, 2.1, 0, 0, 1, 300, 1300)\n{OF}, d)",
-            "with d3 = 2.1 its failure strain is larger in tension", "below 0 here",
-        ),
-        (
-            [], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 0, 20, 1300)\n{OF}, w)",
-            "T0 of the temperature is 20, Tr of the strength is 300", "degrees Celsius",
-        ),
-        (
-            [], f"{METAL}temperature(w, plastic_work, 0.9, 0.5, 0, 0, 300, 1300)\n{OF}, w)",
-            "a plastic strain of 1 warms it by 9e+04 kelvin", "500 for steel",
-        ),
-        (
-            [], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 12e-6, 300, 1300)\n{OF}, w)",
-            "it expands by 2.5e-17 a kelvin", "alpha is 3 K = 4.8e+11 times",
-        ),
-        (
-            [], "material(rubber, linear, 7850, 2e11, 0.3, 460, 45, 12)",
-            "it expands by 12 a kelvin", "1.2e-5",
-        ),
-        (
-            [], "eos(e, shock, 8930, 1e11, 3940, 1490, 2, 385, 294, 150, 60)\n"
-            "strength(s, plastic, 43e9, 4e8)", "the slope S of its shock speed is 1490", "no unit",
-        ),
-        (
-            [], "eos(e, shock, 8930, 1e11, 3940, 1.49, 2, 385, 294, 150, 60)\n"
-            "strength(s, plastic, 43e9, 4e8)", "has the coefficients 150 and 60", "1.5 and 0.06",
-        ),
+        (["compute(Ek, kinetic_energy, all)", "plot(p, 1, time, Ek)"], "",
+         "plot 'p' is drawn nowhere: the script has no save_plot", "save_plot(curves.png)"),
+        ([], "eos(e, linear, 1000, 1e6)\nstrength(s, linear, 1e9)",
+         "bulk modulus 1e+06 and shear modulus 1e+09 make Poisson's ratio -0.996", "2.17e+09"),
+        ([], "eos(e, linear, 1000, 1e6)\nstrength(s, plastic, 1e5, 4e5)",
+         "yields at 4e+05, above its shear modulus 1e+05", "the shear modulus comes first"),
+        ([], "eos(e, linear, 1000, 1e6)\nstrength(s, swift, 1e5, 4e5, 1e5, 0.01, 0.2)",
+         "above its shear modulus 1e+05", "the shear modulus comes first"),
+        ([], "eos(e, linear, 1000, 1e6)\nstrength(s, mohr-coulomb, 1e5, 100, 0.5)",
+         "its angle of friction is about 0.5 degrees", "not in radians"),
+        ([], "material(rubber, linear, 2.1e11, 7800, 0.3)",
+         "waves of it move at 0.000224, since its density 2.1e+11", "before the modulus"),
+        ([], "eos(e, linear, 8000, 160e9)\nstrength(s, plastic, 80e9, 4e8, 5e12)",
+         "flow stress at a plastic strain of 1 is 5e+12, above its modulus", "in the units of"),
+        ([], "eos(e, linear, 8000, 160e9)\n"
+         "strength(s, johnson_cook, 80e9, 4e8, 5e8, 0.3, 1, 10, 0, 300, 1300)",
+         "rises by 10 times itself for e times the rate", "0.01"),
+        ([], "eos(e, linear, 2000, 1e8)\nstrength(s, mu-i, 1e7, 20, 38, 0.279, 5e-4, 2450)",
+         "its coefficient of friction is 20", "tangents"),
+        (["fix(e, erosion, all, ep > 0.1 && x > 0)"], "",
+         "ep will be 0: points have no such field", ""),
+        ([], f"{METAL}damage(d, damage_johnson_cook, 54, 489, -3, 0, 0, 1, 300, 1300)\n{OF}, d)",
+         "it fails in shear at a plastic strain of 543", "not in per cent"),
+        ([], f"{METAL}damage(d, damage_johnson_cook, 0.1, 3, 2.1, 0, 0, 1, 300, 1300)\n{OF}, d)",
+         "with d3 = 2.1 its failure strain is larger in tension", "below 0 here"),
+        ([], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 0, 20, 1300)\n{OF}, w)",
+         "T0 of the temperature is 20, Tr of the strength is 300", "degrees Celsius"),
+        ([], f"{METAL}temperature(w, plastic_work, 0.9, 0.5, 0, 0, 300, 1300)\n{OF}, w)",
+         "a plastic strain of 1 warms it by 9e+04 kelvin", "500 for steel"),
+        ([], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 12e-6, 300, 1300)\n{OF}, w)",
+         "it expands by 2.5e-17 a kelvin", "alpha is 3 K = 4.8e+11 times"),
+        ([], "material(rubber, linear, 7850, 2e11, 0.3, 460, 45, 12)",
+         "it expands by 12 a kelvin", "1.2e-5"),
+        ([], "eos(e, shock, 8930, 1e11, 3940, 1490, 2, 385, 294, 150, 60)\n"
+         "strength(s, plastic, 43e9, 4e8)", "the slope S of its shock speed is 1490", "no unit"),
+        ([], "eos(e, shock, 8930, 1e11, 3940, 1.49, 2, 385, 294, 150, 60)\n"
+         "strength(s, plastic, 43e9, 4e8)", "has the coefficients 150 and 60", "1.5 and 0.06"),
     ],
 )  # fmt: skip
 def test_told(run_interpreted, lines, material, says, hint):
@@ -129,20 +93,14 @@ def warm_block(T0, *fixes):
     ("T0", "fix", "says"),
     [
         (20, "", "T0 = 20, and the material counts temperatures from 300"),
-        (
-            300,
-            "fix(f, temperature_nodes, near, -20)",
-            "the temperature is -20, and bodies begin at 3",
-        ),
-        (
-            300,
-            "fix(f, convection_particles, top, 25, 20)",
-            "the temperature is 20, and bodies begin",
-        ),
+        (300, "fix(f, temperature_nodes, near, -20)",
+         "the temperature is -20, and bodies begin at 3"),
+        (300, "fix(f, convection_particles, top, 25, 20)",
+         "the temperature is 20, and bodies begin"),
         (300, "fix(f, heat_flux_particles, all, 1e3)", "all points of solid 'body' get heat as if"),
         (300, "fix(f, temperature_nodes, far, 400)", "'f' acts on nodes that no point reaches"),
     ],
-)
+)  # fmt: skip
 def test_slips_of_heat(run_interpreted, T0, fix, says):
     lines = [
         "region(near, block, 0.25, 0.35, 0.2, 0.6)", "group(near, nodes, region, near, all)",

@@ -113,16 +113,12 @@ def test_averaged_volumes_about_an_axis(run_script, away):
         ("soil that vibrates", {"nu": 0.3, "phi": 40, "averaged": "false"}, True),
         ("soil that vibrates", {"nu": 0.25, "phi": 40, "averaged": "false"}, False),
         ("soil that vibrates", {"nu": 0.45, "psi": 10}, False),
-        (
-            "soil that vibrates",
-            {"nu": 0.45, "scheme": "quasi-static", "averaged": "false"},
-            False,
-        ),
+        ("soil that vibrates", {"nu": 0.45, "scheme": "quasi-static", "averaged": "false"}, False),
         ("F-bar with splines", {"basis": "quadratic-spline", "psi": 30}, True),
         ("F-bar with splines", {"basis": "quadratic-spline"}, False),
         ("F-bar with splines", {"psi": 30}, False),
     ],
-)
+)  # fmt: skip
 def test_what_sand_cannot_do_is_said(run_interpreted, name, numbers, told):
     numbers = {"run": "set_dt(0.001)\n    run(1)", **numbers}
     assert (f"warning: {name}: " in run_interpreted(wall(**numbers), command="check").err) == told

@@ -240,13 +240,10 @@ def test_a_plate_has_the_mass_of_its_thickness(run_interpreted):
         ("dimension(3, 0, 2, 0, 2, 0, 2, 0.25)", "", "3 dimensions, not 2"),
         ("dimension(1, 0, 2, 0.25)", "", "uniaxial_stress"),
         ("axisymmetric(true)", "dimension(2, 0, 2, 0, 2, 0.25)\n", "axisymmetric"),
-        (
-            "material(m, neo-hookean, 1, 1, 0)",
-            "dimension(2, 0, 2, 0, 2, 0.25)\n",
-            "before the first",
-        ),
+        ("material(m, neo-hookean, 1, 1, 0)", "dimension(2, 0, 2, 0, 2, 0.25)\n",
+         "before the first"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_thin_is_refused(run_interpreted, line, before, says):
     script = f"method(ulmpm, FLIP, linear, 1)\n{before}{line}\nplane_stress(true)\n"
     assert says in run_interpreted(script, status=1).err

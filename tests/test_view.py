@@ -157,10 +157,8 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "-o", "p.jpg"], ".pdf"),
         (["p.dump", "--cmap", "rainbows"], "rainbows"),
         (["p.dump", "--only", "vxx > 0"], "vxx"),
-        (
-            ["p.dump", "--only", "type = 2"],
-            "| type = 2\n      |      ^\nexpected: name = expression",
-        ),
+        (["p.dump", "--only", "type = 2"],
+         "| type = 2\n      |      ^\nexpected: name = expression"),
         (["p.dump", "--only", "type = 2"], "hint: compare with =="),
         (["p.dump", "--outlines", "yes"], "| yes\n"),
         (["p.dump", "--outlines"], "expected: --outlines true|false"),
@@ -185,7 +183,7 @@ def test_points_that_move_stay_in_view(tmp_path, monkeypatch):
         (["p.dump", "--title", "{1/0}"], "error: {1/0} in --title: division by zero"),
         ([], "FILE"),
     ],
-)
+)  # fmt: skip
 def test_view_says_what_is_wrong(tmp_path, monkeypatch, capsys, arguments, remedy):
     monkeypatch.chdir(tmp_path)
     Particle(FakeHub(tmp_path), 1, "p.dump", "vx").write()
