@@ -66,7 +66,7 @@ def goes_on(run, script: str, *, files: int = 1) -> Path:
 
 RUBBING = bars(
     0.0, "fix(rub, contact/friction, a, b, 0.3)", "log_modify(custom, step, rub_x, va_x)",
-    "fix(slide, initial_velocity_particles, b, -0.1, 0.3)", "run(6)", d=2, scheme="usavg", v=2,
+    "fix(slide, initial_velocity_particles, b, -0.1, 0.3)", "run(4)", d=2, scheme="usavg", v=2,
 )  # fmt: skip
 TOOLS = (
     "fix(F, indent/minimize_penetration, all, sphere, 0.1, 0.45, 0.55, 0, 3, 0, 0, 0.2)",
@@ -75,7 +75,7 @@ TOOLS = (
     "fix(C, cuttingtool, all, 0.1, 0.35 + time, 0.36, 0, -1, 0, 0, 0.4, 0.5, 0.6, 0.36)",
     "region(low, block, 0, 1, 0, 0.32)",
     "fix(S, contact/surface, all, low, 0.3, 9*time^2, 0)",
-    "log_modify(custom, step, F_x, W_x, I_y, C_x, S_x)", "set_dt(0.001)", "run(6)",
+    "log_modify(custom, step, F_x, W_x, I_y, C_x, S_x)", "set_dt(0.001)", "run(4)",
 )  # fmt: skip
 GROUPS = """\
 region(low, block, 0.3, 0.3, 0.3, 0.5)
@@ -103,7 +103,7 @@ LOADS = (
     "fix(P, edge_pressure, all, box, 5*time)", "fix(calm, local_damping, all, 0.8)",
     "fix(Ek, kinetic_energy, all)", "fix(Es, strain_energy, all)",
     "compute(E, energy_balance, all)", "set_output(1)",
-    "log_modify(custom, step, dt, limit, F_y, T_x, P_x, E_drift, Ek, Es)", "run(6)",
+    "log_modify(custom, step, dt, limit, F_y, T_x, P_x, E_drift, Ek, Es)", "run(4)",
 )  # fmt: skip
 PYTHON = """\
 fix(v, initial_velocity_nodes, all, 0.2*sin(9*x0), 0)
@@ -163,7 +163,7 @@ material(tnt, eos-strength, tnt, thin)
 solid(tnt, region, last, 2, tnt, 0.1)
 fix(light, detonation, all, (x0 - 0.8)/30)
 fix(v, initial_velocity_particles, all, sin(9*x0))
-run(6)
+run(4)
 """
 FLOWS = {
     "a": "zerilli-armstrong, 80, 0.4, 0.2, 0, 0.0028, 0.000115, 0.3, 0.5",
@@ -213,7 +213,7 @@ def of_laws(method: str, laws: dict[str, str], thin: str = "false") -> str:
         "fix(pull, velocity_nodes, nodes, x0 + y0, -x0)",
         f"dump(d, all, particle, 1, d.*.txt, s11, s12{', ep, epdot' * (laws is FLOWS)})",
         "set_dt(0.003)",
-        "run(6)",
+        "run(4)",
     ]
     return "\n".join(lines)
 
@@ -222,7 +222,7 @@ IMPLICIT = (
     "region(floor, block, -INF, INF, -INF, 0.301)", "group(floor, nodes, region, floor, all)",
     "fix(hold, velocity_nodes, floor, 0, 0)", "fix(g, body_force, all, time, -time)",
     "set_dt(0.5)", "set_output(1)", "log_modify(custom, step, iterations, residual, hold_y)",
-    "run(6)",
+    "run(4)",
 )  # fmt: skip
 SWAYS = (
     "fix(v, initial_velocity_particles, all, 3*sin(9*x0), 1)", "set_output(1)",
@@ -242,10 +242,10 @@ SERIAL = {  # scenes that one process takes
 SCENES = {
     "loads": block(2, *LOADS, size=SIZE),
     "loads in the total frame": block(2, *LOADS, size=SIZE).replace("ulmpm", "tlmpm"),
-    "wall that rubs": rubbed().replace("run_time(0.2)", "run(6)"),
+    "wall that rubs": rubbed().replace("run_time(0.2)", "run(4)"),
     "rigid": pushed().replace("run_time(3)", "set_dt(0.05)\nrun(16)"),
     "rigid by a formula": pushed("ulmpm/contacts").replace("initial_velocity_particles, tool, 0.5",
-        "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(6)"),
+        "velocity_particles, tool, 0.2*time").replace("run_time(3)", "run(4)"),
     "flow": of_laws("ulmpm, FLIP, linear, 1", FLOWS),
     "flow in the total frame": of_laws("tlmpm, APIC, linear", FLOWS),
     "flow with averaged volumes": of_laws("ulmpm, FLIP, linear, 1", FLOWS).replace(
@@ -260,23 +260,23 @@ SCENES = {
     ).replace("FLIP, linear, 1", "FLIP/per-time, linear, 0.9"),
     "friction": RUBBING,
     "points that touch": bodies(
-        -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(6)",
+        -0.01, "contact/minimize_penetration, a, b, 0.2", "log_modify(custom, step, c_x)", "run(4)",
         d=2, n=2,
     ),
     "Hertz": bodies(
-        -0.01, "contact/hertz, a, b", "log_modify(custom, step, c_x)", "run(6)", d=2, n=2
+        -0.01, "contact/hertz, a, b", "log_modify(custom, step, c_x)", "run(4)", d=2, n=2
     ),
-    "heat": slab(HOT.format("301 + time"), ", hot_s", "run(6)"),
-    "heat in the total frame": slab(HOT.format(301), ", hot_s", "run(6)").replace(
+    "heat": slab(HOT.format("301 + time"), ", hot_s", "run(4)"),
+    "heat in the total frame": slab(HOT.format(301), ", hot_s", "run(4)").replace(
         'kind = "ulmpm"', 'kind = "tlmpm"'
     ),
     "metal": pulled(ALL).replace("run(50)", "run(6)"),
     "anti locking": block(
         2, "anti_volumetric_locking(true)", "fix(v, initial_velocity_particles, all, sin(9*x0), 0)",
-        "run(6)", size=SIZE,
+        "run(4)", size=SIZE,
     ),
     "single": "precision(single)\n" + block(
-        2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(6)", size=SIZE
+        2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "run(4)", size=SIZE
     ),
     "deleted": thrown(2, "delete", "run(8)", "run(12)"),
     "reflected": thrown(2, "reflect", "run(8)", "run(12)"),
@@ -288,9 +288,9 @@ SCENES = {
         1, "fix(v, initial_velocity_particles, all, 3*sin(9*x0))",
         "fix(p, edge_pressure, all, box, 9)",
         "dump(d, all, particle, 2, d.*.txt, x, s11, s22, s33, volume)", "set_output(1)",
-        "log_modify(custom, step, dt, time, p_x)", "run(6)",
+        "log_modify(custom, step, dt, time, p_x)", "run(4)",
     ).replace("region(box", "spherical(true)\nregion(box"),
-    "faces with heat": slab(FACE, ", lamp_s, air_s", "run(6)"),
+    "faces with heat": slab(FACE, ", lamp_s, air_s", "run(4)"),
     "fluids": FLUIDS,
 }  # fmt: skip
 OUTPUTS = """\
