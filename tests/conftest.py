@@ -238,6 +238,13 @@ def _forking() -> Iterator[str]:
         yield python
 
 
+@pytest.fixture(scope="session")
+def compiling() -> Iterator[str]:
+    """A Python that compiles, and starts as a fork."""
+    with forking() as python:
+        yield python
+
+
 @pytest.fixture
 def starts_are_cheap(_forking, monkeypatch) -> Iterator[None]:
     """Runs and code, interpreted, start as forks of a process that has the program at hand."""

@@ -25,10 +25,14 @@ def ask(path: str, words: list[str]) -> int:
 
 def do(said: list[str]) -> int:
     """Do in this process what a Python of its own would do."""
+    import time
     import traceback
     import warnings
 
     from karamelo_py.app.start import main
+    from karamelo_py.compiler.disk import cache
+
+    cache._began = time.time()  # sources that are older are those that this process has read
 
     folder, count, *words = said
     os.chdir(folder)

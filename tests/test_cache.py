@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from conftest import forking
 from listening import listening
 from numba import config
 
@@ -155,13 +154,7 @@ FILES = {
             print(one.message)
         """,
 }
-# A fork begins now: sources that are older than it are those that it has read.
-START = """
-import sys, time
-from karamelo_py.compiler.disk import cache
-sys.dont_write_bytecode, cache._began = True, time.time()
-exec(open("program.py").read())
-"""
+START = "import sys; sys.dont_write_bytecode = True; exec(open('program.py').read())"
 VALUES = [212.0, 206.0, 197.0]
 ALL = ["Disk", "Square", "Strip"]
 
@@ -195,24 +188,18 @@ class Shapes:
 
 
 @pytest.fixture(scope="module")
-def python():
-    with forking() as command:
-        yield command
-
-
-@pytest.fixture(scope="module")
-def compiled(python, tmp_path_factory):
+def compiled(compiling, tmp_path_factory):
     """The files of the kernels of the package as it is above."""
-    shapes = Shapes(python, tmp_path_factory.mktemp("shapes"))
+    shapes = Shapes(compiling, tmp_path_factory.mktemp("shapes"))
     assert shapes.run() == (VALUES, ALL, [])
     assert shapes.run() == (VALUES, [], [])
     return {path.name: path.read_bytes() for path in shapes.kernels.iterdir()}
 
 
 @pytest.fixture
-def shapes(python, tmp_path, compiled):
+def shapes(compiling, tmp_path, compiled):
     """The package in a folder of its own, with its kernels."""
-    shapes = Shapes(python, tmp_path)
+    shapes = Shapes(compiling, tmp_path)
     shapes.kernels.mkdir(parents=True)
     for name, content in compiled.items():
         (shapes.kernels / name).write_bytes(content)

@@ -3,7 +3,6 @@
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -331,11 +330,11 @@ def test_what_a_hook_changes_in_place_is_written(run_interpreted):
         ("material(m, uncompiled, 1)", "in.wrong:4:1: error: material uncompiled"),
     ],
 )
-def test_the_command_line_tells_of_what_cannot_be_compiled(site, tmp_path, line, part):
+def test_the_command_line_tells_of_what_cannot_be_compiled(site, compiling, tmp_path, line, part):
     (tmp_path / "in.wrong").write_text(scene(line))
     path = os.pathsep.join([str(site), os.environ["PYTHONPATH"]])
     done = subprocess.run(
-        [sys.executable, "-m", "karamelo_py.app.cli", "in.wrong"], cwd=tmp_path,
+        [compiling, "-m", "karamelo_py.app.cli", "in.wrong"], cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": path, "NUMBA_DISABLE_JIT": "0"},
         capture_output=True, text=True, timeout=300,
     )  # fmt: skip

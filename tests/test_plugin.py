@@ -18,7 +18,7 @@ from scenes import block
 from selection import few
 
 pytestmark = [pytest.mark.xdist_group("plugin"), pytest.mark.usefixtures("starts_are_cheap")]
-PYTHON = sys.executable  # which compiles, too
+PYTHON = sys.executable  # before it is a fork
 
 # One period of the first mode of a bar with fixed ends.
 VIBRATION = """
@@ -76,13 +76,12 @@ def _interpreter(site):
         yield process
 
 
-def karamelo_py(site, folder, *arguments, compiled=False):
-    """Run the command line in a process of its own that sees the plug-in."""
+def karamelo_py(site, folder, *arguments, compiling=""):
+    """Run the command line where it sees the plug-in, with a Python that compiles or not."""
     path = os.pathsep.join(filter(None, [str(site), os.environ.get("PYTHONPATH")]))
     environment = os.environ | {"PYTHONPATH": path}
-    environment["NUMBA_DISABLE_JIT"] = "0" if compiled else "1"
-    python = PYTHON if compiled else sys.executable
-    command = [python, "-m", "karamelo_py.app.cli", *map(str, arguments)]
+    environment["NUMBA_DISABLE_JIT"] = "0" if compiling else "1"
+    command = [compiling or sys.executable, "-m", "karamelo_py.app.cli", *map(str, arguments)]
     return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300
     )
@@ -192,10 +191,10 @@ run(100)
 
 
 @pytest.mark.parametrize("compiled", few((False, True), True))
-def test_a_strength_shows_its_own_number(site, tmp_path, compiled):
+def test_a_strength_shows_its_own_number(site, compiling, tmp_path, compiled):
     recovery = 4e3
     (tmp_path / "in.pull").write_text(PULL.replace("{recovery}", str(recovery)))
-    done = karamelo_py(site, tmp_path, "in.pull", compiled=compiled)
+    done = karamelo_py(site, tmp_path, "in.pull", compiling=compiling * compiled)
     assert done.returncode == 0, done.stderr
     rows = np.loadtxt(tmp_path / "points.100.LAMMPS", skiprows=11)
     ep, R, q = rows[:, -3:].T
@@ -276,13 +275,13 @@ def test_a_force_by_the_whole_velocity(run_interpreted, style):
     np.testing.assert_allclose(np.hypot(fx, fy)[1:], (4 * 0.1 * 25 * slower**2)[1:], rtol=3e-3)
 
 
-def test_compiled_hooks_do_what_interpreted_ones_do(site, tmp_path, run_interpreted):
+def test_compiled_hooks_do_what_interpreted_ones_do(site, compiling, tmp_path, run_interpreted):
     """On two threads, of points and of nodes."""
     lines = "fix(wind, air_drag, all, 0.1)\nfix(reeds, node_drag, all, 0.2)"
     scene = AIR.format(steps=20).replace("fix(wind, air_drag, all, 0.1)", lines)
     scene = scene.replace("set_output(100)", "set_output(10)").replace("p_y,", "p_y, reeds_x,")
     (tmp_path / "in.air").write_text(scene)
-    done = karamelo_py(site, tmp_path, "in.air", "--threads", "2", compiled=True)
+    done = karamelo_py(site, tmp_path, "in.air", "--threads", "2", compiling=compiling)
     assert done.returncode == 0, done.stderr
     found = read_log(tmp_path)[:4]
     assert found[2][-1] < 0.99 * found[2][0]
@@ -350,11 +349,11 @@ def many(folder, names):
 @pytest.mark.parametrize(
     "how, compiled", [((), False), (("--threads", "2"), True), (("--gpu",), False)]
 )
-def test_hooks_publish_any_number_of_totals(tmp_path, how, compiled):
+def test_hooks_publish_any_number_of_totals(compiling, tmp_path, how, compiled):
     """Once, twice, three and four times the mass, of 360 kg; in several threads and on a card."""
     site = many(tmp_path, ("a", "b", "c", "d"))
     (tmp_path / "in.many").write_text(PUBLISHING)
-    done = karamelo_py(site, tmp_path, "in.many", *how, compiled=compiled)
+    done = karamelo_py(site, tmp_path, "in.many", *how, compiling=compiling * compiled)
     assert done.returncode == 0, done.stderr
     expected = 360 * np.array([1, 2, 3, 4, 1, 2, 3, 4])
     np.testing.assert_allclose(read_log(tmp_path)[1:, -1], expected, rtol=1e-8)
