@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import kernel, noinline
+from karamelo_py.compiler import caller_of, kernel, noinline, point_function
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
@@ -38,10 +38,10 @@ from karamelo_py.kernels.arrays import (
     of_momentum,
 )
 from karamelo_py.kernels.contact import Bodies, ListedPairs, SeparateFields, list_pairs
-from karamelo_py.kernels.surfaces import depth, slopes
+from karamelo_py.kernels.surfaces import Surface, depth, distance, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_point
 from karamelo_py.kernels.totals import WORK, add_to
-from karamelo_py.kernels.touching import ASIDE, SOFT, direction_of
+from karamelo_py.kernels.touching import ASIDE, CALL, SOFT, direction_of
 from karamelo_py.kernels.views import place_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.bodies import radius
@@ -62,7 +62,8 @@ PASSES, FAILED = 46, 47  # of Newton's method: in this step, and steps without a
 STATE = 48
 # Columns of FreeBody.constants.
 OF_MASS, INERTIA, AXES, START, BOUND = 0, 1, 4, 13, 16  # AXES: principal axes, by columns
-CONSTANTS = 17
+SPEED_AT_MOST = 17  # of a point of the body, in this step
+CONSTANTS = 18
 # Formulas of a body: prescribed velocity and spin, force and torque, acceleration.
 LED, LOADED, FALLS = 0, 6, 12
 FORMULAS = 15
@@ -75,6 +76,8 @@ START_P, U, TRIAL, REST, REST_TRIAL, SUM, STEP, ROWS = range(8)
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
 SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the square of the residual at the start
 
+_call = caller_of(CALL)
+
 
 class TouchingSurface(NamedTuple):
     """The surface of a body, and the points that it touches."""
@@ -83,6 +86,7 @@ class TouchingSurface(NamedTuple):
     members: np.ndarray  # (N,) bool, by id
     mu: float
     slot: int  # of the force on the points
+    lost: int  # address of a function called for a point without a way out
 
 
 class FreeBody(NamedTuple):
@@ -434,6 +438,9 @@ def _start(body, s):
     for a in range(6):
         vectors[U, a] = 0.0 if body.dofs[a] else _value(body, s, LED + a)
     _velocities_of(body, START_P)
+    u = vectors[U]
+    speed = sqrt(u[3] ** 2 + u[4] ** 2 + u[5] ** 2) * body.constants[BOUND]
+    body.constants[SPEED_AT_MOST] = sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2) + speed
 
 
 @noinline
@@ -533,6 +540,18 @@ def _place_of(s, points, p):
     )
 
 
+@point_function(otherwise=True)
+def depth_near(shape, kin, x, reach):
+    """Depth at `x`; -reach at all places further from the surface, inside as well."""
+    return depth(shape, kin, x, reach)
+
+
+@depth_near.on(Surface)
+def _depth_near_faces(shape, kin, x, reach):
+    # Whether faces enclose a place takes longer than that none is near.
+    return depth(shape, kin, x, reach) if distance(shape, kin, x, reach) < reach else -reach
+
+
 @noinline
 def _list_point(body, surface, s, block, p):
     """Put a contact of point `p` with a surface into the next row; return whether there is one."""
@@ -540,22 +559,29 @@ def _list_point(body, surface, s, block, p):
     times, dt = s.control.step[0], s.control.values[DT]
     h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
     x = load_vector(kin, points.x[s.control.motion[0].now], p)
-    away = 0.0
+    away = speed = 0.0
     for c in range(d):
         away += (x[c] - state[X + c]) ** 2
+        speed += abs(points.v[c, p])
     if away > (body.constants[BOUND] + 2 * h) ** 2:
         return False
+    # Surfaces that may meet in this step: most points are far, and a short reach is cheap.
+    near = min(2 * dt * (speed + body.constants[SPEED_AT_MOST]), h)
     law, material = state_at(kin, points, block.laws, p)
     ball = radius(kin, volume_of(kin, points, law, material, p), x)
     arm = [x[c] - state[X + c] if c < d else 0.0 for c in range(3)]
     local = _to_start(state, arm[0], arm[1], arm[2])
     y = none._make([local[c] + body.constants[START + c] for c in range(d)])
-    within = depth(surface.shape, kin, y, h + ball)
-    if within <= -h - ball:
+    within = depth_near(surface.shape, kin, y, near + ball)
+    if within <= -near - ball:
         return False
+    if within > ball:
+        within = depth(surface.shape, kin, y, h + ball)
     step = ASIDE * h
     way = direction_of(slopes(surface.shape, kin, y, h + ball, (within, step)), step)
     if way.squared() == 0:
+        if within > 0 and _call(surface.lost, points.id[p]) == 0:
+            raise RuntimeError("a point has no way out")
         return False
     out = [way[c] if c < d else 0.0 for c in range(3)]
     normal = _from_start(state, out[0], out[1], out[2])

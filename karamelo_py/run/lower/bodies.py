@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from karamelo_py.compiler import address_of
+from karamelo_py.compiler import address_of, address_of_python
 from karamelo_py.kernels import free_bodies as kernel
 from karamelo_py.kernels.contact import ListedPairs
+from karamelo_py.kernels.touching import CALL
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
@@ -54,6 +55,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
             touch.group.has(np.arange(count)) & ~_of(fix.body, count),
             float(touch.mu),
             hub.values.slot(f"{touch.id}_x"),
+            address_of_python(touch.refuse, CALL),
         )
         for touch in surfaces_of(fix)
     )

@@ -8,16 +8,19 @@ import numpy as np
 from karamelo_py.kernels import free_bodies as kernel
 from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.language.arguments import NULL
+from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Argument, NonNegative, Positive
+from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.region import Region
-from karamelo_py.scene.solid import Solid
+from karamelo_py.scene.solid import Solid, named
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import judge_friction
+from karamelo_py.styles.fixes.tools.base import begin_behind
 
 COLUMNS = kernel.X, kernel.ANGLE, kernel.V, kernel.W, kernel.FORCE, kernel.TORQUE
 WAYS = "x", "y", "z", "rx", "ry", "rz"
@@ -434,7 +437,34 @@ class ContactRigidBody(Fix):
                 expected="a block, cylinder, sphere, closed STL surface or mesh, or some of these",
             )
 
+    def behind(self, points: PointTable) -> tuple[int, float]:
+        """Return the number of points in the body before the first step, and the largest depth."""
+        depth = self.region.depth(points.position.astype(float), self.hub.domain.h)
+        own = points.numbers - self.body.first_id
+        depth = depth[(own < 0) | (own >= self.body.count)]
+        return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
+
+    def refuse(self, number: int) -> int:
+        """Refuse a point, by its number from 0, that has no way out."""
+        raise ScriptError(
+            f"{named(self.hub, number)} is so deep in the body '{self.body.id}' that no way out of "
+            "it is the shortest",
+            place=self.place,
+            expected="points that come less than a cell below its surface",
+            hint="another place of the body at the start, smaller steps (dt_factor), or a stiffer "
+            "solid",
+        )
+
 
 def surfaces_of(body: Any) -> list[ContactRigidBody]:
     fixes = body.hub.fixes.values()
     return [f for f in fixes if isinstance(f, ContactRigidBody) and f.body is body.body]
+
+
+known_failure(
+    ContactRigidBody,
+    "points in the body '{part.body.id}'",
+    when=begin_behind,
+    reason="{which} points of the group begin there, up to {depth:.3g} deep, and are thrown out",
+    cure="another place of the body or of the other solid",
+)
