@@ -79,7 +79,7 @@ def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None
     why, hint = mixed_units(hub, simulation), UNITS
     if hub.update.fixed_dt is not None:
         why, hint = "", "a larger step with set_dt, or an earlier end"
-    elif simulation.steps.ruling_limit == "conduction":
+    elif simulation.ruling_limit == "conduction":
         why = (
             f"heat goes through cells of {hub.domain.h:g} that fast. The units of conductivities, "
             "heat capacities, lengths and times may be mixed"
@@ -206,7 +206,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     scene = SceneFacts(hub, simulation, duration)
     scene.duration += _gone(hub, simulation) + _duration_of_later(hub, simulation)
     one_step = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.steps.limit)
-    if one_step and simulation.steps.ruling_limit == "end" and hub.update.first_time("one step"):
+    if one_step and simulation.ruling_limit == "end" and hub.update.first_time("one step"):
         limit = simulation.steps.limit
         words = f"one step covers the whole run, where one of {limit:.3g} is stable"
         hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS, code="one-step")

@@ -10,6 +10,7 @@ from karamelo_py.advice.step_size import (
     own_step_instead,
     own_step_instead_of,
     stable_step,
+    words_of_limit,
     words_of_own_step,
     words_of_share,
 )
@@ -41,6 +42,7 @@ class Narrator(Listener):
                 run.rollback.point.halvings or simulation.implicit
             ):  # else the script has not chosen the step
                 known_failures.warn_about_steps(hub, simulation, halve, again=True)
+            self._tell_of_end(run, simulation)
             return
         steps = inf if run.steps is None else run.steps
         duration = min(run.end_time - simulation.time, steps * simulation.dt)
@@ -51,6 +53,19 @@ class Narrator(Listener):
         else:
             known_failures.warn(hub, simulation, duration, halve)
             known_failures.warn_about_length(hub, simulation, run.end_time)
+
+    def _tell_of_end(self, run: RunLoop, simulation: Simulation) -> None:
+        """The file may hold the end of the run, or a later state."""
+        step, time, last_step = simulation.step, simulation.time, run.last_step
+        holds = f"{run.resumed_from} holds step {step}, time {time:.6g}"
+        hint = "a longer run, or a file from before its end"
+        if step > last_step or time > run.end_time:
+            end = f"step {last_step}" if step > last_step else f"time {run.end_time:.6g}"
+            message = f"{holds}, which is beyond the end of this run, {end}: it takes no step"
+            self.hub.warn(message, hint=hint)
+        elif step == last_step or time == run.end_time or not run.condition_allows():
+            message = f"{holds}, the end of this run: it takes no further step"
+            self.hub.console.say(render_message("note", message, hint=hint))
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
         hub, why = self.hub, unknown_work(self.hub)
@@ -84,9 +99,9 @@ class Narrator(Listener):
             facts["stable_dt"] = shown["stable dt"] = stable
             facts["own_dt"] = dt = own_step_instead_of(simulation)
             shown["own dt"] = words_of_own_step(simulation, dt) if dt else None
-            facts["limited_by"] = simulation.steps.ruling_limit
+            facts["limited_by"] = simulation.ruling_limit
             self.limits, self.least = {facts["limited_by"]}, simulation.steps.limit
-            shown["limited by"] = f"{simulation.steps.words_of_limit}; {words_of_share(simulation)}"
+            shown["limited by"] = f"{words_of_limit(simulation)}; {words_of_share(simulation)}"
         if why and simulation.moves:
             facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
         hub.record.begin(facts)
@@ -120,14 +135,14 @@ class Narrator(Listener):
             )
 
     def _tell_of_limit(self, simulation: Simulation) -> None:
-        name, limit, before = simulation.steps.ruling_limit, simulation.steps.limit, self.least
+        name, limit, before = simulation.ruling_limit, simulation.steps.limit, self.least
         if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
             return
         self.limits.add(name)
         self.least = min(limit, before)
         words = (
             f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by "
-            f"{simulation.steps.words_of_limit} now: {limit:.4g} is stable, {before:.4g} before"
+            f"{words_of_limit(simulation)} now: {limit:.4g} is stable, {before:.4g} before"
         )
         self.hub.console.say(render_message("note", words))
 

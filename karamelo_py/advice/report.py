@@ -9,6 +9,7 @@ from karamelo_py.advice.step_size import (
     own_step_instead_of,
     stable_step,
     step_after_motion,
+    words_of_limit,
     words_of_own_step,
     words_of_share,
 )
@@ -67,7 +68,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         say(f"               {words_of_share(simulation)}")
         if (step := own_step_instead_of(simulation)) is not None:
             say(f"own dt         {words_of_own_step(simulation, step)}")
-        say(f"limited by     {simulation.steps.words_of_limit}")
+        say(f"limited by     {words_of_limit(simulation)}")
         if (n := (end_time - simulation.time) / simulation.dt) < inf:
             one = seconds_of_step(hub, simulation.count)
             after = step_after_motion(simulation)

@@ -8,6 +8,7 @@ from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_we
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 LOST = 2.05  # times the stable step: every run above it failed
+EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
 NO_LIMITS = ("set_dt", "end")  # of stability
 
 
@@ -84,6 +85,10 @@ def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
     return f"set_dt {fixed_dt}" if fixed_dt else f"dt_factor {dt_factor}"
 
 
+def words_of_limit(simulation: Simulation) -> str:
+    return simulation.ruling_limit + EXPLAINED.get(simulation.ruling_limit, "")
+
+
 def words_of_share(simulation: Simulation) -> str:
     hub, steps = simulation.hub, simulation.steps
     asked, keeping = hub.update.dt_factor, keeping_share(hub)
@@ -92,7 +97,7 @@ def words_of_share(simulation: Simulation) -> str:
         words = f"{fraction:.3g} of the stable step"
     elif asked is None:
         step = simulation.control.step[0]
-        of_heat = steps.ruling_limit == "conduction"
+        of_heat = simulation.ruling_limit == "conduction"
         words = f"{DEFAULT_SHARE if of_heat else float(step.dt_factor):g} of the stable step, "
         words += "the program's own"
         after = step_after_motion(simulation)

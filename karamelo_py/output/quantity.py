@@ -74,7 +74,7 @@ class Quantity:
     def read(self) -> float | int | str:
         """The number or word; the first NaN is reported."""
         if self.is_word:
-            return self.hub.simulation.steps.ruling_limit
+            return self.hub.simulation.ruling_limit
         source = self._source()
         if isinstance(source, Expression):
             number = float(source.evaluate(self.hub.values))

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field
 from math import inf, isfinite, isnan
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -18,7 +19,7 @@ from karamelo_py.run.timings import Timings
 from karamelo_py.scene.comm import handled_signals
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
 SECONDS_PER_CHUNK = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
@@ -45,6 +46,7 @@ class RunLoop:
     advice: Listener = field(default_factory=Listener)
 
     signalled = 0  # number of a signal to this process
+    resumed_from: Path | None = None
     interrupted = 0  # signal that ends all processes
 
     def __post_init__(self, halve: bool) -> None:
@@ -108,24 +110,13 @@ class RunLoop:
             raise Interrupted(self.interrupted)
 
     def _take_up(self, simulation: Backend) -> None:
-        hub, file = self.hub, self.hub.restart.path
+        hub, self.resumed_from = self.hub, self.hub.restart.path
         hub.restart.take(hub, self.rollback.point, outputs=True)
         hub.restart = hub.interpreter.replay = None
         watched = simulation.control.step[0].watch_limit
         self.ruined = not watched and simulation.step > self.first_step
         simulation.go_on(self.end_time, self.rollback.point.halvings)
         self.tell(lambda to: to.begun(self, simulation, resumed=True))
-        # The file may hold the end of this run, or a later state.
-        step, time, last_step = simulation.step, simulation.time, self.last_step
-        holds = f"{file} holds step {step}, time {time:.6g}"
-        hint = "a longer run, or a file from before its end"
-        if step > last_step or time > self.end_time:
-            end = f"step {last_step}" if step > last_step else f"time {self.end_time:.6g}"
-            message = f"{holds}, which is beyond the end of this run, {end}: it takes no step"
-            self.hub.warn(message, hint=hint)
-        elif step == last_step or time == self.end_time or not self._condition_allows():
-            message = f"{holds}, the end of this run: it takes no further step"
-            self.hub.console.say(render_message("note", message, hint=hint))
 
     def _loop(self, simulation: Backend) -> None:
         hub, rollback, timings = self.hub, self.rollback, self.timings
@@ -163,7 +154,7 @@ class RunLoop:
     def _goes_on(self, simulation: Backend) -> bool:
         if not self._steps_left(simulation):
             return False
-        if self._condition_allows():
+        if self.condition_allows():
             self._agree(simulation)
             return not self.interrupted
         if simulation.step == self.first_step:
@@ -184,7 +175,7 @@ class RunLoop:
         end_time = simulation.control.step[0].end_time
         return simulation.step < self.last_step and simulation.time < end_time
 
-    def _condition_allows(self) -> bool:
+    def condition_allows(self) -> bool:
         if self.condition is None:
             return True
         values = self.hub.values

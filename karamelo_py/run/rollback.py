@@ -1,16 +1,14 @@
 """Return to the last good state of a run: to halve the step, or to end."""
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable
+from contextlib import suppress
 from typing import NoReturn
 
-from karamelo_py.kernels.step import DONE, GAINED, HEATED, STOPPED
-from karamelo_py.kernels.watch import GROWTH, LOOK, WITHIN, unit_of
+from karamelo_py.kernels.step import DONE, STOPPED
+from karamelo_py.kernels.watch import WITHIN
 from karamelo_py.run.backend import Backend
-from karamelo_py.run.checkpoint import restart_file
 from karamelo_py.run.checkpoint.parts import OUTPUTS, PartStates, RollbackPoint
+from karamelo_py.run.last_good import LastGood, OthersWait
 from karamelo_py.run.listening import Trouble, when
 from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
@@ -19,16 +17,10 @@ from karamelo_py.script.errors import ScriptError
 HALVINGS = 5  # per run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
 RETURNS = 2  # returns per state before an energy gain: two halvings without effect are enough
-LAST_GOOD = "last_good.*.h5"
-MOST_REPEATED = 100  # maximum steps repeated for the last rows of log and dumps
 
 
 class Stopped(ScriptError):
     """A run failed on all processes; its last good state is written."""
-
-
-class OthersWait(Exception):
-    """This process cannot write a file while others still send data for it."""
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
@@ -144,108 +136,18 @@ class RollBack:
         After an energy gain: the last state before it; log and dumps end with the last faultless
         state. If the step was too large from the start, only the initial state is good.
         """
-        too_large = self.too_large and self.simulation.steps.too_large
+        simulation = self.simulation
+        too_large = self.too_large and simulation.steps.too_large
         trouble = self._explained(status, too_large)
         resume, kind = "", ScriptError
         with suppress(OthersWait):
-            keep = self._keep_start if too_large else self._keep_good
-            resume = keep(status, trouble.code)
+            last = LastGood(self.hub, simulation, self.point)
+            if too_large:
+                resume = last.keep_start(status, writes=self.point.step == self.begun_at)
+            else:
+                resume = last.keep(status, trouble.code)
             kind = Stopped
         error = kind(trouble.message, place=trouble.place, hint=trouble.fix)
         error.code, error.cause, error.resume = trouble.code, trouble.cause, resume
         error.complete = trouble.place is not None
         raise error
-
-    def _keep_start(self, status: int, _: str) -> str:
-        """Write the initial state, end the outputs; return how to resume."""
-        simulation, good = self.simulation, self.point
-        step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
-        good.return_to(simulation)
-        if good.step == self.begun_at:
-            path = self._write_last_good()
-        present.give(self.hub)  # their files are unchanged
-        end = step - (status in (GAINED, HEATED))
-        if end - simulation.step <= MOST_REPEATED:
-            good.again(simulation.advance, end)
-            self._end_outputs()
-        return self._resume(path)
-
-    def _resume(self, path: Path | None, remark: str = "") -> str:
-        """Return the command that resumes; to a shell, the remark is a comment."""
-        if path is None:
-            return ""
-        names = self.hub.record.script, os.path.relpath(path), os.path.relpath(self.hub.folder)
-        script, file, folder = (f'"{name}"' if " " in name else name for name in names)
-        out = f" -out {folder}" if folder != os.curdir else ""
-        return f"karamelo-py {script} -restart {file}{out}" + (remark and f"  # {remark}")
-
-    def _keep_good(self, status: int, code: str) -> str:
-        """Write the last good state, end the outputs; return how to resume."""
-        simulation, good = self.simulation, self.point
-        step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
-        watch = simulation.energy_watch
-        grown, path = not watch.grown_little(), None
-        if grown:
-            path = self._write_before_growth(step)
-        else:
-            good.return_to(simulation)
-            if status not in (GAINED, HEATED, STOPPED):
-                # Nodal values depend on the number of steps per call: always the same here.
-                good.again(simulation.advance, step)
-        if status not in (GAINED, HEATED) and step > simulation.step:
-            before = watch.energy()
-            good.again(simulation.advance, step)
-            if path is None and watch.growth_since(before) > WITHIN:
-                # The monitor averages over 100 steps, so it is late.
-                grown, path = True, self._write_before_growth(step)
-                good.again(simulation.advance, step)
-        path = path or self._write_last_good()
-        if simulation.step < step:
-            present.give(self.hub)  # their files are unchanged, with later rows
-        self._end_outputs()
-        change = "boundary(delete)" if code == "left-domain" else simulation.remedy
-        return self._resume(path, f"{'before energy grew; ' * grown}with {change}")
-
-    def _write_before_growth(self, end: int) -> Path | None:
-        """Write the last state before step `end` without an energy gain."""
-        simulation, good = self.simulation, self.point
-        good.return_to(simulation)
-        energy = simulation.control.energy[0]
-        before = float(energy.balance)
-        while energy.watch_energy and simulation.step + LOOK < end:
-            look = simulation.step + LOOK - (simulation.step - 1) % LOOK
-            healthy = good.again(simulation.advance, look) == DONE
-            if not (healthy and simulation.energy_watch.grown_little()):
-                break
-            if energy.balance - before < GROWTH * unit_of(energy):
-                good.keep(simulation, forget=False)
-        good.return_to(simulation)
-        return self._write_last_good()
-
-    def _write_last_good(self) -> Path | None:
-        hub, path = self.hub, restart_file.path_of(self.hub, Path(LAST_GOOD))
-        may_be = hub.settings.comm.bcast(not path.exists() or restart_file.is_restart(path))
-        if not (hub.output.takes_part and may_be):
-            return None
-        with self._as_warnings():
-            path = restart_file.write(hub, Path(LAST_GOOD), within=True)
-            # restart(...) would write the same state again.
-            for item in hub.output.last:
-                item.last_step = hub.update.step
-            return path
-        return None
-
-    def _end_outputs(self) -> None:
-        with self._as_warnings():
-            self.hub.output.write(last=True)
-
-    @contextmanager
-    def _as_warnings(self) -> Iterator[None]:
-        try:
-            yield
-        except ScriptError as error:
-            hub = self.hub
-            hub.warn(error.message, hint=error.hint, place=error.place)
-            if hub.settings.comm.size > 1:
-                hub.settings.comm.failed_within = True
-                raise OthersWait from None

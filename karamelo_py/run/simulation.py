@@ -17,6 +17,7 @@ from karamelo_py.run.light_nodes import stable_share
 from karamelo_py.run.lower.hooks import ActingFixes, FixesOfRun, views_of
 from karamelo_py.run.mpi.whole import PointsMoved
 from karamelo_py.run.scene_arrays import SceneArrays
+from karamelo_py.run.stable_step import ruling_limit
 from karamelo_py.run.step_size import StepSize
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -59,6 +60,10 @@ class Simulation(SceneArrays):
     def light_nodes(self) -> float:
         """Stable step over h/c allowed by the nodes of thin and round solids."""
         return stable_share(self.hub, self.setup.grids)
+
+    @property
+    def ruling_limit(self) -> str:
+        return ruling_limit(self)
 
     @property
     def flags(self) -> tuple[bool, ...]:

@@ -4,7 +4,8 @@ from math import inf, sqrt
 
 import numpy as np
 
-from karamelo_py.kernels.arrays import Tag
+from karamelo_py.kernels.arrays import DT, Tag
+from karamelo_py.kernels.clock import STRIDE
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.kinematics import total
 from karamelo_py.points.laws import (
@@ -224,3 +225,30 @@ def stable_conduction(hub: Hub) -> float:
             capacity = heat_capacity(law, 1.0) / specific_volume(law)
             limits.append((solid.h / per_cell) ** 2 / (4 * hub.domain.dimension) * capacity / kappa)
     return min(limits)
+
+
+def ruling_limit(state: SceneState) -> str:
+    """Name of the present limit of the step (docs/energy.md); of stability but set_dt, end."""
+    step, motion = state.control.step[0], state.control.motion[0]
+    dt, heat = state.control.values[DT], state.control.heat[0]
+    if step.fixed_dt > 0:
+        return "set_dt"
+    waves = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
+    of_waves, of_heat = step.dt_factor * waves, step.heat_factor * heat.heat_limit
+    if motion.weight != 1 and motion.speed * dt * (1 + 1e-9) >= STRIDE:
+        return "speed"
+    if dt < min(of_waves, of_heat) * (1 - 1e-9):
+        return "end"
+    if of_heat < of_waves:
+        return "conduction"
+    speed = state.fastest(motion.common[0])
+    if speed > 0.5 * motion.rate:
+        return "speed"
+    undeformed = [elastic_speed(state, solid) for solid in state.hub.solids.values()]
+    without = max(wave for wave, _ in undeformed)
+    slowed = any(viscous for _, viscous in undeformed)
+    if slowed and 0 < without < (motion.rate - speed) / SLOWED:
+        return "viscosity"
+    if step.courant < 1:
+        return "lone_points" if step.courant == lone_point(state.hub) else "light_nodes"
+    return "waves"

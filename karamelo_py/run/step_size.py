@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from karamelo_py.kernels.arrays import DT, TIME, Control, Tag
-from karamelo_py.kernels.clock import STILL, STRIDE, choose_dt
+from karamelo_py.kernels.clock import STILL, choose_dt
 from karamelo_py.kernels.step import measure
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.stable_step import (
-    SLOWED,
     common_velocity,
     courant_number,
-    elastic_speed,
     keeping_share,
-    lone_point,
     own_step_of_waves,
     own_weight_of_drift,
     stable_conduction,
@@ -31,8 +27,6 @@ from karamelo_py.schemes.traits import DEFAULT_SHARE
 from karamelo_py.script.errors import ScriptError
 
 NO_STRIDE = 1e9  # cells, further than points ever move
-
-EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
 
 
 class StepPolicy(NamedTuple):
@@ -228,34 +222,3 @@ class StepSize:
         """Watch the limit, unless the user's step exceeds it from the start."""
         self.step.watch_limit = int(not self.above_limit() and not self.simulation.implicit)
         self.step.over_limit = 0
-
-    @property
-    def words_of_limit(self) -> str:
-        return self.ruling_limit + EXPLAINED.get(self.ruling_limit, "")
-
-    @property
-    def ruling_limit(self) -> str:
-        """Name of the present limit of the step (docs/energy.md); of stability but set_dt, end."""
-        simulation, step, motion = self.simulation, self.step, self.motion
-        dt, heat = self.control.values[DT], self.control.heat[0]
-        if step.fixed_dt > 0:
-            return "set_dt"
-        waves = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
-        of_waves, of_heat = step.dt_factor * waves, step.heat_factor * heat.heat_limit
-        if motion.weight != 1 and motion.speed * dt * (1 + 1e-9) >= STRIDE:
-            return "speed"
-        if dt < min(of_waves, of_heat) * (1 - 1e-9):
-            return "end"
-        if of_heat < of_waves:
-            return "conduction"
-        speed = simulation.fastest(motion.common[0])
-        if speed > 0.5 * motion.rate:
-            return "speed"
-        undeformed = [elastic_speed(simulation, solid) for solid in simulation.hub.solids.values()]
-        without = max(wave for wave, _ in undeformed)
-        slowed = any(viscous for _, viscous in undeformed)
-        if slowed and 0 < without < (motion.rate - speed) / SLOWED:
-            return "viscosity"
-        if step.courant < 1:
-            return "lone_points" if step.courant == lone_point(simulation.hub) else "light_nodes"
-        return "waves"

@@ -72,7 +72,7 @@ class RunPage(Rhythmic, Listener):
         gain = -100 * simulation.energy_watch.share_lost() if has_gain else None
         why = unknown_work(hub)
         self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""
-        limit = "load steps" if simulation.implicit else simulation.steps.ruling_limit
+        limit = "load steps" if simulation.implicit else simulation.ruling_limit
         self._rows.append(Row(hub.update.step, hub.update.time, hub.update.dt, limit, gain, log))
         self.frames.add(self._taken())
         self.server.changed()
