@@ -55,7 +55,6 @@ class Narrator(Listener):
             known_failures.warn_about_length(hub, simulation, run.end_time)
 
     def _tell_of_end(self, run: RunLoop, simulation: Simulation) -> None:
-        """The file may hold the end of the run, or a later state."""
         step, time, last_step = simulation.step, simulation.time, run.last_step
         holds = f"{run.resumed_from} holds step {step}, time {time:.6g}"
         hint = "a longer run, or a file from before its end"

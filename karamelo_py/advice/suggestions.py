@@ -136,7 +136,6 @@ def _flat(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _moves_nothing(hub: Hub, k: int, rest: list[int]) -> bool:
-    """Fixes neither act along k nor depend on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         if len(formulas) <= len(rest) or not is_zero(formulas[k]):
@@ -288,7 +287,6 @@ def _precision(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _output(hub: Hub, simulation: Simulation) -> Words:
-    """Output that takes seconds, and longer than the steps."""
     span = simulation.control.step[0].end_time - hub.update.time
     steps = span / simulation.dt
     if not np.isfinite(steps):

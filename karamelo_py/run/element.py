@@ -148,7 +148,6 @@ class Point:
     def _go(
         self, motion: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
     ) -> np.ndarray:
-        """Go from fraction `a` of a path to `b`; halve increments that fail."""
         try:
             solution = self._solve(motion, (b - a) * duration, a, b, rate)
         except Unreachable:
@@ -162,7 +161,6 @@ class Point:
     def _solve(
         self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
     ) -> np.ndarray:
-        """Solve an increment for the strains with prescribed stress."""
         prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
         increment = (b - a) * motion.strain
         rigid = self._turned((b - a) * motion.turn, dt)

@@ -44,7 +44,6 @@ class LastGood(NamedTuple):
         return self._resume(path)
 
     def _resume(self, path: Path | None, remark: str = "") -> str:
-        """Return the command that resumes; to a shell, the remark is a comment."""
         if path is None:
             return ""
         names = self.hub.record.script, os.path.relpath(path), os.path.relpath(self.hub.folder)
@@ -80,7 +79,6 @@ class LastGood(NamedTuple):
         return self._resume(path, f"{'before energy grew; ' * grown}with {change}")
 
     def _write_before_growth(self, end: int) -> Path | None:
-        """Write the last state before step `end` without an energy gain."""
         simulation, good = self.simulation, self.good
         good.return_to(simulation)
         energy = simulation.control.energy[0]

@@ -130,7 +130,8 @@ class RunLoop:
 
         while self._goes_on(simulation):
             rollback.before()
-            step, before = simulation.step, {name: timings.passed(name) for name in timings.on}
+            step, compiled = simulation.step, timings.on["compilation"][0]
+            begun = timings.on["steps"][0]
             kept = (step // most + 1) * most  # where a state may be stored
             end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             end = min([end, *((step // every + 1) * every for every in rhythms)])
@@ -142,14 +143,13 @@ class RunLoop:
                 continue
             self.tell(lambda to: to.stepped(simulation))
             rollback.act_between_steps()
-            elapsed = simulation.comm.bcast(timings.passed("steps") - before["steps"])
+            elapsed = simulation.comm.bcast(timings.on["steps"][0] - begun)
             in_time = SECONDS_PER_CHUNK * max(simulation.step - step, 1) / max(elapsed, 1e-9)
             length = int(min(longest, max(1, in_time)))
             with timings.counted("output"):
                 if self._steps_left(simulation):
                     hub.output.write()
-                anew = timings.passed("compilation") > before["compilation"]
-                self._show_progress(simulation, anew=anew)
+                self._show_progress(simulation, anew=timings.on["compilation"][0] > compiled)
 
     def _goes_on(self, simulation: Backend) -> bool:
         if not self._steps_left(simulation):
@@ -203,7 +203,6 @@ class RunLoop:
         console.progress(simulation.step, simulation.time, fraction, within)
 
     def _note(self, number: int, _: FrameType | None = None) -> None:
-        """End after the present chunk; a second signal ends at once."""
         if self.signalled:
             raise KeyboardInterrupt
         self.signalled = number

@@ -41,7 +41,6 @@ def _first_bad(simulation: SceneState) -> tuple | None:
 def _places(
     simulation: SceneState, group: ParticleGroup | NodeGroup, formula: Expression
 ) -> Iterator[tuple]:
-    """Yield numbers, positions (n, d) and initial positions where a fix evaluates a formula."""
     if not formula.names.intersection(POINT_SEEDS):
         yield np.zeros(1, np.int64), np.empty((1, 0)), None
     elif isinstance(group, NodeGroup):

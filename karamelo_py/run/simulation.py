@@ -181,7 +181,6 @@ class Simulation(SceneArrays):
         return SORT  # unfinished, unless all steps are done
 
     def _take(self, hooks: Tag, count: int) -> int:
-        """Take compiled steps, row by row if Python acts between the rows."""
         if isinstance(hooks, ActingFixes):
             return run_steps(self.step_kind._replace(visits=Staged()), self.setup, hooks, count)
         return advance(self.step_kind, self.setup, hooks, count)

@@ -62,17 +62,13 @@ class StepPolicy(NamedTuple):
         }
 
 
-class Carried(NamedTuple):
-    """Numbers of the clock that the next lowering takes over."""
-
-    last_dt: float
-    last_contact_dt: float
-    path: float
+Carried = tuple[float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
+    """Last steps, of motion and of contact, and path: for the next lowering."""
     step = control.step[0]
-    return Carried(float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path))
+    return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
 
 
 def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> None:
@@ -219,6 +215,5 @@ class StepSize:
         return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:
-        """Watch the limit, unless the user's step exceeds it from the start."""
         self.step.watch_limit = int(not self.above_limit() and not self.simulation.implicit)
         self.step.over_limit = 0

@@ -26,10 +26,7 @@ class Timings:
         self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
         self._depth = 0  # of nested compilation
         self._begun = np.zeros(2)
-        self._told = False
-
-    def passed(self, name: str) -> float:
-        return float(self.on[name][0])
+        self._says = True
 
     @contextmanager
     def counted(self, name: str) -> Iterator[None]:
@@ -39,7 +36,6 @@ class Timings:
 
     @contextmanager
     def telling_of_compilation(self) -> Iterator[None]:
-        self._told = False
         telling = files.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
         with compilation.told_to(self), telling:
             yield
@@ -49,9 +45,9 @@ class Timings:
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()
-            if not self._told:
+            if self._says:
                 self.hub.console.say(COMPILING)
-                self._told = True
+            self._says = False
 
     def on_end(self) -> None:
         self._depth -= 1

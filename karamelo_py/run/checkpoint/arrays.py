@@ -447,7 +447,6 @@ def _points(
 
 
 def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
-    """Cut ranges with these ends into groups of about `PIECE` rows."""
     total = int(ends[-1]) if len(ends) else 0
     cuts = np.searchsorted(ends, np.arange(PIECE, total, PIECE), side="right")
     return pairwise([*np.unique([0, *cuts]).tolist(), len(ends)])

@@ -146,7 +146,6 @@ def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> 
 
 
 def _checksum(data: "h5py.Dataset", file: BinaryIO) -> int:
-    """Return an array's checksum: of a piece of the file, unless it is compressed."""
     begin, crc, left = data.id.get_offset(), 0, data.id.get_storage_size()
     if begin is None:
         return zlib.crc32(np.ascontiguousarray(data[()]))

@@ -135,7 +135,6 @@ class LoadSteps:
         control.values[TIME], control.values[TIMESTEP] = end, step + (self.parts > 0)
 
     def _tell_of_long_way(self, equilibrium: "Equilibrium") -> None:
-        """Report once that points cross cells within a load step, which costs accuracy."""
         far = equilibrium.equations.furthest() / float(np.min(self.simulation.setup.grids.spacing))
         if far <= LONG_WAY or self.dynamic or not self.simulation.setup.frame.moves:
             return
@@ -355,7 +354,6 @@ class LoadSteps:
         return f"step {int(values[TIMESTEP]) + 1}, time {float(values[TIME]):.6g}"
 
     def _check_held(self, equations: Equations, fixed: np.ndarray, contact: Contact | None) -> None:
-        """Refuse bodies (nodes that points connect) that can move as a whole."""
         s = equations.s
         bodies = equations.bodies()
         motions = equations.rigid_motions

@@ -167,7 +167,6 @@ class Newton:
         return np.where(free, x, jump)
 
     def _wrong(self, u: np.ndarray) -> Failed:
-        """Explain why the forces after displacements (m, d) are not finite."""
         if not np.all(np.isfinite(u)):
             return Failed("displacements are no finite numbers")
         places = self.equations.s.kin.Tensor.places

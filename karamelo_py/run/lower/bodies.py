@@ -83,7 +83,6 @@ def _of(solid: Solid, count: int) -> np.ndarray:
 
 
 def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
-    """Refuse what rigid bodies do not support, before the run."""
     bodies = {fix.body for fix in moving}
     for fix in hub.fixes.values():
         if isinstance(fix, ContactRigidBody):

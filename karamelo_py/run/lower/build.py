@@ -161,10 +161,13 @@ def lower(
     if hub.update.thermal:
         means = lower_nodes((NodalMean,), Line(), count, real)
         heat = Conducting(means, tiles.empty_buffers(means, len(hub.solids)))
-    nodes = lower_nodes(node_kinds(hub, basis, contact), kin, count, real)
+    owners = owners_of_fields(hub, contact)
+    of_nodes = [kind for kind in fields.declared(owners, "node_fields") if kind.needed(basis)]
+    of_nodes += [EnergyLoss] * returns_loss(hub) + [FrictionalHeat] * warms_by_friction(hub)
+    nodes = lower_nodes(of_nodes, kin, count, real)
     if previous is not None:
         resume_nodes(nodes, grids, previous)
-    kinds = fields.declared(owners_of_fields(hub, contact), "point_fields")
+    kinds = fields.declared(owners, "point_fields")
     blocks = (
         arrays.Block(*lower_points(hub, solids, kin, kinds, real), tiles.empty_tiling())
         for solids in solids_alike(hub, ids)
@@ -185,12 +188,6 @@ def fixes_of_bodies(hub: Hub) -> tuple:
     """Return the fixes of free rigid bodies, and those that hold nodes; () without bodies."""
     fixes = [fix for fix in hub.fixes.values() if fix.body or fix.prescribes_velocity]
     return tuple(fixes) if any(fix.body for fix in fixes) else ()
-
-
-def node_kinds(hub: Hub, basis: NamedTuple, contact: NamedTuple) -> list[type]:
-    declared = fields.declared(owners_of_fields(hub, contact), "node_fields")
-    kinds = [kind for kind in declared if kind.needed(basis)]
-    return kinds + [EnergyLoss] * returns_loss(hub) + [FrictionalHeat] * warms_by_friction(hub)
 
 
 def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:

@@ -126,7 +126,6 @@ def _expect(part: PartInUse, function: Tag, value: object, count: int, kind: typ
 
 
 def _numbers(part: PartInUse, name: str, values: Iterable, one: Number) -> None:
-    """Refuse values that are not finite numbers, or more precise than the run."""
     for number in values:
         if not isinstance(number, (int, float, np.number)):
             raise fault(part.name, f"{name} is {number!r} for some point, no number", part.place)

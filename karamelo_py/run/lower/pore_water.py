@@ -43,7 +43,6 @@ class PoreWater(NamedTuple):
 
 
 def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
-    """Yield what is not supported, what to write instead, and the line."""
     update, settings = hub.update, hub.settings
     method, basis = update.method, type(update.method.basis)
     name = registry.name_of("method", type(method))
