@@ -192,7 +192,10 @@ def text_of(
     return name, text.replace(NAME + ENTRY, f"{name}_entry").replace(NAME, name)
 
 
-def numbers_of(function: Callable, arguments: tuple) -> int:
+def numbers_of(function: Callable, arguments: tuple, i: int) -> int:
+    """Count the numbers that a function of a thread `i` returns."""
+    if INTERPRETED:
+        return len(function(*arguments, i))
     kinds = plan_for(arguments).types
     with in_one({}):
         return len(traced(function, (*kinds, types.int64)).result)

@@ -35,6 +35,7 @@ MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; STATUS: 0, or 1 + a s
 BEHIND = 2.0**53  # above all numbers of points
 CHUNK = 64  # items that one thread sums
 WARP = 32  # threads that read memory together
+REGISTERS = {4: 200, 8: 130}  # words summed by a cell's thread, by size of a number
 OCCUPIED = 1 << 40  # in `CellLists.sums`: added per cell with points
 
 
@@ -113,16 +114,20 @@ def is_last(s):
 class Stage:
     """A visit of the points as thread functions.
 
-    `columns`: (array, column, whether it adds) of each column of nodes it sums, of the arrays
-    `present`. The nodes of a cell are summed in `parts`.
+    `columns`: (array, column, whether it adds) of each column of nodes it sums. The nodes of a cell
+    are summed in `parts`.
     """
 
-    def __init__(self, row: Any, s: Any, present: list):
+    def __init__(self, row: Any, s: Any):
         basis, kin, quantities = s.basis, s.kin, row.visit.quantities
-        self.row, self.parts, self.at = row, 1, row.at or (lambda s: s)
+        self.row, self.at = row, row.at or (lambda s: s)
+        present = ["sums", "velocity", *(type(one) for one in self.at(s).nodes.fields)]
         self.lists = isinstance(row.visit.weights, sweep.PresentWeights)  # sorts points by cell
         self.columns = columns_in_turn(quantities, kin, present)
         self.support = nodes_in_cell(basis, kin)
+        size = s.nodes.sums.itemsize
+        words = size // 4 * len(self.columns) * self.support
+        self.parts = max(1, -(-words // REGISTERS[size]))
         self.corners = int(support(basis, kin)) // self.support  # listed per point
         self.scatters = bool((row.scatters or row.only_if_more) and quantities)
         self._point_functions()

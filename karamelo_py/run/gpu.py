@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
-from karamelo_py.compiler import INTERPRETED
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of
 from karamelo_py.kernels import arrays, gpu, heat, table
@@ -30,7 +29,6 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.script.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
 
 POLL = 64  # steps between reads of `fate`
-REGISTERS = {4: 200, 8: 130}  # words summed by a cell's thread, by size of a number
 FAR = 1.0  # cells that points move before they are reordered
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # of launches
 Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
@@ -112,15 +110,6 @@ class StepsOnCard:
 
     # --- device memory
 
-    def visit(self, row: Any) -> gpu.Stage:
-        nodes = (row.at(self.s) if row.at else self.s).nodes
-        present = ["sums", "velocity", *(type(one) for one in nodes.fields)]
-        stage = gpu.Stage(row, self.s, present)
-        size = self.s.nodes.sums.itemsize
-        words = size // 4 * len(stage.columns) * stage.support
-        stage.parts = max(1, -(-words // REGISTERS[size]))
-        return stage
-
     def _cells(self, block: Any) -> gpu.CellLists:
         """Make the lists of points by cell, and room for the largest sums and loads."""
         nodes, new, points = self.nodes, self.images.new, block.points.mass.size * self.corners
@@ -132,22 +121,15 @@ class StepsOnCard:
         count, real = np.zeros(nodes, np.int32), self.s.nodes.sums.dtype
         self.images.of(count)
         self.images.send([count])
-        most = max((visit.numbers for visit in self.visits.values()), default=0)
-        loads = (self._count_loads(block), block.points.mass.size)
+        visits = self.visits.values()
+        most = max((visit.numbers for visit in visits), default=0)
+        of_load = (numbers_of(visit.load, (self.s, block), 0) for visit in visits if visit.scatters)
+        loads = (max(of_load, default=0), block.points.mass.size)
         return gpu.CellLists(
             count, new((points,), np.int32), new((nodes + 1,), np.int32),
             new((nodes + 1,), np.int32), new((boxes,), np.int32), new((points,), np.int32),
             new(sums, np.int64), new(sums, np.int64), new(loads, real), new((most, boxes), real),
         )  # fmt: skip
-
-    def _count_loads(self, block: Any) -> int:
-        loads = [visit.load for visit in self.visits.values() if visit.scatters]
-        if INTERPRETED:
-            counts = [len(load(self.s, block, 0)) for load in loads]
-        else:
-            arguments = self.images.of((self.s, block))
-            counts = [numbers_of(load, arguments) for load in loads]
-        return max(counts, default=0)
 
     # --- launches
 
@@ -459,7 +441,7 @@ def _repeated(row: table.Repeated, steps: StepsOnCard) -> Iterator:
 
 @_on_card.register
 def _visited(row: table.Sweep, steps: StepsOnCard) -> Iterable:
-    steps.visits[id(row)] = steps.visit(row)
+    steps.visits[id(row)] = gpu.Stage(row, steps.s)
     return (row,)
 
 
