@@ -213,10 +213,11 @@ class StepsOnCard:
 
     # --- hooks of fixes
 
-    def _called(self, h: int) -> dict:
-        """Map callees by address to the functions of a hook."""
-        own = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
-        return {**own, EVALUATE: evaluate_in_table if self._has_formulas(h) else _no_formula}
+    def _hook(self, h: int) -> tuple[fixes.Act, dict]:
+        """Return a hook for launches, and the functions that it calls by address."""
+        called = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
+        called[EVALUATE] = evaluate_in_table if self._has_formulas(h) else _no_formula
+        return fixes.Act(self.hooks, h, self.heavy, self.copies), called
 
     def _has_formulas(self, h: int) -> bool:
         return any(program.begin < program.end for program in self.hooks.programs[h])
@@ -248,20 +249,19 @@ class StepsOnCard:
                 yield self._act(fixes.on_node(nodes_of, ACT, self._values(h), length), h, s)
             elif target != arrays.ON_VELOCITY:
                 act = fixes.on_node(fixes.whole_nodes(target, stage), ACT)
-                yield self._act(act, h, s, self._whole(h))
+                yield self._act(act, h, s, *self._whole(h))
             yield from self._publish_at_once(h)
         for h in own:
             if self.hooks.programs[h][FRICTION].begin >= 0:
                 yield self._act(fixes.on_node(nodes_of, RUB), h, s)
                 yield from self._publish_at_once(h)
 
-    def _whole(self, h: int) -> arrays.Tag:
-        (tag,) = (one for one in self.hooks.whole if one.row == h)
-        return tag
+    def _whole(self, h: int) -> tuple[arrays.Tag, ...]:
+        """Return the tag of a hook on whole points or nodes."""
+        return tuple(one for one in self.hooks.whole if one.row == h)
 
     def _act(self, function: Callable, h: int, s: arrays.Setup, *tag: arrays.Tag) -> KernelLaunch:
-        about, called = fixes.Act(self.hooks, h, self.heavy, self.copies), self._called(h)
-        row = self.table[h]
+        row, (about, called) = self.table[h], self._hook(h)
         count = self.nodes if row.begin < 0 else int(row.end - row.begin)
         return self.launch(function, count, s, about, *tag, called=called)
 
@@ -274,20 +274,16 @@ class StepsOnCard:
             if stage == arrays.INITIAL_INTEGRATE and len(self.table) and self.hooks.whole:
                 yield self.of_points(fixes.clear_force, block)
             for h in own:
-                about, called = fixes.Act(self.hooks, h, self.heavy, self.copies), self._called(h)
-                if self.table[h].address != arrays.WHOLE:
-                    act = fixes.on_point(points_of, then, self._values(h))
-                    yield self.of_points(act, block, about, called=called)
-                else:
-                    act, tag = fixes.on_point(fixes.whole_points(heats), then), self._whole(h)
-                    yield self.of_points(act, block, about, tag, called=called)
+                (about, called), whole = self._hook(h), self._whole(h)
+                points = fixes.whole_points(heats) if whole else points_of
+                act = fixes.on_point(points, then, self._values(h))
+                yield self.of_points(act, block, about, *whole, called=called)
         for h in own:
             yield from self._publish_at_once(h)
 
     def work_of_loads(self, target: int) -> Iterator[KernelLaunch]:
         if len(self.table) and self.hooks.loads.size:
-            about = fixes.Act(self.hooks, 0, self.heavy, self.copies)
-            called = self._called(0)
+            about, called = self._hook(0)
             yield self.launch(fixes.work_of_loads, self.nodes, self.s, about, target, called=called)
 
     # --- totals, and the energy monitor
