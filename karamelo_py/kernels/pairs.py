@@ -12,16 +12,15 @@ import numpy as np
 from karamelo_py.compiler import at_hand, kernel, noinline
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.kernels.arrays import Tag, vector_at
+from karamelo_py.kernels.rubbing import rubbed
 from karamelo_py.kernels.views import state_at, volume_of
 from karamelo_py.points.bodies import (
     NEW,
-    FrictionMemory,
     MinimizePenetration,
     TouchingPair,
     along,
     force_between,
     radius,
-    rub,
 )
 from karamelo_py.points.kinematics import zero_vector
 
@@ -271,13 +270,9 @@ def _rub(push, bodies, i, contact):
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
     slid = push.step if grip[i, d] > 0 else 0.0  # 0 if it did not touch before
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
-    load = contact[0]
-    memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
-    force, (hold, mean, unused) = rub(push.law.friction, load, memory, push.dt * slide)
+    force = rubbed(push.law.friction, contact[0], hold, push.dt * slide, (grip, i))
     for k in range(d):
-        grip[i, k] = hold[k]
         contact[1 + d + k] = force[k]
-    grip[i, d], grip[i, d + 1] = mean, unused
 
 
 @noinline

@@ -19,6 +19,17 @@ class Rubbing(NamedTuple):
     stop: np.ndarray  # (n, d) forces that stop the slip
 
 
+def rubbed(mu, load, hold, stop, at):
+    """Return the friction (d,) on a point; update its row `i` of the memory: ``at`` (grip, i)."""
+    (grip, i), d = at, len(hold)
+    memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
+    force, (hold, mean, unused) = rub(mu, load, memory, stop)
+    for k in range(d):
+        grip[i, k] = hold[k]
+    grip[i, d], grip[i, d + 1] = mean, unused
+    return force
+
+
 @kernel
 def rub_points(kin, mu, rubbing, grip, force):
     """Add the friction of n points to `force` (n, d); update `grip` (n, d + 2)."""
@@ -28,9 +39,6 @@ def rub_points(kin, mu, rubbing, grip, force):
         n = vector_at(kin, normal, i, 0, none)
         hold = along(vector_at(kin, grip, i, 0, none) + vector_at(kin, pull, i, 0, none), n)
         stopping = along(vector_at(kin, stop, i, 0, none), n)
-        memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
-        friction, (hold, mean, unused) = rub(mu, load[i], memory, stopping)
+        friction = rubbed(mu, load[i], hold, stopping, (grip, i))
         for k in range(d):
             force[i, k] += friction[k]
-            grip[i, k] = hold[k]
-        grip[i, d], grip[i, d + 1] = mean, unused
