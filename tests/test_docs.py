@@ -411,7 +411,7 @@ def _tried(lines, dimension, folder):
             interpreter.run_text(f"material(wet, linear, 1000, 1000, 0.3)\n{wet}")
         kind = (
             "nodes"
-            if words[2] in ("body_force", "pore_pressure") or "_nodes" in line
+            if words[2] in ("absorbing", "body_force", "pore_pressure") or "_nodes" in line
             else "particles"
         )
         if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):

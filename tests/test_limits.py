@@ -12,7 +12,7 @@ ROWS = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", PAGE, re.M)[1:]
 # What a row calls missing: styles that would end it, as (family, part of a name).
 STYLES = {
     "pores that are partly": [("command", "unsaturated"), ("fix", "suction")],
-    "inflow, outflow": [("fix", "inflow"), ("fix", "outflow"), ("fix", "absorbing")],
+    "inflow and outflow": [("fix", "inflow"), ("fix", "outflow")],
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],

@@ -31,6 +31,15 @@ class PoreWater(NamedTuple):
     def around(self, law: NamedTuple) -> NamedTuple:
         return Saturated(law, *self)
 
+    @property
+    def stiffness(self) -> float:
+        """Of the water in the pores, per strain."""
+        return self.K / self.n
+
+    def heavier(self, dry: float) -> float:
+        """Density of soil and water over the `dry` density."""
+        return 1 + self.n * self.rho / dry
+
     def check(self, hub: Hub) -> None:
         """Refuse unsupported combinations, all in one message."""
         errors = [

@@ -1,0 +1,76 @@
+"""Edges through which waves leave."""
+
+import pytest
+
+ROCK = """
+    h = 1
+    method({way})
+    dimension(1, 0, 100, h)
+    region(bar, block, 0, 100)
+    material(rock, linear, 2500, 50e9, 0.25)
+    {water}
+    solid(rock, region, bar, 2, rock, h, 0)
+    region(right, block, 100 - 1e-6, INF)
+    region(left, block, -INF, 1e-6)
+    group(right, nodes, region, right, all)
+    group(left, nodes, region, left, all)
+    fix(right, absorbing, right, rock, xhi)
+    fix(left, absorbing, left, rock, xlo)
+    compute(k, kinetic_energy, all)
+    compute(e, strain_energy, all)
+    E = k + e
+"""
+# A pulse of ten cells to either side; lambda is a third of the P-wave modulus, 60 GPa.
+PULSE = """
+    c = sqrt(60e9/2500)
+    fix(v, initial_velocity_particles, all, exp(-((x0 - 60)/5)^2))
+    fix(s, initial_stress, all, {p}, {p}/3, {p}/3, 0, 0, 0)
+    log_modify(custom, time, E)
+    set_output(1000)
+    run_time(80/c)
+"""
+
+
+@pytest.mark.xdist_group("absorbing")
+@pytest.mark.parametrize("way", ["tlmpm, FLIP, linear, 1", "ulmpm, FLIP, quadratic-spline, 1"])
+def test_a_wave_leaves(run_script, way):
+    """Lysmer & Kuhlemeyer 1969: exact at normal incidence; here 0.16 and 0.09 % of the energy."""
+    pulse = PULSE.format(p="-2500*c*exp(-((x0 - 60)/5)^2)")
+    energy = run_script(ROCK.format(way=way, water="") + pulse).log["E"]
+    assert energy[-1] < 0.002 * energy[0]
+
+
+def test_ground_with_its_stress_stays(run_interpreted):
+    """The edge takes over the force that holds it: weight does not push it away."""
+    script = ROCK.format(way="tlmpm, FLIP, linear, 1", water="").replace("h = 1", "h = 10")
+    at_rest = """
+        fix(weight, body_force, all, -9.81)
+        fix(s, initial_stress, all, 2500*9.81*(x0 - 100), 0, 0, 0, 0, 0)
+        log_modify(custom, time, k, left_x)
+        run(30)
+    """
+    log = run_interpreted(script.replace("fix(right, abs", "# ") + at_rest).log
+    assert log["k"].max() < 1e-12
+    assert abs(log["left_x"][-1] - 2500 * 9.81 * 100) < 1
+
+
+def test_a_side_that_is_not_there_is_refused(run_interpreted):
+    script = ROCK.format(way="ulmpm, FLIP, linear, 1", water="").replace("xhi", "yhi")
+    err = run_interpreted(script + "run(1)", status=1).err
+    assert "the scene has no direction y" in err
+    assert err.count("error:") == 1
+
+
+@pytest.mark.xdist_group("pore water")
+def test_a_wave_leaves_saturated_ground(run_script):
+    """rho c of soil and water together, which move as one."""
+    water = "pore_water(rock, n=0.3, permeability=1e-7)"
+    pulse = """
+        fix(v, initial_velocity_particles, all, exp(-((x0 - 60)/5)^2))
+        log_modify(custom, time, k)
+        set_output(1000)
+        run_time(80/sqrt((60e9 + 2.2e9/0.3)/2800))
+    """
+    way = "tlmpm, FLIP, linear, 1"
+    energy = run_script(ROCK.format(way=way, water=water) + pulse).log["k"]
+    assert energy[-1] < 0.003 * energy[0]
