@@ -14,7 +14,7 @@ from karamelo_py.advice.basics import BasicFacts
 from karamelo_py.advice.bodies import sides
 from karamelo_py.language.rules import code_of
 from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
-from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
+from karamelo_py.points.laws import law_kind, law_traits, specific_volume
 from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.run.listening import when
@@ -72,7 +72,7 @@ def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
     With impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
     returned through the thinner solid.
     """
-    bodies = [b for b in facts.bodies if not can(b.solid.material.law, constrained_velocity)]
+    bodies = [b for b in facts.bodies if not b.solid.rigid]
     if not bodies:
         return
     c = np.array([stable_step.elastic_speed(facts.simulation, body.solid)[0] for body in bodies])

@@ -16,7 +16,7 @@ from karamelo_py.advice.neighbours import bent_row, parting, uneven
 from karamelo_py.compiler.fields import declared
 from karamelo_py.language import rules
 from karamelo_py.points import transfers
-from karamelo_py.points.laws import can, constrained_velocity, law_parts
+from karamelo_py.points.laws import law_parts
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
@@ -101,9 +101,7 @@ class SceneFacts(BasicFacts):
     @cached_property
     def moving_walls(self) -> bool:
         """True if a rigid solid moves or a fix leads its points."""
-        rigid = [
-            can(solid.material.law, constrained_velocity) for solid in self.hub.solids.values()
-        ]
+        rigid = [solid.rigid for solid in self.hub.solids.values()]
         led = (fix for fix in self.hub.fixes.values() if fix.leads_points)
         led = (fix for fix in led if not all(map(is_zero, fix.formulas)))
         moving = (rigid[m.number] and np.any([m.slow, m.fast]) for m in self.motions)

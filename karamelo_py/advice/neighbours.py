@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.advice.basics import BasicFacts
 from karamelo_py.advice.bodies import fixed_directions, vibrating
 from karamelo_py.advice.crossing import BodyBoxes, boxes_of, meetings
-from karamelo_py.points.laws import can, constrained_velocity, specific_volume
+from karamelo_py.points.laws import specific_volume
 from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
@@ -57,7 +57,7 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None
-    free = [b for b in facts.bodies if not can(b.solid.material.law, constrained_velocity)]
+    free = [b for b in facts.bodies if not b.solid.rigid]
     lo, hi = (np.array([getattr(b.solid, end) for b in free]) for end in ("lo", "hi"))
     for a, body in enumerate(free[:-1]):
         ahead = slice(a + 1, None)

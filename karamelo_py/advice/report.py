@@ -164,7 +164,7 @@ def stages(hub: Hub, simulation: Simulation) -> list[str]:
             once = " (first step only)" if fix.first_step_only else ""
             acting.setdefault(name, []).append(fix.id + once)
     lines = [f"{name}: {', '.join(ids)}" for name, ids in acting.items()]
-    scheme = hub.update.scheme
+    scheme = simulation.scheme
     if simulation.implicit:
         parts = one_by_one(scheme.begin), one_by_one(scheme.close)
         words = [[t for row in rows if (t := says(row, simulation.setup))] for rows in parts]

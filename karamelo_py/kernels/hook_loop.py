@@ -26,6 +26,7 @@ from karamelo_py.points.bodies import face
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import is_rigid
+from karamelo_py.points.transfers import Moment
 from karamelo_py.script.formula import BLOCK, ROWS, STACK, call_evaluate
 
 # Each bare number would be a type.
@@ -80,6 +81,7 @@ class MovingPoints(NamedTuple):
     y: np.ndarray
     corners: int
     rigid: bool
+    moments: tuple  # (`Moment`,), (d*d, n), or ()
 
 
 class WholePoints(NamedTuple):
@@ -643,6 +645,7 @@ def _act_on_motion(members, task, call, count):
         # Forces act while the hook moves a point from its initial velocity in the step.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
+        rigid = leads and hooks.table[h].uses_place == 0
         for q in range(count):
             p = hooks.chosen[q]
             velocity, position, total = _call_point_function(
@@ -657,6 +660,10 @@ def _act_on_motion(members, task, call, count):
             for corner in range(members.corners):
                 y[d + d * corner + c, p] += position - y[c, p]
             y[c, p] = position
+            for moment in members.moments:
+                # Otherwise nodes, and strains around, follow what the point had from the grid.
+                for k in range(d if rigid else 0):
+                    moment[d * c + k, p] = 0
             if slot >= 0:
                 totals.add_to(control.totals, slot + c, total)
     return 0
@@ -790,9 +797,11 @@ def whole_points(tag, s, block, then, heat):
 
 
 def moving_points(s, block, then):
-    points, rigid = block.points, is_rigid(block.laws)
+    points, rigid, corners = block.points, is_rigid(block.laws), corners_that_move(s)
     x, y = _positions(s, points, then)
-    return MovingPoints(points.id, points.v, points.mass, x, y, corners_that_move(s), rigid)
+    moment = field(points.fields, Moment)
+    moments = () if moment is None else (moment,)
+    return MovingPoints(points.id, points.v, points.mass, x, y, corners, rigid, moments)
 
 
 def clear_forces(kin, force, count):

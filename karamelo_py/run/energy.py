@@ -20,7 +20,7 @@ from karamelo_py.kernels.watch import (
     sum_energies,
     unit_of,
 )
-from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws import can
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.run.state import SceneState
@@ -43,7 +43,7 @@ def unknown_work(hub: Hub) -> str:
             return f"fix {fix.style} '{fix.id}'"
     free = [fix.body for fix in hub.fixes.values()]
     for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity) and apart and solid not in free:
+        if solid.rigid and apart and solid not in free:
             return f"rigid solid '{solid.id}'"
         if solid.material.fluid is not None:
             return f"the water in solid '{solid.id}'"

@@ -18,8 +18,6 @@ from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.basis.product import along
 from karamelo_py.points.laws import (
-    can,
-    constrained_velocity,
     initial_state,
     parameter,
     specific_volume,
@@ -47,7 +45,7 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf
-    solids = [s for s in hub.solids.values() if not can(s.material.law, constrained_velocity)]
+    solids = [s for s in hub.solids.values() if not s.rigid]
     limits = [_stable_share(hub, solid, grids) for solid in solids if solid.count]
     least = min(limits, default=inf)
     return floor(1e4 * least) / 1e4 if least < inf else inf

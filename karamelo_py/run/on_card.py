@@ -135,7 +135,7 @@ class SimulationOnCard(Simulation):
             self._fetch()
             if steps is not None:
                 steps.images.close()
-            program = type(self.hub.update.scheme), type(self.visits)
+            program = type(self.scheme), type(self.visits)
             card, acting = self.hub.settings.card, (hooks, functions)
             with missing_told(self.hub):
                 steps = StepsOnCard(card, self._setup, program, acting)

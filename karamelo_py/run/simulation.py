@@ -138,7 +138,15 @@ class Simulation(SceneArrays):
 
     @property
     def step_kind(self) -> StepKind:
-        return StepKind(self.hub.update.scheme, self.visits, self.mode)
+        return StepKind(self.scheme, self.visits, self.mode)
+
+    @property
+    def scheme(self) -> Tag:
+        """The scheme of the steps: another one if fixes lead points that deform."""
+        scheme, fixes = self.hub.update.scheme, self.hub.fixes.values()
+        led = (fix for fix in fixes if fix.leads_points and not fix.of_rigid_points)
+        leading = scheme.traits.leading
+        return scheme if leading is None or next(led, None) is None else leading
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
         """Take up to `count` steps, to the end time at most; return DONE, or why it stopped.

@@ -141,6 +141,12 @@ class Fix(Publisher):
         return list(_formulas_in(tuple(vars(self).values())))
 
     @property
+    def of_rigid_points(self) -> bool:
+        """True if all its points are of rigid solids."""
+        soft = (solid for solid in self.hub.solids.values() if not solid.rigid)
+        return isinstance(self.group, ParticleGroup) and not any(map(self.group.touches, soft))
+
+    @property
     def nodes(self) -> np.ndarray:
         return self.group.nodes
 

@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import can, law_kind, parameter, specific_volume
+from karamelo_py.points.laws import can, constrained_velocity, law_kind, parameter, specific_volume
 from karamelo_py.points.laws.doubts import reference_temperatures
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain, require_domain
@@ -45,6 +45,10 @@ class Solid(Named):
     region: Region | None = None
     ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
     warm = False  # points have individual temperatures
+
+    @property
+    def rigid(self) -> bool:
+        return can(self.material.law, constrained_velocity)
 
     def __init__(
         self,

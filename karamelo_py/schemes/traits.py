@@ -21,6 +21,8 @@ class SchemeTraits(NamedTuple):
     strained_before: float = 0.0
     # The velocity of the moved points is mapped to the nodes again.
     maps_velocity_again: bool = False
+    # The scheme of steps in which fixes lead points of deformable bodies; None: this one.
+    leading: Any = None
     # Drifting bodies gain no energy.
     bears_drift: bool = False
     # Vibrations are damped, with two points per cell and direction.

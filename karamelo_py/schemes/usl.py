@@ -9,6 +9,7 @@ from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.table import NodeTask, light_node
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
+from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.traits import SchemeTraits
 
 
@@ -25,12 +26,15 @@ class USL(NamedTuple):
     points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
     scaled by mass / limit. Momentum is conserved.
 
+    Strains must contain velocities that fix velocity_particles prescribes: with it, on points that
+    deform, steps are those of musl.
+
     Example
     -------
     scheme(usl)
     """
 
-    traits = SchemeTraits(courant=(0.65, 0.4), damps=True)
+    traits = SchemeTraits(courant=(0.65, 0.4), damps=True, leading=MUSL())
     node_fields = (SquaredMass,)
     rows = (
         table.BEGIN,
@@ -88,7 +92,7 @@ class USLUnlimited(NamedTuple):
     scheme(usl/unlimited)
     """
 
-    traits = SchemeTraits(courant=USL.traits.courant)
+    traits = SchemeTraits(courant=USL.traits.courant, leading=MUSL())
     rows = tuple(
         table.NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows
     )

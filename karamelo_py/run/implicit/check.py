@@ -9,12 +9,10 @@ from karamelo_py.compiler.slopes import NoSlope
 from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
-from karamelo_py.points.laws import can, constrained_velocity, initial_state
+from karamelo_py.points.laws import initial_state
 from karamelo_py.points.laws.strengths.mu_i import yields_early_with_fbar
 from karamelo_py.points.transfers import Moment
-from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.methods.base import takes_average
 
@@ -36,9 +34,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             "FLIP instead, with an alpha of 1 after the basis",
             method.place,
         )
-    if update.thermal and any(
-        can(solid.material.law, constrained_velocity) for solid in hub.solids.values()
-    ):
+    if update.thermal and any(solid.rigid for solid in hub.solids.values()):
         yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
         yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.place
@@ -53,7 +49,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     kin = method.kinematics(hub)
     for solid in hub.solids.values():
         law = solid.material.law
-        if can(law, constrained_velocity):
+        if solid.rigid:
             continue
         # F-bar lets some laws yield too early in load steps.
         averaged = update.anti_locking and takes_average(law)
@@ -91,7 +87,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         prescribes = fix.prescribes_velocity or fix.first_step_only
         if prescribes:
             other = [hook for hook in other if hook != "post_velocities_to_grid"]
-        if _of_rigid_points(hub, fix):
+        if fix.of_rigid_points:
             other = [hook for hook in other if hook != "post_advance_particles"]
         only_prescribes = prescribes and fix.wall_friction is None
         if "post_update_grid_state" in fix.hooks() and not only_prescribes:
@@ -111,7 +107,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
         elif (
             not update.scheme.traits.inertia
             and fix.style.startswith("initial_velocity")
-            and not _of_rigid_points(hub, fix)
+            and not fix.of_rigid_points
         ):
             yield (
                 f"has no inertia: the velocities of fix {fix.style} would change nothing",
@@ -132,13 +128,6 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 f"ulmpm/contacts; or {_EXPLICIT}",
                 fix.place,
             )
-
-
-def _of_rigid_points(hub: Hub, fix: Fix) -> bool:
-    if not isinstance(fix.group, ParticleGroup):
-        return False
-    soft = (s for s in hub.solids.values() if not can(s.material.law, constrained_velocity))
-    return not any(fix.group.touches(solid) for solid in soft)
 
 
 def _bears_shear(law: Tag, kin: Tag) -> bool:

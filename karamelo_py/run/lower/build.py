@@ -101,7 +101,7 @@ def check_scene(hub: Hub) -> None:
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
     for solid in hub.solids.values():
-        if laws.can(solid.material.law, laws.constrained_velocity):
+        if solid.rigid:
             raise ScriptError(
                 f"solid '{solid.id}' is rigid, and the domains of its points would deform",
                 place=solid.place,

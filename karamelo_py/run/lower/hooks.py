@@ -15,7 +15,6 @@ from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
-from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.run.boxes import unique
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
@@ -89,8 +88,7 @@ class _Builder:
         self.loaded_nodes = 0  # the number of nodes, if hooks bring forces
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
-        laws = (solid.material.law for solid in hub.solids.values())
-        self.rigid = any(can(law, constrained_velocity) for law in laws)
+        self.rigid = any(solid.rigid for solid in hub.solids.values())
         self.whole: list[Tag] = []  # of hooks on whole points
         self.wet = any(solid.material.fluid is not None for solid in hub.solids.values())
 

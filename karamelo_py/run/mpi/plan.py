@@ -59,7 +59,7 @@ def bytes_of_node(simulation: Simulation) -> int:
     s, sums = simulation.setup, _Sums([])
     control = s.control
     kept = control.values.copy(), control.clock.copy(), control.totals.copy()
-    step(StepKind(simulation.hub.update.scheme, simulation.visits, sums), s, NoHooks(), True)
+    step(StepKind(simulation.scheme, simulation.visits, sums), s, NoHooks(), True)
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
     for what, nodes in sums.found:

@@ -15,7 +15,6 @@ from karamelo_py.points.laws import (
     advance,
     can,
     cauchy_stress,
-    constrained_velocity,
     initial_state,
     specific_volume,
     with_stress,
@@ -145,11 +144,8 @@ class PointForces(Fix):
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
-        solids = list(hub.solids.values())
-        rigid = [can(solid.material.law, constrained_velocity) for solid in solids]
-        self.rigid = [s for s, r in zip(solids, rigid, strict=True) if r and group.touches(s)]
-        soft = (s for s, r in zip(solids, rigid, strict=True) if not r)
-        if self.rigid and not any(map(group.touches, soft)):
+        self.rigid = [s for s in hub.solids.values() if s.rigid and group.touches(s)]
+        if self.rigid and self.of_rigid_points:
             message = f"solid '{self.rigid[0].id}' is rigid: forces do not move it"
             expected = "points of other solids; fix velocity_particles moves rigid ones"
             raise ScriptError(message, argument="group", expected=expected)

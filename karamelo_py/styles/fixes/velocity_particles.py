@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.language import registry
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import places_before
 from karamelo_py.points.transfers import stores_moment
@@ -14,7 +13,7 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, point_hook
 from karamelo_py.script.errors import plural
-from karamelo_py.script.expressions import FIRST, Expression
+from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
 from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
 
 SAMPLE = 1000  # points at which formulas are compared, about
@@ -59,10 +58,9 @@ class VelocityParticles(VelocityOfPoints):
     in one direction, the last decides. It also overrides initial velocities and held nodes, with a
     warning before the first step.
 
-    Use two cells of points or more, FLIP, and a scheme that maps velocities again (musl). The rest
-    of a solid slips past a grip of one cell when squeezed by 20 % in ulmpm (linear,
-    quadratic-spline, cubic-spline); a bar in tlmpm is pulled with 94 % of the force. With affine
-    transfers such as APIC, or usl, it slips past any grip.
+    Use two cells of points or more: nodes that other points reach move less, so the outer cell of a
+    grip deforms with the body. The rest of a solid slips past a grip of one cell when squeezed by
+    20 % in ulmpm (linear, quadratic-spline, cubic-spline).
 
     See Also
     --------
@@ -163,20 +161,15 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
             yield _said(other, axes, caught)
 
 
-def _slips(fix: Any, scene: Any) -> dict[str, Any] | None:
-    """Check whether strains miss the prescribed velocities.
-
-    Strains follow from nodal velocities. With usl these precede the prescribed ones; with affine
-    transfers they contain the affine part of the points, which nothing prescribes.
-    """
-    again, affine = scene.scheme.traits.maps_velocity_again, stores_moment(scene.transfer)
-    if not fix.leads_points or scene.simulation.implicit or (again and not affine):
-        return None
+def _slips(fix: Any, scene: Any) -> bool:
+    """Check whether points retain an affine part that their formulas of place do not prescribe."""
+    placed = any(f is not None and f.names & set(POINT_SEEDS) for f in fix.formulas)
+    affine = stores_moment(scene.transfer) and not scene.simulation.implicit
+    if not (placed and affine and fix.leads_points):
+        return False
     solids = [solid for solid in scene.hub.solids.values() if fix.group.touches(solid)]
-    if len(fix.group) >= sum(len(solid.volume0) for solid in solids):  # nothing is left to pull
-        return None
-    scheme = registry.name_of("scheme", type(scene.scheme))
-    return {"what": scene.transfer_name if again else f"scheme {scheme}"}
+    # If all points are led, nothing is left to pull.
+    return len(fix.group) < sum(len(solid.volume0) for solid in solids)
 
 
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
@@ -233,8 +226,8 @@ known_failure(
     VelocityOfPoints,
     "grip '{part.id}'",
     when=_slips,
-    reason="with {what} the grid does not follow points of prescribed velocity: the rest of the "
-    "body slips past them, and the force is far too small (in a pulled bar by a factor of 19 with "
-    "a grip of one cell, 4 with two)",
-    cure="tlmpm with velocity_nodes at the grip; or FLIP with scheme musl",
+    reason="with formulas of positions, {scene.transfer_name} retains the velocity gradients that "
+    "points have from the grid: the rest of the body slips past them, and the force is too small "
+    "(a bar pulled by two cells of points: by 60 %)",
+    cure="velocities that do not depend on positions; FLIP; or tlmpm with velocity_nodes",
 )

@@ -8,7 +8,6 @@ import numpy as np
 from karamelo_py.kernels.rigid import RigidBodies
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.frames import Total
-from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
 from karamelo_py.scene.solid import Solid
@@ -33,13 +32,13 @@ class ULMPM(Method):
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        if can(solid.material.law, constrained_velocity):
+        if solid.rigid:
             publish_loads(hub, solid)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         solids = list(hub.solids.values())
         free = [fix.body for fix in hub.fixes.values()]
-        rigid = [can(s.material.law, constrained_velocity) and s not in free for s in solids]
+        rigid = [s.rigid and s not in free for s in solids]
         if not any(rigid):
             return super().contact_between(hub, lattices)
         slots = np.full((2, len(solids)), -1)

@@ -120,11 +120,8 @@ class ULMPMContacts(Method):
         return numbered([self._lattice(*box) for _ in range(max(fields(hub), default=0) + 1)])
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        rigid = {
-            field
-            for solid, field in zip(hub.solids.values(), fields(hub), strict=True)
-            if can(solid.material.law, constrained_velocity)
-        }
+        pairs = zip(hub.solids.values(), fields(hub), strict=True)
+        rigid = {field for solid, field in pairs if solid.rigid}
         count = max(fields(hub), default=-1) + 1
         return np.isin(np.arange(count if rigid else 0), list(rigid))
 
