@@ -167,9 +167,8 @@ def _slips(fix: Any, scene: Any) -> bool:
     affine = stores_moment(scene.transfer) and not scene.simulation.implicit
     if not (placed and affine and fix.leads_points):
         return False
-    solids = [solid for solid in scene.hub.solids.values() if fix.group.touches(solid)]
-    # If all points are led, nothing is left to pull.
-    return len(fix.group) < sum(len(solid.volume0) for solid in solids)
+    solids = filter(fix.group.touches, scene.hub.solids.values())
+    return len(fix.group) < sum(len(solid.volume0) for solid in solids)  # some are left to pull
 
 
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
