@@ -57,8 +57,7 @@ GRACE = 2.0  # seconds for processes to end after mpiexec
 AT_ONCE = 3  # signals
 LONGEST_FOLDER = 70  # characters: names of sockets must be short
 A_CORE = 16  # processes per core; more is a mistake
-# Seconds until a failed process ends the others: rank 0 reports the error, others what only they
-# know.
+# Seconds until a failed process ends the others: rank 0 reports the error.
 PATIENCE, LONGER = 2.0, 6.0
 
 
@@ -82,7 +81,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
 
 
 def rendered(error: BaseException) -> str:
-    """Any exception for the user, without a traceback."""
+    """Without a traceback."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
@@ -260,7 +259,7 @@ def keep_to_oneself() -> None:
 
 
 def _report_to_launcher(rank: int) -> None:
-    """Report this process to the launcher; rank 0 gets streams and signals."""
+    """Rank 0 gets streams and signals."""
     global _link
     name = os.environ.pop(SOCKET, None)
     if name is None:
@@ -304,14 +303,14 @@ def _report(**message: object) -> None:
 
 
 def has_terminal() -> bool | None:
-    """False if mpiexec pretends that output is a terminal."""
+    """False if mpiexec pretends that output is one."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
 def together(
     asked: int | None, run: Callable[[mpi.MpiComm], int], *, debugging: bool = False
 ) -> int:
-    """Call `run` as one of the processes (`asked`: their number); return the exit status."""
+    """Call `run` as one of `asked` processes; the exit status."""
     size, rank = mpi.launched()
     comm: mpi.MpiComm | None = None
 

@@ -38,7 +38,7 @@ class Advice(NamedTuple):
 
 
 def code_of(name: str) -> str:
-    """Code of a known failure: ``shocks of material 'm'`` is shocks-of-material."""
+    """``shocks of material 'm'`` is shocks-of-material."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
     return "-".join(re.findall(r"\w+", words.lower()))
 
@@ -49,7 +49,7 @@ _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 def known_failure(
     part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare a known failure of a part by a name; it is reported once.
+    """Declare a known failure, reported once by its name.
 
     With a `cause`, it is noise: reported if its ``share`` exceeds 1, and as the cause of a gain.
     """
@@ -66,17 +66,17 @@ def known_failures() -> Iterator[tuple[type, str, str, str]]:
 
 
 def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
-    """Declare a needless cost of a part, for `check`."""
+    """Declare a needless cost, for `check`."""
     _rules.setdefault(("suggestion", part), []).append((when, "", cost, instead))
 
 
 def gain(part: type, *, when: When, cause: str, cure: str) -> None:
-    """Declare a part as likely cause of a spurious energy gain, with its fix."""
+    """Declare a likely cause of a spurious energy gain, with its fix."""
     _rules.setdefault(("gain", part), []).append((when, "", cause, cure))
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    """Advice of one kind about a part (or a field, which is a class)."""
+    """About a part (or a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
             result = when(part, scene)

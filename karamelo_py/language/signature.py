@@ -48,7 +48,7 @@ __all__ = [
 
 @cache
 def parameters(target: Callable) -> list[Parameter]:
-    """Parameters of a command or style, without the hub.
+    """Those of a command or style, without the hub.
 
     TypeError for an unsupported signature, a fault of its author.
     """
@@ -68,7 +68,7 @@ def parameters(target: Callable) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """True if a style is a NamedTuple, a tag that needs no hub.
+    """A NamedTuple, a tag that needs no hub.
 
     Its arguments are its fields, or the parameters of its classmethod ``given``. A method
     ``checked`` returns a replacement.
@@ -91,10 +91,10 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 def call(
     target: Callable, hub: Scene, arguments: Sequence[Argument], name: str, converted: Any = None
 ) -> Any:
-    """Call a command or make a style with script arguments; store their values in `converted`.
+    """Call a command or make a style from script arguments; store their values in `converted`.
 
-    `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a place, for anything wrong
-    in the arguments or the target.
+    `name` is ``run``, or ``fix body_force``. ScriptError, with a place, for anything wrong in the
+    arguments or the target.
     """
     try:
         expected = parameters(target)
@@ -197,7 +197,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """Call a command or make a style with values; faults are reported as its author's."""
+    """As `call`, with values; faults are reported as its author's."""
     if not inspect.isclass(target):
         if target.__module__.startswith(registry.PREFIX):
             return target(hub, *values, **named)
@@ -305,7 +305,7 @@ def default_variant(style: Any) -> str | None:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """Parameters for help, with the word that selects a variant."""
+    """For help, with the word that selects a variant."""
     variants = variants_of(target)
     if not variants:
         return parameters(target)

@@ -40,7 +40,7 @@ class Tool(NamedTuple):
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Lines (m, 2) where points x (n, 2) fill half of the space.
+    """Where points x (n, 2) fill half of the space: lines (m, 2).
 
     Points are scattered to nodes of cells of their size, over three cells: a node at the surface
     gets half as much as nodes inside.
@@ -70,7 +70,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Scatter positions (n, d) to nodes, with linear weights."""
+    """With linear weights."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -93,7 +93,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Lines (m, 2) of zero depth between corners (2,), with `fine` steps on the long side."""
+    """Lines (m, 2) between corners (2,), with `fine` steps on the long side."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -127,7 +127,7 @@ def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Tight bounds of a surface between corners (3,); None without a surface."""
+    """Tight bounds between corners (3,); None without a surface."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -141,13 +141,13 @@ def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | 
 
 
 def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
-    """Mask (n,) of the sections across an axis that cut the surface."""
+    """Mask (n,) of the sections that cut the surface."""
     within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
     return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
 
 def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
-    """Both ends of a surface along an axis, by bisection; empty without a surface."""
+    """Ends by bisection; empty without a surface."""
     axes, crossed = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
     ends = []
     for k, beyond in ((crossed[0], -1), (crossed[-1], 1)) if len(crossed) else ():
@@ -163,7 +163,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Lines (m, 3) of sections that show the surface, but not a plane that cuts it off."""
+    """Lines (m, 3) that show the surface, but not a plane that cuts it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(*ends, BETWEEN + 2)

@@ -64,7 +64,7 @@ class Rows(NamedTuple):
             yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Gather a field (n, ...) selected by `of`; zero for deleted points."""
+        """Zero for deleted points."""
         local = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
@@ -79,7 +79,7 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """Gather a declared field (n, components) or None; initial values where laws lack it."""
+        """(n, components) or None; initial values where laws lack it."""
         arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
         if all(array is None for _, array in arrays):
             return None
@@ -88,7 +88,7 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Numbers (n, *columns) by ``of(laws)(matter, rows)``; 0 if it is None."""
+        """(n, *columns) by ``of(laws)(matter, rows)``; 0 if it is None."""
         local, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
@@ -101,7 +101,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Some points in order: arrays (copies; 0 for deleted points) and columns."""
+    """In order: arrays (copies; 0 for deleted points) and columns."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -182,7 +182,7 @@ class PointTable:
         return rows._filled(np.zeros(kept.T.shape, kept.dtype), local)
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (n, components); None if the scene lacks it."""
+        """(n, components); None if the scene lacks it."""
         return self._rows.declared(kind)
 
     def columns_of_laws(self) -> set[str]:
@@ -190,7 +190,7 @@ class PointTable:
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """A column (n,) of the existing points; 0 if the scene lacks it, as in Karamelo."""
+        """A column (n,) of existing points; 0 if the scene lacks it, as in Karamelo."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -239,7 +239,7 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
 
 
 def named_sets(hub: Scene) -> list[str]:
-    """Groups of points and solids: columns that are 1 for their points, else 0."""
+    """Columns that are 1 for the points of a group or solid, else 0."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
@@ -261,7 +261,7 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of positions if rates are stored, else half a step earlier."""
+    """(d, n) at the time of positions if rates are stored, else half a step earlier."""
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
         return points.v

@@ -45,7 +45,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Rows of a table as text, block by block: integers, the rest with nine significant digits."""
+    """Rows as text, block by block: integers, the rest with nine significant digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))
@@ -71,12 +71,11 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 
 @kernel
 def write_rows(table, start, text, at):
-    """Write numbers, row after row, up to one that is left to Python.
+    """Write row after row, up to a number left to Python: its index, or the count; the text's end.
 
     `table`: numbers (rows, columns), the same memory as integers, and which columns are integers.
     `start`: index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and
-    continues at `at`. Returns the index of the number left to Python (or their count), and the end
-    of the text.
+    continues at `at`.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -97,7 +96,7 @@ def write_rows(table, start, text, at):
 
 
 def _put_integer(text, at, n):
-    """Write an integer; return where it ends, or `at` if it is too large."""
+    """The integer's end, or `at` if it is too large."""
     if not -LARGEST_INTEGER < n < LARGEST_INTEGER:
         return at
     text[index(at)] = MINUS
@@ -113,7 +112,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Write nine significant digits; return where they end, or `at` if in doubt."""
+    """Nine significant digits; their end, or `at` if in doubt."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)
@@ -159,7 +158,7 @@ def _put_number(text, at, x, bits):
 def _decimal(x, binary):
     """Nine digits of x > 0 as an integer (0 if in doubt), and the first one's power of ten.
 
-    `binary` is the power of two of x.
+    `binary`: the power of two.
     """
     exponent = binary * 315653 >> 20  # log10(2) * 2^20
     exponent += x >= POWERS[index(exponent + 1 - FIRST), 0]
@@ -177,7 +176,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """The eight digits of n < 10^8 as text: halves, quarters, eighths."""
+    """The eight digits of n < 10^8: halves, quarters, eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

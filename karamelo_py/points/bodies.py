@@ -54,7 +54,7 @@ class TouchingPair(NamedTuple):
 
 @point_function()
 def force_between(law, kin, pair):
-    """Contact force on point 1 of a `TouchingPair`."""
+    """Force on point 1 of a `TouchingPair`."""
 
 
 @force_between.on(Hertz)
@@ -100,7 +100,7 @@ def rub(mu, load, memory, stop):
 
 
 def along(v, normal):
-    """Tangential part of a vector; all of it if the normal is 0."""
+    """Tangential part; all of it if the normal is 0."""
     square = normal.squared()
     return v + -(dot(v, normal) / square if square > 0 else 0.0) * normal
 

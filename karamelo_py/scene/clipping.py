@@ -1,4 +1,4 @@
-"""Clip the boxes of points at the edge of a region: volumes and centroids.
+"""Volumes and centroids of point boxes clipped at the edge of a region.
 
 The surface in a box is a plane, fitted to `Region.depth` at corners and centre; other boxes are
 halved, up to `HALVED` times.
@@ -34,13 +34,13 @@ class Pieces(NamedTuple):
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
-        """Smallest thickness resolved by boxes of this size; 0: all."""
+        """Smallest thickness that is resolved; 0: all."""
         mostly = self.rough.sum() > MOSTLY * self.fraction.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Boxes of edge `size` around `x` (n, d) in a region: mask, and pieces at its edge.
+    """Boxes of edge `size` around `x` (n, d): mask, and pieces at the region's edge.
 
     Boxes end at the domain and at the region's bounding box: faces along the axes are exact.
     """
@@ -69,7 +69,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger one in an adjacent box (fraction 0 then)."""
+    """Merge small ones into the nearest larger one in an adjacent box (fraction 0 then)."""
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -111,7 +111,7 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
 def _measure(
     region: Region, lo: np.ndarray, edges: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Volume fraction (n,), moment (n, d) and `Pieces.rough` of boxes clipped by a surface."""
+    """Volume fraction (n,), moment (n, d) and `Pieces.rough` of clipped boxes."""
     n, d = lo.shape
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
@@ -160,7 +160,7 @@ def _measure(
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
 
-    A difference of covered areas of opposite faces: its sum over boxes is exact.
+    From the covered areas of opposite faces: the sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))

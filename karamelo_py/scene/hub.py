@@ -24,7 +24,7 @@ from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts of a scene in creation order, with ``id`` and ``place``."""
+    """Named parts in creation order, with ``id`` and ``place``."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -188,7 +188,7 @@ class Hub:
         self.checking = False  # ``karamelo-py check``: the first run only reports
         self.pausing = False  # stops before runs, which a program controls
         self.open_ended = False  # a program may continue after the script
-        # Fixes, dumps and curves active in some run of the rehearsal.
+        # active in some run of the rehearsal
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
         self.restart: Any = None  # until the script has rebuilt the scene
@@ -274,7 +274,7 @@ class Hub:
                         item.place,
                         hint="its author calls self.publish in refresh, or says published = ()",
                     )
-        # A plug-in's compute may use random numbers: rank 0's values count.
+        # A plug-in's compute may use random numbers.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
@@ -329,7 +329,7 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """Copy for trying the rest of the script, except objects that commands never change."""
+        """Copy without objects that commands never change."""
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)

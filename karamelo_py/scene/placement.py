@@ -82,7 +82,6 @@ class Filled:
         return np.array(np.unravel_index(cell, self._counts)).T, index_in_cell
 
     def move(self, rows: np.ndarray, x: np.ndarray) -> None:
-        """Replace the positions of ascending `rows` by (n, d)."""
         self._moved = rows, x
 
     def __len__(self) -> int:
@@ -142,7 +141,7 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and sizes (m, d) of points in Karamelo's order (x before y; lowest z first)."""
+    """Positions and sizes (m, d) in Karamelo's order (x before y; lowest z first)."""
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
 
@@ -161,8 +160,7 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill `region` in chunks of cells, x outermost; ScriptError for more points than numbers or
-    `room`."""
+    """Fill it in chunks of cells, x outermost; ScriptError for more points than numbers or `room`."""
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
     placed = Placement(

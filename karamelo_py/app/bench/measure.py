@@ -64,7 +64,7 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """Mode that times each sweep of `mode`, and the same call without points, to be subtracted."""
+    """Times each sweep of `mode`, and the same call without points, to be subtracted."""
 
     mode: Any
     of_points: dict[str, list[float]]
@@ -105,7 +105,7 @@ class Measured(NamedTuple):
 
     @property
     def rest(self) -> float:
-        """Fraction of the step outside sweeps: control and waiting threads."""
+        """Fraction of the step: control and waiting threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
@@ -131,7 +131,7 @@ class Measured(NamedTuple):
         return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
     def record(self) -> dict[str, Any]:
-        """Results; speeds in particle-steps/s, times in seconds."""
+        """Speeds in particle-steps/s, times in seconds."""
         speeds = {"best": self.best, "median": self.median, "limited_by": self.limit}
         return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
@@ -239,7 +239,7 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Returns steps per repetition, and the seconds taken and waited by each process.
+    Steps per repetition, and the seconds taken and waited by each process.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -261,7 +261,7 @@ def _waits(simulation: Simulation) -> np.ndarray:
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:
-    """Take `count` steps; return the seconds until they are done, also on a GPU."""
+    """Seconds until `count` steps are done, also on a GPU."""
     card = simulation.hub.settings.card
     wait = card.wait if card else lambda: None
     wait()
@@ -382,7 +382,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Measure bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes in total."""
+    """Bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes in total."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     team = new_team(threads)

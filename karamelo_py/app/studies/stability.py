@@ -51,9 +51,9 @@ CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")
 UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
-FEWEST = watch.FEW * watch.LOOK + 1  # steps for enough energies
+FEWEST = watch.FEW * watch.LOOK + 1  # for enough energies
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
-FIRST = 0.1  # fraction of the rows of a log over which energies are averaged
+FIRST = 0.1  # fraction of the log over which energies are averaged
 FEW = 9  # up to as many values of a variable all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
@@ -145,7 +145,7 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """The largest mean of an energy over its first; inf for NaN.
+    """Largest mean over the first; inf for NaN.
 
     Means are over a tenth of the rows; from rest the median replaces the first.
     """
@@ -162,7 +162,7 @@ def growth(energy: np.ndarray) -> float:
 
 
 def remains(energy: np.ndarray) -> float:
-    """Mean of an energy over the last tenth of its rows over the first tenth's."""
+    """Mean over the last tenth of the rows over the first tenth's."""
     rows = max(1, ceil(FIRST * len(energy)))
     first, last = (float(np.abs(end).mean()) if len(end) else 0.0
                    for end in (energy[:rows], energy[-rows:]))  # fmt: skip
@@ -300,7 +300,7 @@ class Map:
         return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
-        """Position where a ratio is 1, at or beyond its known values."""
+        """Where a ratio is 1, at or beyond its known values."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
@@ -452,7 +452,7 @@ def explore(
     stride: int = 6,
     apart: Sequence[bool] = (False, False),
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """Classes of the cells that were run, and of the others, which are inferred.
+    """Classes of the cells that were run, and of the inferred others.
 
     Lines and columns about `stride` cells apart are run first. Cells between two of one class in a
     row or column get that class, the nearest first; between different ones the middle is run,
@@ -504,7 +504,6 @@ def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray
 
 
 def _between(plane: np.ndarray, reach: int) -> np.ndarray:
-    """Fill each row between equal cells at most `reach` apart."""
     said = np.full(plane.shape, UNKNOWN)
     for line, out in zip(plane, said, strict=True):
         for a, b in _gaps(line):
@@ -542,7 +541,7 @@ def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) 
 
 
 def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
-    """Select cells of the longest gaps, at least half a gap apart."""
+    """Cells of the longest gaps, at least half a gap apart."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
         if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):

@@ -30,7 +30,7 @@ COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
 class Line(NamedTuple):
     word = "1D"
     per = ""  # unit of forces, masses and energies
-    hoops = 0  # directions around an axis or centre; x is the distance from it
+    hoops = 0  # around an axis or centre; x is the distance from it
     dimension = 1
     tensor_size = 1
     tensor_names = ("11",)
@@ -100,12 +100,12 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 def free_from(kin):
-    """First direction in which a body may translate: not the radius."""
+    """A direction in which a body may translate: not the radius."""
     return 1 if kin.hoops else 0
 
 
 def planar(kin):
-    """Tag of d x d matrices over the same vectors, without hoop components."""
+    """Matrices over the same vectors, without hoop components."""
     return kin.plane
 
 
@@ -130,12 +130,12 @@ def dot(*vectors):
 
 
 class Elements(tuple):
-    """Components that exist in a kinematics `kin`.
+    """Components that exist in a kinematics.
 
-    `places`: row and column of each component (of vectors: the direction, twice), from 0. `axes`:
-    indices of rows. Of tensors also `acting` (`places` with the direction in which a row acts, the
-    radius for hoop components) and `rows` (per direction, index and column of the components that
-    act along it, the last first).
+    `places`: row and column of each (of vectors: the direction, twice), from 0. `axes`: indices of
+    rows. Of tensors also `acting` (`places` with the direction in which a row acts, the radius for
+    hoop components) and `rows` (per direction, index and column of the components that act along
+    it, the last first).
     """
 
     __slots__ = ()
@@ -243,7 +243,7 @@ class Matrix(Elements):
     __slots__ = ()
 
     def dot(self, gradient):
-        """s_ij g_j of a stress and a gradient, each term rounded once; hoop parts act radially."""
+        """s_ij g_j, each term rounded once; hoop parts act radially."""
         made = []
         for (k, j), *rest in self.rows:
             made.append(add_row(self, rest, gradient, self[k] * gradient[j]))
@@ -286,11 +286,11 @@ class Tensor(Matrix):
         return self if made is type(self) else made._make(self[: len(made.places)])
 
     def generator(self):
-        """Matrix of this increment's strain and rotation: dt grad v."""
+        """dt grad v: strain and rotation."""
         return self
 
     def strain_at_end(self):
-        """Strain whose stress is added after the old stress is rotated, for small increments."""
+        """Its stress is added after the old stress is rotated, for small increments."""
         return sym(self)
 
     def after(self, dl):
@@ -314,12 +314,12 @@ class Tensor(Matrix):
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
     def stretch(self):
-        """Right stretch U = sqrt(F^T F), for det F not 0.
+        """U = sqrt(F^T F), for det F not 0.
 
         In 2D U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
         1984, J. Elasticity 14). In 3D Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
         rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius
-        norms): accurate to round-off for equal stretches too, unlike closed forms.
+        norms): accurate to round-off for equal stretches too.
         """
         if self.kin.dimension == 3:
             r = self
@@ -356,7 +356,7 @@ class Tensor(Matrix):
 
 
 def further_terms(squared):
-    """tan(x) / x - 1 - x^2 / 3 as a function of x^2, with an error of x^8/46."""
+    """tan(x) / x - 1 - x^2 / 3 of x^2, with an error of x^8/46."""
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
@@ -384,10 +384,7 @@ def squares(a, axes, i, j):
 
 
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
-    """dl of a step with a large rotation, and the logarithm of I + dl.
-
-    Strain and rotation are those of the logarithm, the constant dt grad v that leads to I + dl.
-    """
+    """dl of a step with a large rotation; strain and rotation are the logarithm of I + dl."""
 
     __slots__ = ()
 
@@ -401,7 +398,7 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.logarithm
 
     def strain_at_end(self):
-        """Strain in the axes at the end: the added stress is rotated by half the angle."""
+        """In the axes at the end: the added stress is rotated by half the angle."""
         return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 
@@ -409,11 +406,10 @@ algebra(LargeIncrement)
 
 
 def large(dl):
-    """Strain and rotation of a step with a large rotation.
+    """ln(I + dl) = 2 artanh(G / 2) with the midpoint gradient G = 2 dl (2 I + dl)^-1.
 
-    ln(I + dl) = 2 artanh(G / 2) with the midpoint gradient G = 2 dl (2 I + dl)^-1. For a pure
-    rotation G and its odd powers are skew (Hughes & Winget 1980): no strain for any truncation. The
-    error is G^7/448.
+    For a pure rotation G and its odd powers are skew (Hughes & Winget 1980): no strain for any
+    truncation. The error is G^7/448.
     """
     G = dl @ inv(I + 0.5 * dl)
     squared = G @ G
@@ -433,7 +429,7 @@ class SymmetricTensor(Matrix):
         return total([self[i] for i in axes]) / len(axes)
 
     def turned(self, dl):
-        """Rotate by the increment dl: R s R^T with its rotation R, objective (Jaumann).
+        """R s R^T with the rotation R of the increment, objective (Jaumann).
 
         R rotates about w = axial(skew(dl)) by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
         |w|^2/12): orthogonal to round-off, angle error |w|^5/120 (Hughes & Winget 1980 use
@@ -510,7 +506,7 @@ class SymmetricTensor(Matrix):
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
 
     def nominal(self, F):
-        """First Piola-Kirchhoff stress P = tau F^-T of a Kirchhoff stress."""
+        """First Piola-Kirchhoff stress P = tau F^-T."""
         if self.kin.dimension == 1:
             return type(F)._make([s / f for s, f in zip(self, F, strict=False)])
         a, back = self.at(), inv(F).at()
@@ -592,7 +588,6 @@ def nothing(kin):
 
 
 def zero(kin, like):
-    """The tensor 0, with the number type of `like`."""
     return kin.Tensor._make([real(0, like) for _ in kin.Tensor.places])
 
 
@@ -631,7 +626,7 @@ def dev(s):
 
 
 def inner(s, e):
-    """s_ij e_ij of symmetric tensors."""
+    """s_ij e_ij."""
     normal = s[0] * e[0] + s[1] * e[1] + s[2] * e[2]
     shears = [a * b for a, b in zip(s[3:], e[3:], strict=True)]
     return normal + 2 * total(shears) if len(shears) else normal

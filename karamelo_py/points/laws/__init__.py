@@ -58,7 +58,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Check whether a point function is defined for a law or one of its parts."""
+    """The point function is defined for the law or one of its parts."""
     kinds = (kind for kind in law_kind(law) if not law_traits(kind).wraps)
     return any(function.defined(kind) for kind in kinds)
 
@@ -93,12 +93,12 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
 def column(part: type, name: str, source: Callable | NamedTuple) -> None:
-    """Declare an output column of a law or part, by a `number` or a tag of `shown`."""
+    """Declare an output column, by a `number` or a tag of `shown`."""
     _columns.setdefault(part, {})[name] = source if isinstance(source, tuple) else source.tag
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """Output columns of a law, its parts' first: name, and tag for `shown`."""
+    """Columns, the parts' first: name, and tag for `shown`."""
     kinds = reversed(law_kind(law)[1:])
     tags = {name: tag for kind in kinds for name, tag in _columns.get(kind, {}).items()}
     return {name: of_part(law, tag) for name, tag in tags.items()} | _columns.get(type(law), {})
@@ -106,18 +106,17 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def of_part(law, tag):
-    """Tag by which `law` shows the column `tag` of a part."""
     return tag
 
 
 @point_function()
 def shown(tag, law, kin, state):
-    """Value of an output column for a point in `state`."""
+    """Value of an output column."""
 
 
 @point_function(otherwise=True)
 def shown_by(law, kin, state, tag):
-    """Value of a column of a law, or of the law within."""
+    """Value of a column of the law, or of the law within."""
     return shown(tag, law, kin, state)
 
 
@@ -133,7 +132,7 @@ def _shown_within(tag, law, kin, state):
 def number(function: Callable) -> Callable:
     """Make a point function of (law, kin, state) an output column.
 
-    The function's module stores the tag's class: cached kernels import it.
+    Its module stores the tag's class: cached kernels import it.
     """
     name = f"{function.__name__}_tag"
     tag_class = namedtuple(name, (), module=function.__module__)
@@ -192,13 +191,13 @@ def deformation(law, kin, state):
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """Check whether a law sums strains, so load steps need their logarithm; a constant."""
+    """The law sums strains, so load steps need their logarithm; a constant."""
     return True
 
 
 @point_function()
 def wave_speed_squared(law, kin, state):
-    """Squared speed of the fastest small disturbance, for the stable step."""
+    """Speed of the fastest small disturbance, for the stable step."""
 
 
 @point_function(otherwise=True)
@@ -209,19 +208,19 @@ def wave_speed_bound(law, kin, state):
 
 @point_function(otherwise=True)
 def stretch_across(law, state):
-    """Thickness of a thin body over initial thickness; 1 for other laws."""
+    """Thickness over the initial one; 1 for other laws."""
     return 1
 
 
 @point_function(otherwise=True)
 def is_round(law):
-    """Check whether a bar pulled along x contracts equally in y and z."""
+    """A bar pulled along x contracts equally in y and z."""
     return True
 
 
 @point_function(otherwise=True)
 def shear_part(law, kin, state):
-    """The part 2 G / rho of `wave_speed_squared`, or more: thin bodies have slower waves."""
+    """2 G / rho in `wave_speed_squared`, or more: thin bodies have slower waves."""
     return wave_speed_squared(law, kin, state)
 
 
@@ -244,7 +243,7 @@ def is_rigid(law: tuple) -> bool:
 @number
 @point_function(otherwise=True)
 def dissipated_energy(law, kin, state):
-    """Dissipated energy per reference volume; undefined for laws without."""
+    """Per reference volume; undefined for laws without."""
     return specific_volume(law) - specific_volume(law)
 
 
@@ -263,19 +262,19 @@ def damage_initiation(law, kin, state):
 @number
 @point_function(otherwise=True)
 def temperature(law, kin, state):
-    """Temperature; 0 for laws without one."""
+    """0 for laws without one."""
     return specific_volume(law) - specific_volume(law)
 
 
 @point_function(otherwise=True)
 def with_temperature(law, kin, state, T):
-    """State at temperature `T`; unchanged for laws without one."""
+    """Unchanged for laws without temperature."""
     return state
 
 
 @point_function(otherwise=True)
 def heat_capacity(law, like):
-    """Heat per mass and kelvin; 0 for laws without temperature."""
+    """Per mass and kelvin; 0 for laws without temperature."""
     return real(0, like)
 
 
@@ -287,30 +286,30 @@ def lit(law, kin, state, since):
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """State with `heat` more internal energy per reference volume, if the law has any."""
+    """State with `heat` more internal energy per reference volume, if any."""
     return state
 
 
 @point_function(otherwise=True)
 def conductivity(law, like):
-    """Heat flux per temperature gradient; 0 for laws without temperature."""
+    """Heat flux per gradient; 0 for laws without temperature."""
     return real(0, like)
 
 
 @point_function()
 def elastic_strain(law, kin, state):
-    """Elastic strain, for output."""
+    """For output."""
 
 
 @number
 @point_function()
 def plastic_strain(law, kin, state):
-    """Equivalent plastic strain, for output; undefined for laws without."""
+    """Equivalent, for output; undefined for laws without."""
 
 
 @point_function()
 def with_stress(law, kin, state, stress):
-    """State with the Cauchy stress `stress` (initial_stress); undefined for laws without."""
+    """With this Cauchy stress (initial_stress); undefined for laws without."""
 
 
 @point_function(otherwise=True)

@@ -7,14 +7,14 @@ from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Distance between equal vertices, relative to the size: files have few digits.
+# Distance of equal vertices, relative to the size: files have few digits.
 _WELD = 1e-6
-_SAMPLES = 4000  # positions on a shell for testing whether it lies in another
+_SAMPLES = 4000  # positions on a shell, to test whether it lies in another
 _SETS = 8  # at most, of shells that do not overlap
 
 
 class Skin:
-    """Surface of a body: sets of `faces` (m, d, d), each closed.
+    """Sets of `faces` (m, d, d), each closed.
 
     A position is inside if a set encloses it, or within `tolerance` of a face; never if `open`.
     """
@@ -43,7 +43,7 @@ class Skin:
 
 
 def _volumes(faces: np.ndarray) -> np.ndarray:
-    """Signed volumes (m,) below faces (m, d, d); their sum is the enclosed volume."""
+    """Signed volumes (m,) below faces (m, d, d)."""
     d = faces.shape[2]
     if d == 1:
         return faces[:, 0, 0] * np.where(np.arange(len(faces)) % 2, 1, -1)
@@ -75,7 +75,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Simplices (m, d, d) of elements of lower dimension; a line in 3D is a triangle."""
+    """Simplices (m, d, d); a line in 3D is a triangle."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -87,7 +87,7 @@ def flat_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def _once(rows: np.ndarray) -> np.ndarray:
-    """Ascending indices of the rows (n, k) that occur an odd number of times."""
+    """Ascending indices of rows (n, k) that occur an odd number of times."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     begin = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
@@ -118,7 +118,7 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 
 
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
-    """Skin of closed shells of `points` (n, 3), `triangles` (m, 3).
+    """Closed shells of `points` (n, 3), `triangles` (m, 3).
 
     Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
     ScriptError for an edge with an odd number of triangles.
@@ -160,7 +160,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Merge equal vertices; raise ScriptError if the surface is open."""
+    """Equal vertices are merged; ScriptError if the surface is open."""
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
@@ -211,7 +211,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Reorient triangles: two at an edge run through it in opposite directions."""
+    """Two triangles at an edge run through it in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -236,7 +236,7 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number the shells (m,) of triangles by common edges (3 m,); not `sided`: by edges of two."""
+    """Number shells by common edges (3 m,); not `sided`: by edges of two."""
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2
@@ -262,7 +262,7 @@ def _within(
 
 
 def _sample(faces: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) at corners and along edges of triangles."""
+    """(n, 3) at corners and along edges."""
     some = faces[:: max(1, 21 * len(faces) // _SAMPLES)]
     fraction = np.linspace(0, 1, 8)[:-1, None, None, None]
     return ((1 - fraction) * some + fraction * np.roll(some, -1, axis=1)).reshape(-1, 3)

@@ -34,7 +34,7 @@ class Faces(NamedTuple):
 
 
 def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
-    """Outer faces, at the edge of a region, of the points `ids` inside it.
+    """Outer faces of the points `ids` inside a region.
 
     Points are boxes; a face counts if the centre of the adjacent box of the same size is outside.
     Boxes cut by a region: `faces_cut`.
@@ -74,7 +74,7 @@ def joined(tables: Sequence[Columns]) -> Columns:
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
-    """The surface of a region at the points `ids` of a solid that fills it.
+    """Its surface at the points `ids` of a solid that fills it.
 
     The surface in a part of a box belongs to the nearest inside point in this box or an adjacent
     one.
@@ -115,14 +115,14 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
-    """Centres (n PARTS^d, d) of the parts of boxes of edge length `size` around `x`."""
+    """Centres (n PARTS^d, d) of the parts of boxes around `x`."""
     d = x.shape[1]
     places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
     return (x[:, None, :] + size * places).reshape(-1, d)
 
 
 def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
-    """Area (n,) of the surface in boxes around `x`: by parts at an edge."""
+    """Area (n,) in boxes around `x`: by parts at an edge."""
     lengths, d = np.linalg.norm(area, axis=1), x.shape[1]
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
     depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
@@ -138,7 +138,7 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Faces at the points `ids` of a solid whose boxes were cut: see `surface_at`.
+    """For cut boxes: see `surface_at`.
 
     Projections of the surface across the axes. At an edge within a part of a box, opposite
     projections cancel, and only the difference remains.
@@ -157,7 +157,7 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """The surface of a region at the points `ids` of a solid, in every orientation."""
+    """The surface at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     none = np.zeros(len(pieces.point), np.int64)
     area = pieces.length * solid.domain.depth(pieces.middle)
@@ -188,7 +188,7 @@ class OnEdge(Fix):
                 )
 
     def faces_at(self, ids: np.ndarray) -> Faces:
-        """Faces of the points in a view, by their rows there; cached."""
+        """By rows in the view; cached."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
@@ -203,12 +203,12 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Faces from the surface of the region; None to find them from the boxes."""
+        """From the surface of the region; None to find them from the boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
-        """Solids whose faces come from the surface, with the faces of all their points."""
+        """Solids whose faces come from the surface, with all faces."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
         by_solid = {}
         for solid in self.hub.solids.values():

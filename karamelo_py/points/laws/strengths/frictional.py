@@ -32,7 +32,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
-    """Cohesion, friction and dilation after a plastic strain.
+    """Cohesion, friction and dilation.
 
     Linear from the peak to the residual; a step uses the values at its beginning.
     """
@@ -44,14 +44,14 @@ def surface(strength, strain):
 
 
 def lowest_pressure(strength, strain):
-    """The largest sustainable tension, as a pressure: -cohesion / friction or a given bound."""
+    """-cohesion / friction, or a given bound."""
     cohesion, friction, _ = surface(strength, strain)
     return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
 
 @point_function(otherwise=True)
 def tension_bound(strength, lowest):
-    """The lowest pressure, for a yield surface that ends at `lowest`."""
+    """If the yield surface ends at `lowest`."""
     return lowest
 
 
@@ -60,8 +60,8 @@ def fraction_by_dilatancy(strength, memory):
 
     Averaging multiplies waves by a (1 for long waves, 0.1 to 0.5 for two or three cells). Their
     stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with the
-    sines f of friction and d of dilatancy. With b = 0 it is negative for a between d and f:
-    pressure grows in stripes, and strength falls. With b = (f - d)/(f (1 - d)) it is a square.
+    sines f of friction and d of dilatancy: with b = 0 negative for a between d and f (pressure
+    grows in stripes, and strength falls), with b = (f - d)/(f (1 - d)) a square.
     """
     f, d = sines_after(strength, memory.ep)
     # The sine of a steep cone in plane strain may be above 1.
@@ -84,7 +84,7 @@ def elastic_part(strength, memory, j):
 
 
 def respond_by_friction(strength, law, kin, step, memories):
-    """Return an elastic trial to the yield surface, and store the plastic volume change."""
+    """Return to the yield surface, and store the plastic volume change."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
     elastic = elastic_part(strength, memory, step.j)
@@ -167,7 +167,7 @@ def little_dilatancy(strength):
 
 
 def _vibrates(strength, scene):
-    """Check whether a strain cycle of a point at its limit releases more work than it takes.
+    """A strain cycle of a point at its limit releases more work than it takes.
 
     Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, f the sine of friction.
     """
@@ -203,7 +203,7 @@ def _poisson(K_over_G):
 
 
 class Soil(NamedTuple):
-    """Constants of a soil, as scripts give them: angles in degrees, None without softening."""
+    """Constants as scripts give them: angles in degrees, None without softening."""
 
     cohesion: float
     phi: float
