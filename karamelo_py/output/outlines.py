@@ -40,7 +40,7 @@ class Tool(NamedTuple):
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Where points x (n, 2) fill half of the space: lines (m, 2).
+    """Lines (m, 2) where points x (n, 2) fill half of the space.
 
     Points are scattered to nodes of cells of their size, over three cells: a node at the surface
     gets half as much as nodes inside.

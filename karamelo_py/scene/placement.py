@@ -160,7 +160,7 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill it in chunks of cells, x outermost; ScriptError for more points than numbers or `room`."""
+    """Fill it in chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
     placed = Placement(

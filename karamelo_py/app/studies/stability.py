@@ -300,7 +300,7 @@ class Map:
         return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
-        """Where a ratio is 1, at or beyond its known values."""
+        """Position where a ratio is 1, at or beyond its known values."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
