@@ -21,6 +21,7 @@ WORDS = {
     "studies/sweep": "parameter sweep variation batch of runs table design of experiments",
     "studies/chart": "plot error cost order of convergence Pareto compare curves",
     "studies/sampling": "uncertainty Monte Carlo random probability reliability Sobol Morris",
+    "studies/elsewhere": "cluster Dask Slurm PBS MPI pool distributed batch array job",
     "studies/fit": "calibrate calibration inverse least squares parameter identification",
     "studies/advise": "cheapest set-up accuracy target optimisation which mesh size",
     "studies/stability": "stable time step map Courant unstable limit",

@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from difflib import SequenceMatcher
 from importlib import import_module
 from pathlib import Path
@@ -145,7 +146,8 @@ def _dispatch(arguments: list[str]) -> int:
     if surplus:
         raise _surplus(arguments, surplus, commands.choices.get(arguments[0], parser))
     size, rank = launched()
-    if size > 1 and arguments[0] != "run" and (rank or arguments[0] != "check"):
+    pooled = "on" in options and options.on == "mpi"  # the others work for this one
+    if size > 1 and not pooled and arguments[0] != "run" and (rank or arguments[0] != "check"):
         if rank == 0:
             raise ScriptError(
                 f"karamelo-py {arguments[0]} is of one process, and {size} were started",
@@ -155,7 +157,8 @@ def _dispatch(arguments: list[str]) -> int:
     options.command_line = arguments
     if options.act is not _run:  # run imports more first
         begun()
-    return options.act(options)
+    with ExitStack() as options.ends:
+        return options.act(options)
 
 
 def begun() -> None:

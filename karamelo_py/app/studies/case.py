@@ -226,11 +226,15 @@ def command_of(script: str | Path, case: Mapping[str, str]) -> str:
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
 
+OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # of a pool of processes
+
+
 def environment() -> dict[str, str]:
     """Runs import this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
-    return {**os.environ, STUDY: str(os.getpid()), "PYTHONPATH": path}
+    inherited = {name: text for name, text in os.environ.items() if not name.startswith(OF_MPI)}
+    return {**inherited, STUDY: str(os.getpid()), "PYTHONPATH": path}
 
 
 def record_of(folder: Path) -> Record:

@@ -9,6 +9,7 @@ import time
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,9 +30,23 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from karamelo_py.app.live.study import StudyPage
+    from karamelo_py.app.studies.elsewhere import Elsewhere
 
 _FACTS = ("seconds", "points", "steps")
 _STATUS = 24  # least width of the status while facts are shown
+
+
+class Here:
+    """Runs cases on this machine, each in a process."""
+
+    def __init__(self, launch: Launch, jobs: int):
+        self.launch, self.size, self.pool = launch, jobs, ThreadPoolExecutor(jobs)
+
+    def submit(self, case: Mapping[str, str], folder: Path) -> Future:
+        return self.pool.submit(self.launch.run, case, folder)
+
+    def close(self) -> None:
+        self.pool.shutdown(wait=True, cancel_futures=True)
 
 
 @dataclass
@@ -47,6 +62,7 @@ class Study:
     most: int = 0  # 0: `run` gets all cases
     writes: bool = True  # write the table after each run
     page: StudyPage | None = None  # with --live
+    elsewhere: Elsewhere | None = None  # with -on
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
     claim: Claim | None = None  # of the folder
     ran: int = 0
@@ -112,7 +128,7 @@ class Study:
         return [self.rows[tuple(case.values())] for case in cases]
 
     def _run(self, queue: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
-        pool = ThreadPoolExecutor(self.jobs)
+        place: Any = self.elsewhere or Here(self.launch, self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
         compiled = {kind_of(key) for key in self.rows}
@@ -124,11 +140,11 @@ class Study:
 
         try:
             while queue or running:
-                while len(running) < self.jobs and (item := ready()):
+                while len(running) < place.size and (item := ready()):
                     queue.remove(item)
                     case, folder = item
                     started.add(kind_of(case.values()))
-                    running[pool.submit(self.launch.run, case, folder)] = case
+                    running[place.submit(case, folder)] = case
                     display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -145,7 +161,8 @@ class Study:
             self.launch.stop.set()
             raise
         finally:
-            pool.shutdown(wait=True, cancel_futures=True)
+            if self.elsewhere is None:
+                place.close()
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
         """KeyboardInterrupt if the study was stopped on the page."""
@@ -160,7 +177,10 @@ class Study:
     def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
             raise Refused(case, outcome)
-        self.rows[tuple(case.values())] = row(case, outcome, self.items, self.folder.parent)
+        made = row(case, outcome, self.items, self.folder.parent)
+        if self.elsewhere:
+            made = {**made, "machine": self.elsewhere.machines.get(outcome.folder, "")}
+        self.rows[tuple(case.values())] = made
 
 
 class _Display:
@@ -320,4 +340,9 @@ def open_study(
         study.page = StudyPage(options.script, names, words, axes=axes, base=study.folder.parent)
         print(f"live: {study.page.server.address}", flush=True)
     study.describe(variables=plan.values, **facts)
+    if options.on:
+        from karamelo_py.app.studies.elsewhere import opened, packed
+
+        package = packed(plan.script, plan.launch, plan.values, options.keep)
+        study.elsewhere = options.ends.enter_context(closing(opened(options, package, plan.jobs)))
     return study

@@ -26,6 +26,8 @@ from karamelo_py.script.syntax import Assignment, CommandCall, FunctionCall, Nod
 from karamelo_py.script.terms import number_of
 
 VALUES = "NAME=value,value,... or NAME=first:last:count"
+QUEUES = {"slurm": "SLURMCluster", "pbs": "PBSCluster", "lsf": "LSFCluster", "sge": "SGECluster"}
+WHERE = f"local, tcp://HOST:PORT of a Dask scheduler, {', '.join(QUEUES)}, or mpi"
 _NAME = re.compile(r"[^\W\d]\w*")
 _MOST = 100_000
 
@@ -235,6 +237,11 @@ def add_family(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-limit", type=above_zero, metavar="SECONDS", help="stop a run that takes longer"
     )
+    parser.add_argument("-on", metavar="WHERE", help=f"run the cases elsewhere: {WHERE}")
+    parser.add_argument(
+        "-keep", action="append", default=[], metavar="FILES",
+        help="files of each run that return from -on besides the log: 'dump*'",
+    )  # fmt: skip
     parser.add_argument("-again", action="store_true", help="repeat runs of earlier studies, too")
     parser.add_argument(
         *LIVE, action="store_true", help="show the running study on a page in a browser"

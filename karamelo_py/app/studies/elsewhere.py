@@ -1,0 +1,220 @@
+"""Cases of a study on other machines: Dask, its job queues, or MPI.
+
+A case travels as data: the script, its files and the variables. The machine that runs it returns
+the log, the record and the files that -keep names, so no disk has to be shared.
+"""
+
+import re
+import shutil
+import socket
+from argparse import Namespace
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import ExitStack
+from functools import lru_cache
+from importlib.util import find_spec
+from os.path import commonpath
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+from karamelo_py.app.studies.case import KEPT, CaseOutcome, Launch
+from karamelo_py.app.studies.variables import QUEUES, WHERE, ScriptFiles
+from karamelo_py.output.files import reported
+from karamelo_py.output.record import NAME, surroundings
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.syntax import CommandCall
+
+PATIENCE = 10  # seconds for a scheduler to answer
+TRIES = 3
+QUOTED = re.compile(r'"([^"\n]*)"')
+RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
+
+
+class Package(NamedTuple):
+    """All that a case needs but its variables."""
+
+    script: str  # path below a common folder
+    files: tuple[tuple[str, bytes], ...]  # paths below it, and contents
+    launch: tuple[int, int, float | None]  # threads, repetitions, limit (s)
+    texts: tuple[str, ...]
+    keep: tuple[str, ...]  # patterns of further files to return
+    versions: tuple[tuple[str, str], ...]
+
+
+class Returned(NamedTuple):
+    outcome: CaseOutcome
+    files: dict[str, bytes]
+    machine: str
+
+
+def versions() -> tuple[tuple[str, str], ...]:
+    found = surroundings()["versions"]
+    found["python"] = ".".join(found["python"].split(".")[:2])
+    return tuple(found.items())
+
+
+def packed(
+    script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str]
+) -> Package:
+    """Collect the script, its includes, and the files that its arguments or variables name."""
+    paths = {path.resolve() for path in script.statements}
+    words = {(script.path, word) for words in values.values() for word in words}
+    for path, statements in script.statements.items():
+        for one in statements:
+            words |= {(path, quoted) for quoted in QUOTED.findall(one.raw.code)}
+            if isinstance(one, CommandCall):
+                words |= {(path, raw.code.strip()) for raw in one.arguments}
+    for path, word in words:
+        if word and "\n" not in word and len(word) < 1000 and (path.parent / word).is_file():
+            paths.add((path.parent / word).resolve())
+    root = Path(commonpath([path.parent for path in paths]))
+    files = tuple((path.relative_to(root).as_posix(), path.read_bytes()) for path in sorted(paths))
+    name = script.path.resolve().relative_to(root).as_posix()
+    settings = launch.threads, launch.repeat, launch.limit
+    return Package(name, files, settings, launch.texts, tuple(keep), versions())
+
+
+@lru_cache(maxsize=2)
+def _unpacked(package: Package) -> tuple[Launch, TemporaryDirectory]:
+    folder = TemporaryDirectory(prefix="karamelo-py-")
+    for name, content in package.files:
+        path = Path(folder.name) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    return Launch(Path(folder.name) / package.script, *package.launch, package.texts), folder
+
+
+def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
+    """Run a case on the machine of a worker."""
+    machine = socket.gethostname()
+    differ = [
+        f"{name} {here} for {there}"
+        for (name, there), (_, here) in zip(package.versions, versions(), strict=True)
+        if here != there
+    ]
+    if differ:
+        outcome = CaseOutcome("failed", f"{machine} has {', '.join(differ)}", {}, code="busy")
+        return Returned(outcome, {}, machine)
+    launch, _ = _unpacked(package)
+    with TemporaryDirectory(prefix="karamelo-py-case-") as name:
+        folder = Path(name)
+        outcome = launch.run(case, folder)
+        paths = {folder / one for one in RETURNED}
+        paths |= {path for pattern in package.keep for path in folder.glob(pattern)}
+        files = {path.name: path.read_bytes() for path in sorted(paths) if path.is_file()}
+    return Returned(outcome, files, machine)
+
+
+class Elsewhere:
+    """Runs cases by an executor; a case that is lost is tried again."""
+
+    def __init__(self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack):
+        """`send` makes the package known to the machines; what it returns goes with each case."""
+        self.send, self.executor, self.size, self.ends = send, executor, size, ends
+        self.package = send()
+        # Callbacks run in the thread that talks to the machines: it must not wait for them.
+        self.retries = ends.enter_context(ThreadPoolExecutor(1))
+        self.machines: dict[Path, str] = {}  # of folders
+
+    def submit(self, case: Mapping[str, str], folder: Path) -> Future:
+        """A future of the case's outcome, whose files are in `folder`."""
+        outer: Future = Future()
+        self._try(case, folder, outer, 1)
+        return outer
+
+    def _try(self, case: Mapping[str, str], folder: Path, outer: Future, tries: int) -> None:
+        def finished(inner: Future) -> None:
+            try:
+                outer.set_result(self._received(inner.result(), folder))
+            except ScriptError as error:  # a full disk here
+                outer.set_exception(error)
+            except Exception as error:  # the machine, or its copy of the package
+                if tries < TRIES:
+                    self.retries.submit(self._again, case, folder, outer, tries + 1)
+                    return
+                words = f"{type(error).__name__}: {error}".splitlines()[0]
+                reason = f"lost {TRIES} times: {words}"
+                outer.set_result(CaseOutcome("killed", reason, {}, folder))
+
+        try:
+            self.executor.submit(run_sent, self.package, dict(case)).add_done_callback(finished)
+        except Exception as error:  # the executor has gone
+            outer.set_result(CaseOutcome("killed", f"not started: {error}", {}, folder))
+
+    def _again(self, *attempt: Any) -> None:
+        self.package = self.send()
+        self._try(*attempt)
+
+    def _received(self, result: Returned, folder: Path) -> CaseOutcome:
+        with reported(folder):
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+            for name, content in result.files.items():
+                (folder / name).write_bytes(content)
+        self.machines[folder] = result.machine
+        result.outcome.folder = folder
+        return result.outcome
+
+    def close(self) -> None:
+        self.ends.close()
+
+
+def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
+    """Connect to the machines that -on names."""
+    ends = ExitStack()
+    if options.on == "mpi":
+        return _mpi(package, ends)
+    kinds = ("local", *QUEUES)
+    if options.on not in kinds and "://" not in options.on:
+        raise ScriptError(f"-on {options.on}", expected=WHERE)
+    needed = "dask_jobqueue" if options.on in QUEUES else "distributed"
+    if find_spec(needed) is None:
+        hint = "pip install '.[dask]' in the folder of karamelo-py"
+        raise ScriptError(f"-on {options.on} needs {needed.replace('_', '-')}", hint=hint)
+    from distributed import Client, LocalCluster
+
+    try:
+        if options.on == "local":
+            cluster: Any = ends.enter_context(
+                LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
+            )
+        elif options.on in QUEUES:
+            import dask_jobqueue
+
+            cluster = ends.enter_context(getattr(dask_jobqueue, QUEUES[options.on])())
+            cluster.scale(jobs=jobs)
+        else:
+            cluster = options.on
+        client = ends.enter_context(Client(cluster, timeout=PATIENCE))
+    except OSError as error:
+        raise ScriptError(
+            f"no scheduler answers at {options.on}: {str(error).splitlines()[0]}",
+            expected="the address that 'dask scheduler' has printed",
+        ) from None
+    except ValueError as error:
+        raise ScriptError(f"-on {options.on}: {error}", expected=WHERE) from None
+    if options.on not in QUEUES:
+        jobs = options.jobs or sum(client.nthreads().values()) or jobs
+    executor = ends.enter_context(client.get_executor(retries=0))
+
+    def send() -> Any:
+        return client.scatter(package, broadcast=True, hash=False)
+
+    return Elsewhere(send, executor, jobs, ends)
+
+
+def _mpi(package: Package, ends: ExitStack) -> Elsewhere:
+    if find_spec("mpi4py") is None:
+        hint = "pip install '.[mpi]' in the folder of karamelo-py"
+        raise ScriptError("-on mpi needs mpi4py", hint=hint)
+    from mpi4py import MPI
+    from mpi4py.futures import MPIPoolExecutor
+
+    size = MPI.COMM_WORLD.Get_size() - 1
+    if size < 1:
+        raise ScriptError(
+            "-on mpi: there is one process",
+            expected='mpiexec -n 5 python -m mpi4py.futures "$(which karamelo-py)" sweep ...',
+        )
+    return Elsewhere(lambda: package, ends.enter_context(MPIPoolExecutor()), size, ends)

@@ -1,0 +1,167 @@
+"""Studies on other machines: Dask, MPI; workers that are lost; what travels with a case."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+
+import pandas
+import pytest
+from test_sampling import SCRIPT
+
+from karamelo_py.app.cli import main
+from karamelo_py.app.studies import elsewhere, variables
+from karamelo_py.app.studies.case import Launch
+
+TIMES = ["seconds", "cpu_seconds", "seconds_spread", "particle_steps_per_s", "peak_memory_mib"]
+OF_MACHINES = [*TIMES, "wall_s", "folder", "machine"]
+WORDS = ["-var", "a=1:2:6", "-record", "v_x", "-jobs", "2"]
+
+distributed = pytest.importorskip("distributed")
+pytestmark = pytest.mark.xdist_group("machines")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    (tmp_path / "in.lin").write_text(SCRIPT, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture
+def scheduler(tmp_path_factory):
+    """Two workers with folders of their own."""
+    folder = tmp_path_factory.mktemp("dask")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(folder)
+    ) as cluster:
+        yield cluster
+
+
+def numbers(path):
+    table = pandas.read_csv(path)
+    return table.drop(columns=[name for name in OF_MACHINES if name in table])
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_a_killed_worker_changes_nothing(folder, scheduler, capsys):
+    """SIGKILL midway; the table is that of one machine, and what -keep names comes back."""
+    text = SCRIPT.replace("run(1)", "dump(d, all, particle, 1, d.*.txt, x)\nrun(1)")
+    (folder / "in.lin").write_text(text, encoding="utf-8")
+    (folder / "other").mkdir()
+
+    def kill():
+        while not list(folder.glob("far/*/run.json")):
+            time.sleep(0.02)
+        os.kill(next(iter(scheduler.workers.values())).pid, signal.SIGKILL)
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    address = scheduler.scheduler_address
+    assert main(["sweep", "in.lin", *WORDS, "-on", address, "-keep", "d.1*", "-o", "far.csv"]) == 0
+    killer.join(10)
+    assert not killer.is_alive()
+    assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
+    assert numbers("far.csv").equals(numbers("here.csv"))
+    assert (pandas.read_csv("far.csv").machine == os.uname().nodename).all()
+    kept = folder / "far" / "a=2"
+    assert {path.name for path in kept.iterdir()} == {*elsewhere.RETURNED, "d.1.txt"}
+    capsys.readouterr()
+    assert main(["sweep", "in.lin", *WORDS, "-on", address, "-keep", "d.1*", "-o", "far.csv"]) == 0
+    assert "; 6 were known" in capsys.readouterr().out
+
+
+def test_a_pool_of_mpi(folder):
+    pytest.importorskip("mpi4py")
+    start = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or "mpiexec"
+    if not shutil.which(start):
+        pytest.skip("no mpiexec")
+    program = "from karamelo_py.app.start import main\nif __name__ == '__main__':\n    main()\n"
+    (folder / "program.py").write_text(program, encoding="utf-8")
+    root = ["--allow-run-as-root"] if os.geteuid() == 0 else []
+    command = [start, *root, "--oversubscribe", "-n", "3", sys.executable, "-m"]
+    command += ["mpi4py.futures", "program.py", "sweep", "in.lin", *WORDS, "-on", "mpi"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
+    assert numbers("sweep.csv").equals(numbers("here.csv"))
+
+
+def package_of(path, **values):
+    script = variables.ScriptFiles(path)
+    return elsewhere.packed(script, Launch(path, texts=script.texts()), values, ())
+
+
+def test_the_files_of_a_script_travel_with_it(folder):
+    """Includes, tables of formulas and files named by variables, where they lie to each other."""
+    (folder / "parts").mkdir()
+    (folder / "parts" / "more.txt").write_text('k = 1\nload_file = "loads.csv"\n', "utf-8")
+    (folder / "parts" / "loads.csv").write_text("x,y\n0,1\n", "utf-8")
+    (folder / "body.msh").write_text("mesh", "utf-8")
+    (folder / "secret.txt").write_text("not named", "utf-8")
+    text = 'mesh = "none"\ninclude(parts/more.txt)\n' + SCRIPT
+    (folder / "in.lin").write_text(
+        text + "dump(d, all, particle, 1, parts/loads.csv, x)\n", "utf-8"
+    )
+    package = package_of(folder / "in.lin", mesh=["body.msh"])
+    names = {name for name, _ in package.files}
+    assert names == {"in.lin", "parts/more.txt", "parts/loads.csv", "body.msh"}
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_a_machine_with_other_versions_refuses_the_case(folder):
+    package = package_of(folder / "in.lin")
+    others = dict(package.versions) | {"numba": "0.1"}
+    result = elsewhere.run_sent(package._replace(versions=tuple(others.items())), {"a": "1"})
+    assert result.outcome.status == "failed" and not result.files
+    assert "for 0.1" in result.outcome.reason and "numba" in result.outcome.reason
+    result = elsewhere.run_sent(package, {"a": "1"})
+    assert result.outcome.status == "done" and set(result.files) == set(elsewhere.RETURNED)
+
+
+class Losing(ThreadPoolExecutor):
+    """Loses the first cases that it gets."""
+
+    def __init__(self, lost):
+        super().__init__(1)
+        self.lost = lost
+
+    def submit(self, function, *arguments):
+        self.lost -= 1
+        if self.lost >= 0:
+            return super().submit(lambda: (_ for _ in ()).throw(MemoryError("worker is gone")))
+        return super().submit(function, *arguments)
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+@pytest.mark.parametrize(("lost", "status"), [(2, "done"), (3, "killed")])
+def test_a_lost_case_is_tried_twice_more(folder, lost, status):
+    with Losing(lost) as pool:
+        place = elsewhere.Elsewhere(lambda: package_of(folder / "in.lin"), pool, 1, ExitStack())
+        outcome = place.submit({"a": "1"}, folder / "case").result(60)
+    assert outcome.status == status
+    assert status == "done" or outcome.reason == "lost 3 times: MemoryError: worker is gone"
+
+
+@pytest.mark.parametrize(
+    ("where", "says"),
+    [
+        ("mars", "expected: local, tcp://HOST:PORT of a Dask scheduler"),
+        ("tcp://127.0.0.1:9", "no scheduler answers at tcp://127.0.0.1:9"),
+        ("tpc://127.0.0.1:9", "-on tpc://127.0.0.1:9"),
+        ("mpi", "there is one process"),
+        ("slurm", "-on slurm needs dask-jobqueue"),
+    ],
+)
+def test_places_that_are_refused(folder, capsys, monkeypatch, where, says):
+    monkeypatch.setattr(elsewhere, "PATIENCE", 1)
+    assert main(["sweep", "in.lin", *WORDS, "-on", where]) == 1
+    err = capsys.readouterr().err
+    assert says in err and "Traceback" not in err
