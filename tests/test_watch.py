@@ -204,7 +204,7 @@ def test_work_on_nodes_of_little_mass_is_what_points_take(run_interpreted, schem
     text = PULLED.format("ulmpm", scheme, PULL.replace("1e4*min(time/0.2, 1)", "1e3"))
     text = text.replace("linear", "quadratic-spline").replace("0, 2)", "0.4, 1.6)", 1)
     text = text.replace("-0.01, 0.01", "-INF, 0.4").replace("1.99, 2.01", "1.5, INF")
-    result = run_interpreted(text.replace("0.35", "0.15"))
+    result = run_interpreted(text.replace("0.35", "0.23"))
     assert abs(float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])) < 1
     assert "energy balance" not in result.err
 
