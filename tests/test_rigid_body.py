@@ -1,11 +1,14 @@
 """Fix rigid_body: rigid bodies that move by the forces on them, and fix contact/rigid_body."""
 
 from math import cos, pi, radians, sin
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import INPUTS
 from going_on import goes_on, with_files
+
+from karamelo_py.kernels import free_bodies as kernel
 
 pytestmark = pytest.mark.xdist_group("rigid body")
 ALONE = """
@@ -243,3 +246,45 @@ def test_rigid_bodies_that_pass_through_each_other_are_reported(run_interpreted)
     # Leapfrog of period 2 pi: 2 arcsin(dt / 2) / dt.
     rate = 2 * np.arcsin(0.05) / 0.1
     assert result.log.b_x == pytest.approx(4 - np.cos(rate * result.log.Time), rel=1e-3)
+
+
+def body_among(contacts, velocity, mass, dofs):
+    """What Newton's method reads of a body at the origin with some contacts."""
+    vectors = np.zeros((kernel.ROWS, 6))
+    vectors[kernel.START_P], vectors[kernel.U] = mass * velocity, velocity
+    matrices = np.zeros((2, 6, 7))
+    matrices[0, :, :6] = np.diag(mass)
+    return SimpleNamespace(
+        contacts=contacts, vectors=vectors, matrices=matrices, lever=np.eye(3, 6),
+        state=np.zeros(kernel.STATE), dofs=np.array(dofs),
+    )  # fmt: skip
+
+
+def test_impulses_are_found_for_light_bodies_with_much_friction():
+    """60 random contacts: mu up to 1, a body down to 0.001 of what it touches; Coulomb's law."""
+    random = np.random.default_rng(1)
+    for case in range(60):
+        count, d, mu = (2, 6, 20)[case % 3], 2 + case % 2, (0.3, 0.6, 1.0)[case % 3]
+        c = np.zeros((count, kernel.COLUMNS))
+        normal = random.normal(size=(count, 3)) - (0, 1, 0)
+        normal[:, d:] = 0
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        c[:, kernel.AT : kernel.AT + 3] = c[:, kernel.NORMAL : kernel.NORMAL + 3] = normal
+        c[:, kernel.SOFT_V : kernel.SOFT_V + d] = random.normal(0, 0.3, (count, d))
+        c[:, kernel.SOFT_MASS], c[:, kernel.MU] = random.uniform(0.1, 1, count), mu
+        c[:, kernel.SHARE] = 0.1
+        mass = np.repeat([2.0, 1.0], 3) * c[:, kernel.SOFT_MASS].sum() * 10.0 ** -(case % 4)
+        dofs = [1] * 6 if d == 3 else [1, 1, 0, 0, 0, 1]
+        start = (random.normal(size=6) - (0, 1, 0, 0, 0, 0)) * dofs
+        body = body_among(c, start, mass, dofs)
+        kernel._solve(body, count, 1e-3)
+        assert body.state[kernel.FAILED] == 0
+        # M (U - U*) and the impulses at the places, about the centre, add up to nothing.
+        p = c[:, kernel.IMPULSE : kernel.IMPULSE + 3]
+        total = np.concatenate([p.sum(axis=0), np.cross(normal, p).sum(axis=0)])
+        rest = mass * (body.vectors[kernel.U] - start) + total
+        assert rest[np.array(dofs) > 0] == pytest.approx(0, abs=1e-9 * np.abs(mass * start).max())
+        push = (p * normal).sum(axis=1)
+        assert (push >= 0).all()
+        rub = np.linalg.norm(p - push[:, None] * normal, axis=1)
+        assert (rub <= mu * push * (1 + 1e-9) + 1e-12).all()

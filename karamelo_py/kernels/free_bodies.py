@@ -19,7 +19,7 @@ Wisdom 1994, "Lie-Poisson integrators for rigid body dynamics in the solar syste
 free top oscillates by O(dt^2) and does not drift.
 """
 
-from math import cos, sin, sqrt
+from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -460,7 +460,8 @@ def _velocities_of(body, row):
 def _finish(body, s, total):
     """Take the momentum that contact leaves, move the body, and publish.
 
-    `total` (6,): impulses of the body on others, about its centre.
+    `total` (6,): impulses of the body on others, about its centre. Returns their product with the
+    change of its velocity.
     """
     state, vectors, dt = body.state, body.vectors, s.control.values[DT]
     kick = s.control.step[0].kick
@@ -470,8 +471,9 @@ def _finish(body, s, total):
         vectors[STEP, a] = vectors[START_P, a] - total[a]
     _velocities_of(body, STEP)
     u, M, before = vectors[U], body.matrices[0], vectors[TRIAL]
-    partly = False
+    partly, change = False, 0.0
     for k in range(3):
+        change += total[k] * (u[k] - state[V + k]) + total[3 + k] * (u[3 + k] - state[W + k])
         state[V + k], state[W + k] = u[k], u[3 + k]
         state[MOVE + k] = u[k]
         state[L + k] = M[3 + k, 3] * u[3] + M[3 + k, 4] * u[4] + M[3 + k, 5] * u[5]
@@ -499,8 +501,7 @@ def _finish(body, s, total):
         state[X + a] += dt * u[a]
     _set_angle(state, dt, s.kin.dimension)
     _publish(body, s.control.values)
-    for a in range(3):  # for the points, about the old centre
-        vectors[TRIAL, a] = before[a]
+    return change
 
 
 @noinline
@@ -510,18 +511,9 @@ def _set_angle(state, dt, dimension):
         return
     sign = 1.0 if state[Q] >= 0 else -1.0
     size = sqrt(state[Q + 1] ** 2 + state[Q + 2] ** 2 + state[Q + 3] ** 2)
-    angle = 2.0 * _arc(size, sign * state[Q])
+    angle = 2.0 * atan2(size, sign * state[Q])
     for k in range(3):
         state[ANGLE + k] = sign * state[Q + 1 + k] * (angle / size if size > 0 else 2.0)
-
-
-@noinline
-def _arc(s, c):
-    """Return the angle in [0, pi/2] with this sine and cosine, by Newton's method from a guess."""
-    angle = s if s < 0.7 else 1.5707963267948966 - c
-    for _ in range(6):
-        angle += s * cos(angle) - c * sin(angle)
-    return angle
 
 
 @noinline
@@ -751,7 +743,10 @@ def _part(s):
         else:
             for number, block in enumerate(s.blocks):
                 _give_to_points(body, s, block, number, True)
-        _finish(body, s, body.vectors[SUM])
+        change = _finish(body, s, body.vectors[SUM])
+        if isinstance(s.contact, SeparateFields):
+            # Contact took the velocity at the end of the step, not the mean of both ends.
+            add_to(s.control.totals, WORK, -0.5 * change)
 
 
 @kernel
