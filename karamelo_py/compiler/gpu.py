@@ -174,10 +174,7 @@ def library() -> bytes:
 def text_of(
     function: Callable, kinds: tuple, on_card: bool, called: dict | None = None
 ) -> tuple[str, str]:
-    """Return name and module text of a thread function for its further arguments.
-
-    `called` as in `values.in_one`.
-    """
+    """Return name and module text of a thread function; `called` as in `values.in_one`."""
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
         module, _ = written(function, (types.int64, *kinds), types.none, entry)

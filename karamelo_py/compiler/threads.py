@@ -163,10 +163,7 @@ if hasattr(os, "register_at_fork"):
 def _share_out(
     count: int, run_range: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
-    """Run a task for each index in [0, count) by a function of ranges.
-
-    `threads`: their number; 0 for all.
-    """
+    """Run a task for each index in [0, count) by a function of ranges; 0 `threads`: all."""
     do, threads = _PART(run_range), threads or config.NUMBA_NUM_THREADS
     size = min(count, threads)
     ends = [count * k // size for k in range(size + 1)] if size else [0, 0]

@@ -142,10 +142,7 @@ class TileVisit(NamedTuple):
 
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
-    """Visit the points of the t-th occupied tile of a block, in a fused or a single stage.
-
-    After a point that failed, a tile scatters nothing more.
-    """
+    """Visit the points of the t-th tile of a block; after a failed point, nothing is scattered."""
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])

@@ -197,10 +197,7 @@ class Flow:
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
-        """Start a loop; return the variables, with phis for changing ones.
-
-        `grown` are new types, from `Grows`.
-        """
+        """Start a loop; return the variables, with phis for changing ones; `grown`: see `Grows`."""
         phis: list[Phi] = []
         paths: list[tuple] = []
 

@@ -39,10 +39,7 @@ def _is_of_values(one: type) -> bool:
 
 
 class Lowering:
-    """Writes code with a builder, or only determines types.
-
-    ``seen(thing)`` replaces globals of traced functions.
-    """
+    """Writes code with a builder, or only determines types; ``seen(thing)`` replaces globals."""
 
     dispatch: Callable  # calls functions selected by type
     key: tuple | None = None  # of the function whose result type is being determined

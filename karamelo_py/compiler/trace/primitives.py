@@ -144,10 +144,7 @@ def _round_off(like):
 
 
 def index(i: int) -> int:
-    """Return `i` as a non-negative array index.
-
-    Saves the test for negative indices at each access (10 % of a sweep).
-    """
+    """Return `i` as a non-negative array index: saves a test at each access (10 % of a sweep)."""
     return i
 
 
