@@ -84,7 +84,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def locks(self) -> bool:
-        """True if linear cells hold several points, so that isochoric flow locks."""
+        """Linear cells hold several points, so that isochoric flow locks."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
         return self.hats and (self.d > 1 or self.hub.domain.kin.hoops > 0) and not free
 
@@ -100,7 +100,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def moving_walls(self) -> bool:
-        """True if a rigid solid moves or a fix leads its points."""
+        """A rigid solid moves or a fix leads its points."""
         rigid = [solid.rigid for solid in self.hub.solids.values()]
         led = (fix for fix in self.hub.fixes.values() if fix.leads_points)
         led = (fix for fix in led if not all(map(is_zero, fix.formulas)))
@@ -115,7 +115,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def impact(self) -> float:
-        """Half of the largest velocity difference over the wave speed."""
+        """Half of the largest velocity difference, over the wave speed."""
         if not (self.motions and self.waves > 0):
             return 0.0
         fast = np.max([motion.fast for motion in self.motions], axis=0)
@@ -133,14 +133,14 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def sag(self) -> float:
-        """Strain of a solid under its own weight, g L/c^2."""
+        """Under its own weight: strain g L/c^2."""
         sizes = [motion.high - motion.low for motion in self.motions]
         strains = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
         return max((float(strain.max()) for strain in strains), default=0.0)
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain of the slenderest solid by weight or motion.
+        """Of the slenderest solid, by weight or motion.
 
         Cantilever of length L and height H: 3 g L^2/(H c^2). Beam whose kinetic energy becomes
         strain energy: sqrt(3) v/c.
@@ -164,7 +164,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def passes(self) -> float:
-        """Path of points past each other at present velocities, over twice the longest side."""
+        """Of points past each other at present velocities, over twice the longest side."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 

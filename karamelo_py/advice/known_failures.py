@@ -1,7 +1,7 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-Parts declare their rules (`karamelo_py.language.rules`); those that involve several parts are here.
-Each is reported once, by `check` or before the first step.
+Rules that involve several parts (see `karamelo_py.language.rules`). Each is reported once, by
+`check` or before the first step.
 """
 
 from collections.abc import Iterable, Iterator
@@ -97,7 +97,7 @@ def mixed_units(hub: Hub, simulation: Simulation) -> str:
 
 
 class Step(NamedTuple):
-    """The step requested for run number `run`, and the scene on which its limit depends.
+    """Requested for run number `run`, and the scene on which its limit depends.
 
     `span` is the run's length in time and in steps, infinite if a condition ends it.
     """
@@ -130,7 +130,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn once (or `again`) of a step above the limit, in this or a later run."""
+    """Once (or `again`) of a step above the limit, in this or a later run."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -232,7 +232,7 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:
-    """Warn once if constant loads act in the first of several load steps only."""
+    """Once if constant loads act in the first of several load steps only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
     formulas_by_fix = {fix: fix.all_formulas for fix in acting}
     change = any(
@@ -286,7 +286,7 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Warn if single precision cannot resolve the motion in a step.
+    """If single precision cannot resolve the motion in a step.
 
     The cell size matters too: a block that falls at 50 000 cells from the origin errs by 3.5 % of
     its path, and at 200 000 it does not move. ScriptError if positions have a spacing of 1/500 cell

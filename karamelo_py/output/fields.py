@@ -61,7 +61,7 @@ class Fields(PointTable):
 
     @property
     def _rows(self) -> Rows:
-        """All points; clears the cache after a step."""
+        """Clears the cache after a step."""
         simulation = self.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
@@ -77,13 +77,13 @@ class Fields(PointTable):
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: PointGroup) -> np.ndarray:
-        """0-based ids of a particle group, without deleted points."""
+        """Without deleted points: 0-based ids."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: PointGroup | None = None) -> float:
-        """Sum a quantity of `SUMMED` over a group or all points, exactly."""
+        """Of a quantity of `SUMMED` over a group or all points, exact."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -114,7 +114,7 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, part: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
-        """Sum terms over the points of a part's group, exactly.
+        """Exact sums of terms over the points of a part's group.
 
         The method `name` of `part`, called with tables of some points and `arguments`, returns rows
         of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
@@ -138,7 +138,7 @@ class Fields(PointTable):
         return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
-        """Sum local terms (n,) or (n, k) over all processes, rounded once."""
+        """Over all processes, of terms (n,) or (n, k), rounded once."""
         columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
         limbs = np.zeros((len(columns), LIMBS), np.int64)
         for k, column in enumerate(columns):
@@ -199,7 +199,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """Names for `particle`, then groups and solids (1 for their points, else 0)."""
+        """For `particle`, then groups and solids (1 for their points, else 0)."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -235,7 +235,7 @@ class Fields(PointTable):
         return self.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
-        """A column (n,) of all nodes; nodes without mass are at rest."""
+        """(n,) of all nodes; nodes without mass are at rest."""
         return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
 
 

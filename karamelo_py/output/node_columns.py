@@ -75,7 +75,7 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 
 
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Karamelo's type of a node along one axis.
+    """Along one axis.
 
     Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 between.
     Bernstein: 1 in the middle of a cell. Else 0.
@@ -95,7 +95,7 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def load(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Loads of fixes on nodes, and of fixes on points, transferred by the basis."""
+    """Of fixes on nodes, and of fixes on points, transferred by the basis."""
     hub = nodes.hub
     out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
@@ -126,7 +126,7 @@ def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.nda
 
 
 def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
-    """Columns of a vector; ``*`` in the name becomes the direction."""
+    """``*`` in the name becomes the direction."""
     return {
         name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
         for k, axis in enumerate(AXES)

@@ -107,7 +107,7 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """A background of axes, labels and colour bar, with the points of a state on top.
+    """Axes, labels and colour bar, with the points of a state on top.
 
     Matplotlib spends most time on axes: their pixels are stored until the limits change.
     """
@@ -146,7 +146,7 @@ class Picture:
         """Mark ends of the colour bar with values beyond."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """Label an axis in a unit that suits its numbers; without a unit, with a power of 1000."""
+        """In a unit that suits its numbers; without a unit, with a power of 1000."""
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -211,7 +211,7 @@ class Picture:
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
-        """Draw lines around points (n, 3) of bodies, and around tools."""
+        """Around points (n, 3) of bodies, and tools."""
 
     def _entitle(self, text: str) -> None:
         self.title.set_text(text)
@@ -259,7 +259,7 @@ class Picture:
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Reserve room for the widest labels, so that nothing moves between pictures."""
+        """Room for the widest labels: nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
         for _ in range(2):  # the aspect ratio moves the axes
@@ -296,7 +296,7 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Extend limits to the finite values, rounded outwards to 2^k / 8 to change rarely."""
+    """To the finite values, rounded outwards to 2^k / 8 to change rarely."""
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:
@@ -406,7 +406,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # As large as its material, with a minimum that is larger for few points.
+        # As large as its material, at least this: more for few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -505,7 +505,7 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Mask of points that are not completely hidden: the surface of a large body."""
+        """Points that are not completely hidden: the surface of a large body."""
         # An adjacent cell lies within a point's circle, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5

@@ -21,9 +21,9 @@ class Lattice:
     """A grid of square cells of size `h` from the lower corner of a box.
 
     It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
-    cell centres; nodes added for `least_nodes` per direction have no mass. Nodes are numbered from
-    `first`, cells from `first_cell`; `shape` and `cells` (3,) count them, 1 in unused directions.
-    ScriptError for more than `MAX_NODES` nodes.
+    cell centres; nodes added for `least_nodes` per direction have no mass. Numbers of nodes begin
+    at `first`, of cells at `first_cell`; `shape` and `cells` (3,) count them, 1 in unused
+    directions. ScriptError for more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Cell indices (n, d) of positions, or of the nearest cell."""
+        """(n, d) of positions, or of the nearest cell."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)

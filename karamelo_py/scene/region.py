@@ -94,10 +94,10 @@ class Region(Named):
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Depth (n,) of `x` (n, >= d) in the shape, negative outside; ignores `exterior`.
+        """(n,) of `x` (n, >= d) in the shape, negative outside; ignores `exterior`.
 
-        A lower bound of the distance to the surface, up to `reach`; linear near plane parts of it.
-        The default tests `contains` along the axes, and misses shapes thinner than `reach`.
+        A lower bound, up to `reach`; linear near plane parts of the surface. The default tests
+        `contains` along the axes, and misses shapes thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -135,7 +135,7 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Refuse a lower end (argument number `argument`) above the upper end, the next one."""
+    """Refuse a lower end (argument number `argument`) above the upper end."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

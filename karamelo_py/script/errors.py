@@ -31,7 +31,7 @@ class NoItem(KeyError):
 
 
 class Quit(Exception):
-    """The statement quit: the script ends normally."""
+    """The script ends normally."""
 
 
 # Also of exit(), which would end the program silently.
@@ -39,7 +39,7 @@ FAILURES = (Exception, SystemExit)
 
 
 class Pause(Exception):
-    """The script is stopped before a run."""
+    """Before a run."""
 
 
 @dataclass(eq=False, repr=False)
@@ -110,7 +110,7 @@ def render_message(
     cause: str = "",
     resume: str = "",
 ) -> str:
-    """An error or a warning (`kind`) for the user.
+    """For the user.
 
     With the `code` of a run: likely cause, fix, and the command that resumes.
     """
@@ -192,7 +192,7 @@ def unknown(
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
-    """Up to three similar names, most similar first."""
+    """Up to three, most similar first."""
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]

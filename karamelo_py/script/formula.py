@@ -1,8 +1,8 @@
-"""Formulas as stack programs, and the compiled evaluator that runs them over blocks of points.
+"""Formulas as stack programs, evaluated over blocks of points.
 
-No formula is compiled: for each operation the evaluator loops over the points of a block. Values
-common to all points are computed once per block, by instructions with the flag `UNIFORM`; `SPREAD`
-expands the result to a row. Shared subexpressions are stored in rows after the stack.
+No formula is compiled: for each operation the evaluator loops over a block. Values common to all
+points are computed once per block, by instructions with the flag `UNIFORM`; `SPREAD` expands the
+result to a row. Shared subexpressions are stored in rows after the stack.
 """
 
 from typing import NamedTuple
@@ -80,9 +80,9 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise the first `n` numbers of `a` to powers, branch-free if all exponents agree.
+    """Powers of the first `n` numbers of `a`, branch-free if all exponents agree.
 
-    Each result equals `_power`.
+    Each equals `_power`.
     """
     power = b[0]
     same = True
@@ -101,7 +101,7 @@ def _powers(n, a, b):
 
 @kernel
 def evaluate(program, globals_, points, count, out, stack):
-    """Evaluate `program` at `count` points, the rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
+    """At `count` points, the rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
     `globals_` are published values (:class:`karamelo_py.script.values.Values`), `out` (BLOCK,) gets
     the results, `stack` (ROWS, BLOCK) is scratch.
@@ -170,7 +170,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """Evaluate `program` at any number of present and initial positions (n, 3).
+    """At any number of present and initial positions (n, 3).
 
     `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """

@@ -73,7 +73,7 @@ def forecast(
     x: float, xs: Sequence[float], rows: Sequence[Row], accuracy: str, cost: str, *,
     highest: float = 4.0,
 ) -> Forecast | None:  # fmt: skip
-    """Forecast a run at `x` from the runs at `xs`, coarse ones first.
+    """A run at `x` from the runs at `xs`, coarse ones first.
 
     The error continues with the last order. Its bounds follow from the least and largest order, at
     least 33 % of it above and half below; a falling order may fall as much again, and one below 2
@@ -88,8 +88,7 @@ def forecast(
         return None
     xs, error, signed_size = xs[good], error[good], np.abs(signed[good])
     rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
-    # Positive towards finer runs. An error counted too large would make the next one fall too
-    # steeply.
+    # An error counted too large would make the next one fall too steeply.
     way, ways = abs(np.log(x / xs[-1])), np.abs(np.diff(np.log(xs)))
     fall = np.fmax(np.diff(np.log(error)), np.fmin(np.diff(np.log(signed_size)), 0.0)) / ways
     if fall[-1] >= 0:
@@ -214,7 +213,7 @@ class Adviser:
         ]
 
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
-        """True if gradients jump, and points may cross cells at a step."""
+        """Gradients jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
         stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN if unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
@@ -249,7 +248,7 @@ class Adviser:
         return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """The cheapest candidate, after runs that may change it.
+        """After runs that may change it.
 
         Choices that could become the cheapest are followed until their candidate is the next finer
         variant.
@@ -479,7 +478,7 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run what is advised, or what may meet the target, until it is met."""
+    """Until the target is met."""
     best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)

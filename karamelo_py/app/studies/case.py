@@ -30,19 +30,16 @@ Record = Mapping[str, Any]
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Codes of errors before the first step that are no mistake of the script (larger scenes, longer
-# steps), and of the program or another run in the folder.
+# Errors before the first step that are no mistake of the script, and of the program or another run
+# in the folder.
 _NOT_OF_SCRIPT = ("memory", "step-above-limit")
 _NOT_OF_RUN = ("internal", "busy")
 
 
 @dataclass
 class CaseOutcome:
-    """Outcome of a run.
-
-    Status: ``done``, ``failed``, ``refused`` (by a mistake of the script, before any step), ``too
-    long`` or ``killed``.
-    """
+    """Status: ``done``, ``failed``, ``refused`` (by a mistake of the script, before any step),
+    ``too long`` or ``killed``."""
 
     status: str
     reason: str = ""  # unless done
@@ -242,7 +239,7 @@ def record_of(folder: Path) -> Record:
 
 
 def facts_of(record: Record) -> dict[str, float]:
-    """Numbers of all runs of a script, or of the first: `COLUMNS`."""
+    """Of all runs of a script, or of the first: `COLUMNS`."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
     names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")

@@ -73,7 +73,7 @@ def reached(words: Iterable[str]) -> float:
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """Why errors of runs, coarse ones first, are small by chance; "" where they are not.
+    """The reason, for runs from coarse to fine; "" where not.
 
     An error is chance if a finer run is worse. If no finer run is as good, also if the sign
     changes, the error falls faster than by `highest`, the order of the basis, or it grows.
@@ -149,7 +149,7 @@ class GroupedRuns:
 
     @property
     def rises(self) -> bool:
-        """True if the variable grows with refinement, measured in particle-steps if known."""
+        """The variable grows with refinement, measured in particle-steps if known."""
         done = column(self.rows, "particle_steps")
         return not order(self.x, done if np.isfinite(done).all() else self.cost).exponent < 0
 
@@ -171,7 +171,7 @@ def label(choice: Mapping[str, str]) -> str:
 
 
 class Family:
-    """A table of runs as lines, told apart by the variables `by` and others that differ.
+    """Lines told apart by the variables `by` and others that differ.
 
     `along` differs along a line, by default the number with the most values.
     """
@@ -259,13 +259,13 @@ class Family:
 
 
 def errors(rows: Sequence[Row], name: str) -> np.ndarray:
-    """Errors, signed where possible; NaN where missing."""
+    """Signed where possible; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
 def sizes(rows: Sequence[Row], name: str) -> np.ndarray:
-    """Absolute values; NaN where missing."""
+    """NaN where missing."""
     return np.abs(column(rows, name))
 
 

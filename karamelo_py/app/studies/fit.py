@@ -34,8 +34,8 @@ differences that remain are independent. There is no +- where the three searches
 value at the end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # of each range
-# Fraction of a range. Waves and points that cross cells make curves rough: derivatives over 0.01
-# end in a local minimum.
+# Waves and points that cross cells make curves rough: derivatives over 0.01 of a range end in a
+# local minimum.
 STEP = 0.04
 NEAR = 0.01  # of a range: at its end, or equal ends
 ENOUGH = 1e-3  # relative change of misfit or values that ends a search

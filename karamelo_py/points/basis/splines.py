@@ -164,8 +164,7 @@ class CubicSpline(NamedTuple):
     # to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's
     # ratio 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to
     # 2.7. courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the
-    # longer step, 1 % with 0.9 h/c. No instability (in 800/c 32 % at 0.1 of the wave speed, 4 % at
-    # 0.03, none at 0.001), but strains then lacked (dt grad v)^2. Not measured since.
+    # longer step, 1 % with 0.9 h/c; strains then lacked (dt grad v)^2. Not measured since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,
@@ -220,9 +219,9 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
 
 
 def at_wall(grid, direction, a, cell, walls, *, inside):
-    """Modified functions of a cell at a wall; unused nodes of the four have no weight.
+    """Without walls `inside` the grid, only a grid of one cell is between two.
 
-    Without walls `inside` the grid, only a grid of one cell is between two.
+    Unused nodes of the four have no weight.
     """
     last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)

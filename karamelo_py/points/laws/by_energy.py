@@ -1,9 +1,9 @@
 """Hyperelastic laws given by a formula of their stored energy.
 
-The formula is differentiated when a script defines the material. Its structure is in the class of
-the law, so kernels contain it as code; its numbers are parameters. So laws that differ only in
-numbers have common kernels, unless some are equal or small whole exponents. Formulas of invariants
-are computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by point.
+The formula is differentiated when the material is defined. Its structure is in the class of the
+law, so kernels contain it as code; its numbers are parameters. Laws that differ only in numbers
+have common kernels, unless some are equal or small whole exponents. Formulas of invariants are
+computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by point.
 """
 
 from collections import namedtuple
@@ -48,7 +48,7 @@ Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of
 
 
 class _ProgramWriter:
-    """Writes formulas of `names` as stack programs with common `numbers`."""
+    """Writes formulas of `names` with common `numbers`."""
 
     def __init__(self, names: Sequence[str]):
         self.names = names
@@ -104,7 +104,7 @@ def whole_power(a, n):
 
 
 def evaluated(code, law, arguments):
-    """Value of a stack program at `arguments`; 0 without a program."""
+    """Value at `arguments`; 0 without a program."""
     if not len(code):
         return 0
     stack = ()
@@ -169,9 +169,9 @@ IN_STRETCHES = {
 
 
 def law_of(rho: float, energy: Expression, directions: Sequence[float] = ()) -> NamedTuple:
-    """Make the law of a stored energy per reference volume.
+    """From a stored energy per reference volume.
 
-    `directions`: unit vectors a0 and b0, if the formula contains I4 or I6. Raises ScriptError for
+    `directions`: unit vectors a0 and b0, if the formula contains I4 or I6. ScriptError for
     operations without a derivative, stress or no stiffness at rest, and formulas that distinguish
     principal directions.
     """
@@ -297,7 +297,7 @@ SCANNED = 0.5, 3.0  # stretches
 
 
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """Path and stretch nearest to rest at which a principal direction loses its stiffness."""
+    """Nearest to rest: path and stretch at which a principal direction loses its stiffness."""
     unstable = []
     for path, stretches in PATHS.items():
         for end in SCANNED:
@@ -325,7 +325,7 @@ def squared(s):
 
 @point_function()
 def variables(law, F, b):
-    """Variables of the formula: I1, I2, J, and those of fibres."""
+    """I1, I2, J, and those of fibres."""
 
 
 @variables.on(OfInvariants)

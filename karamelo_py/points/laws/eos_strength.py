@@ -172,7 +172,7 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """Check for a temperature without effect on strength, pressure and damage, never read."""
+    """Without effect on strength, pressure and damage, and never read."""
     pressures = parameter(law.eos, "thermal"), parameter(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
@@ -237,13 +237,13 @@ FAST = 0.02  # of the wave speed: metals yield in impacts above it
 
 
 def _locks(law, scene):
-    """Check for flow at constant volume in load steps, which linear cells cannot represent."""
+    """Flow at constant volume in load steps, which linear cells cannot represent."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"place": scene.method.place}
 
 
 def _locks_at_impact(law, scene):
-    """Check for impact in the total frame, where points never leave their linear cells."""
+    """In the total frame points never leave their linear cells."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"place": scene.method.place}
 
@@ -274,7 +274,7 @@ known_failure(
 
 
 class Memory(NamedTuple):
-    """States of the parts of a law; () for parts without a state."""
+    """States of the parts; () for parts without a state."""
 
     energy: Any  # of the equation of state
     viscous: Any
@@ -339,7 +339,7 @@ def _advance_fbar_eos_strength(law, kin, state, step):
 
 
 def rotated_with_point(law, kin, s, dl):
-    """Rotate the deviatoric stress with the point; also return the strain that adds to it."""
+    """Rotated deviatoric stress, and the strain that adds to it."""
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
@@ -358,7 +358,7 @@ def intact_pressure(law, j, m):
 
 
 def volume_energy(law, j, m):
-    """Energy of the volume change of the intact material, at its temperature."""
+    """Of the intact material, at its temperature."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     energy = eos.compression_energy(law.eos, elastic, m.energy)
     energy += strengths.added_energy(law.strength, law, elastic, m)
@@ -371,7 +371,7 @@ def volume_energy(law, j, m):
 
 
 def full_pressure(law, j, m):
-    """Pressure in the stress: damage reduces tension, not compression."""
+    """In the stress: damage reduces tension, not compression."""
     p = intact_pressure(law, j, m)
     return where(p < 0, p * integrity_of(law, m.damage), p) + sum(m.viscous)
 
@@ -383,7 +383,7 @@ def sound(law, j, m):
 
 
 def sound_lost_to_damage(law, j, m):
-    """Reduction of the squared speed of sound by damage.
+    """In the square.
 
     A broken point in tension has no waves. Closed again, at its initial volume, it has the waves of
     rubble; these always count, as it may close soon.
@@ -491,7 +491,7 @@ def _shear_part_eos_strength(law, kin, state):
 
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """Energy released by unloading at this temperature, without plastic work."""
+    """Released by unloading at this temperature, without plastic work."""
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0

@@ -1,9 +1,9 @@
 """Saturated soil: any law as the skeleton, and water in its pores.
 
 Stresses are effective. The state has two numbers more, per volume before deformation: the volume of
-the water at no pressure, and of the pores. Water is compressed where it does not fit: p = K
-ln(content / pores). `advance` alone is undrained; in a run the flux through the nodes changes the
-content (:mod:`karamelo_py.kernels.equations.pore_water`).
+the water at no pressure, and of the pores. p = K ln(content / pores). `advance` alone is undrained;
+in a run the flux through the nodes changes the content
+(:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
 from math import sqrt
@@ -89,7 +89,7 @@ def _wave_speed_bound_saturated(law, kin, state):
 @laws.number
 @laws.point_function()
 def pore_pressure(law, kin, state):
-    """Pressure of the water in the pores; undefined for dry laws."""
+    """Undefined for dry laws."""
 
 
 @pore_pressure.on(Saturated)
@@ -100,7 +100,7 @@ def _pore_pressure_saturated(law, kin, state):
 @laws.number
 @laws.point_function()
 def porosity(law, kin, state):
-    """Volume of the pores over the present volume; undefined for dry laws."""
+    """Over the present volume; undefined for dry laws."""
 
 
 @porosity.on(Saturated)

@@ -20,7 +20,7 @@ FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over r
 
 
 class Thin(NamedTuple):
-    """Law in a body without stress on its faces; `law` is the law in three dimensions."""
+    """No stress on its faces; `law` is the law in three dimensions."""
 
     law: Any
 
@@ -108,10 +108,10 @@ def _wave_speed_bound_thin(law, kin, state):
 
 
 def _slower(law, kin, state, squared):
-    """Squared wave speed of a body that is free across, from its value without strain across.
+    """Squared speed in a body that is free across.
 
-    Hooke's law has 2 G + lambda there; a plate 2 G + 2 G lambda / (2 G + lambda) = E / (1 - nu^2),
-    a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.
+    Hooke's law has 2 G + lambda without strain across; a plate 2 G + 2 G lambda / (2 G + lambda) =
+    E / (1 - nu^2), a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.
     """
     shear = min(laws.shear_part(law.law, WHOLE, state.whole), squared)
     rest = squared - shear
@@ -139,7 +139,7 @@ def _with_stress_thin(law, kin, state, stress):
 @laws.number
 @laws.point_function()
 def thickness(law, kin, state):
-    """Thickness of a thin body over its initial thickness."""
+    """Over its initial thickness."""
 
 
 @thickness.on(Thin)

@@ -118,7 +118,7 @@ def _lost_fractions_flip(transfer, like):
 
 
 def warn_of_vibrations(transfer: type) -> None:
-    """Warn of large vibrations: only usl, which damps, is safe."""
+    """Only usl is safe, which damps."""
     known_failure(
         transfer,
         "large vibrations",
@@ -143,7 +143,7 @@ def _turns_away(transfer, scene):
 
 
 def warn_of_lost_angular_momentum(transfer: type) -> None:
-    """Warn of bodies that rotate many times.
+    """Of bodies that rotate many times.
 
     Points move with the grid velocity u, and store v: each step changes the angular momentum by the
     sum of m u x v dt (disks in 2D, E 100 times the rotational energy, 4 and 8 cells across the
@@ -185,7 +185,7 @@ def _brakes(transfer, scene):
 
 
 def warn_of_slow_rotation(transfer: type) -> None:
-    """Warn of free rotations in the total frame.
+    """Free rotations in the total frame.
 
     Points store another velocity than they move with: a square of n cells rotates too slowly by
     2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).

@@ -1,4 +1,4 @@
-"""Read the mesh in an Abaqus or CalculiX deck: parts, instances, sets, surfaces, generated nodes.
+"""Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
 
 Keywords that move or copy nodes otherwise are refused (Abaqus Keywords Reference; CalculiX CrunchiX
 manual).
@@ -200,7 +200,7 @@ def _system(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _motion(keyword: _Keyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Motion of an instance: translation, then rotation about two points, in degrees."""
+    """Translation, then rotation about two points, in degrees."""
     rows = [_table(keyword._replace(lines=[line]), 1, 7)[0] for line in keyword.lines[:2]]
     shift = rows[0][:3] if rows else np.zeros(3)
     if len(rows) < 2:

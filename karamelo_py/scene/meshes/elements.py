@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError
 
 # relative to size^dimension; less is round-off
 _FLAT = 1e-12
-# Distance from the plane of a 2D mesh, relative to its size, within which nodes lie in it.
+# Distance from the plane of a 2D mesh, relative to its size; nearer nodes lie in it.
 _PLANE = 1e-9
 _CHUNK = 4096
 
@@ -74,7 +74,7 @@ class MeshElements(NamedTuple):
     bulge: float = 0.0  # distance of `nodes` from the straight shape, relative to the size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
-        """Reverse the orientation of `which` (n,); corners only."""
+        """Of `which` (n,); corners only."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()
         numbers[which], corners[which] = numbers[which][:, order], corners[which][:, order]
@@ -84,7 +84,7 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Elements of `dimension` in a mesh or its `group`, one item per type.
+    """Of `dimension`, in a mesh or its `group`, one item per type.
 
     `lower` accepts groups of lower dimension, such as a boundary. ScriptError if there are none,
     for unsupported types, and off z = 0 in 2D or the x axis in 1D.
@@ -213,7 +213,7 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """Elements with positive orientation, volumes (n,) and centroids (n, d).
+    """With positive orientation, volumes (n,) and centroids (n, d).
 
     Exact integrals of det J and x det J, with curved edges and warped faces. ScriptError for a flat
     or twisted element.

@@ -30,7 +30,7 @@ def column(points: PointTable, name: str) -> np.ndarray:
 
 
 class PointField:
-    """A field of points: its name in the script, and its columns (one for a scalar).
+    """Its name in the script, and its columns (one for a scalar).
 
     `weights` count shear components twice in the square of the magnitude.
     """
@@ -54,7 +54,7 @@ class PointField:
 
 
 class Norm:
-    """Norm of a difference: L1, L2 or max, absolute or relative to the norm of the exact values.
+    """L1, L2 or max, absolute or relative to the norm of the exact values.
 
     In a history, differences are weighted by the time since the last output: the number of outputs
     has no effect.
@@ -118,7 +118,7 @@ class Norm:
 
 
 class Compared:
-    """Mix-in for computes that compare points: has `sizes(points)` and a `norm`."""
+    """Mix-in: has `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
         """Norms (2,) of differences and exact values now, and other sums."""

@@ -29,7 +29,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """The yield surface of a law uses part of the averaged pressure (F-bar)."""
+    """The yield surface uses part of the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -80,7 +80,7 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """The points of a cell are equally spaced, so that their domains tile it."""
+        """Equally spaced in a cell, so that their domains tile it."""
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
@@ -105,7 +105,7 @@ class Method:
         return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        """Mask (F,) of the velocity fields of rigid solids; (0,) if none is."""
+        """Mask (F,) of fields of rigid solids; (0,) if none is."""
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
@@ -132,11 +132,11 @@ class Method:
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
-        """Initial positions and domain shapes of a solid's points, (n, w)."""
+        """Initial positions and domain shapes, (n, w)."""
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """Domain shapes of a solid's points, (n, s), as the basis stores them."""
+        """(n, s), as the basis stores them."""
         basis, half = type(self.basis), solid.half_size
         n, d = half.shape
         unit = np.eye(d)

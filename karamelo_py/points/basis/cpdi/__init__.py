@@ -37,10 +37,10 @@ class Element(NamedTuple):
 class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
 
-    Arms of the affine transfers start at the weighted centre x = sum_I N_I X_I. It differs from the
-    point if corners lie beyond the grid or the domain is no parallelogram or parallelepiped. Linear
-    momentum stays exact; angular momentum is exact about the centres, and varies about the points
-    by 0.1 % of its variation with FLIP (a spinning square, Q4).
+    Arms of the affine transfers start at the weighted centre x = sum_I N_I X_I, which differs from
+    the point if corners lie beyond the grid or the domain is no parallelogram or parallelepiped.
+    Linear momentum is exact; angular momentum is exact about the centres, and varies about the
+    points by 0.1 % of its variation with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -77,8 +77,7 @@ known_failure(
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
-# Least extent of domains in cells, by dimension; in 2D points scatter to all adjacent nodes at
-# once.
+# Least extent of domains in cells, by dimension: in 2D points scatter to all adjacent nodes.
 LEAST = (0.0, 0.0, 0.5, 0.0)
 # In mesh order: around the square; around the cube's lower face, then the upper
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -87,12 +86,12 @@ CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
 @point_function()
 def domain(basis, kin, place):
-    """Corners x_c, weights w_c and gradients g_c of a point's domain, a tuple each."""
+    """Corners x_c, weights w_c and gradients g_c, a tuple each."""
 
 
 @point_function()
 def upright(basis, kin, place):
-    """Check for a positive Jacobian at every corner: the domain is not folded."""
+    """A positive Jacobian at every corner: the domain is not folded."""
 
 
 class Corner(NamedTuple):
@@ -112,7 +111,7 @@ class CornerStencil(NamedTuple):
 
 
 class AtCorners(NamedTuple):
-    """Tag for code that uses a node's weight or gradient once, as a factor: corners as nodes.
+    """For code that uses a node's weight or gradient once, as a factor: corners as nodes.
 
     A node number is then a `Weighted`.
     """
@@ -162,7 +161,7 @@ def pairs_of_spread(kin):
 
 
 def spread_of(kin, grid, weight, corner, centre):
-    """One corner's part of D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    """A corner's part of D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):

@@ -24,19 +24,19 @@ class VolumeStep(NamedTuple):
 
 @point_function(otherwise=True)
 def compressed(eos, memory, step, heating):
-    """Memory after a `VolumeStep`; `heating` is plastic and viscous work per reference volume."""
+    """After a `VolumeStep`; `heating` is plastic and viscous work per reference volume."""
     return memory
 
 
 @point_function(otherwise=True)
 def initial_loss(eos, like):
-    """(0,) for an eos that dissipates energy itself, or ()."""
+    """(0,) for an eos that dissipates energy, or ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def crush_work(eos, before, after, step):
-    """Energy dissipated by crushed pores in a `VolumeStep`, from the memories at its ends."""
+    """Dissipated by crushed pores in a `VolumeStep`, from the memories at its ends."""
     return 0
 
 
@@ -65,17 +65,17 @@ def pressure(eos, j, memory, heat):
 
 @point_function()
 def bulk_modulus(eos, j, memory, heat):
-    """-j dp/dj, the stiffness against a further volume change."""
+    """-j dp/dj."""
 
 
 @point_function()
 def compression_energy(eos, j, memory):
-    """Integral of p dj from j to 1: the energy stored by compression, per reference volume."""
+    """Integral of p dj from j to 1, per reference volume."""
 
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """Volume ratio at which the pressure is p, or nearest to it."""
+    """Volume ratio with the pressure p, or nearest to it."""
 
 
 @point_function(otherwise=True)
