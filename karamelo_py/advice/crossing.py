@@ -136,7 +136,7 @@ def words_at_end(facts: BasicFacts) -> dict[str, str]:
     if crossing.lost <= TOLD:
         return {}
     path = f"stressed material moved through {crossing.cells:.2g} cells"
-    loss = f"about {crossing.percent:.0f} % of its pressure is lost"
+    loss = f"about {crossing.percent:.0f} % of its pressure is lost on average, half at places"
     if hub.update.first_time(CROSSING):
         hub.warn(
             f"{CROSSING}: {path}, {loss} ({when(facts.simulation)})",

@@ -108,6 +108,16 @@ class SceneFacts(BasicFacts):
         return any(rigid) and (any(led) or any(moving))
 
     @cached_property
+    def faces_in_cells(self) -> bool:
+        """True if cells hold points of a rigid solid and of another."""
+        found: tuple[list, list] = ([], [])
+        for solid in self.hub.solids.values():
+            at = np.floor((solid.x0 - self.hub.domain.lo[: self.d]) / self.hub.domain.h)
+            rigid = can(solid.material.law, constrained_velocity)
+            found[rigid].extend(np.unique(at, axis=0).tolist())
+        return not set(map(tuple, found[True])).isdisjoint(map(tuple, found[False]))
+
+    @cached_property
     def free_turns(self) -> float:
         """Revolutions of the free solid that rotates most."""
         free = [b.motion.spin for b in self.bodies if self.turns and is_free(self, b)]
