@@ -141,6 +141,12 @@ AVERAGED = {"more": "anti_volumetric_locking(true)"}
         ("liquids with a linear basis", WATER | {"more": "", "u": "0, 0.2*x"}, True),
         ("liquids with a linear basis", WATER | {"more": "", "u": "0, 0.2"}, False),
         ("liquids with a linear basis", WATER | SMOOTH, False),
+        ("liquids with a linear basis", WATER | {"method": "ulmpm, APIC, linear"}, False),
+        (
+            "liquids with a linear basis",
+            WATER | {"method": "ulmpm, APIC, linear", "steps": 8000},
+            True,
+        ),
         ("vortices with FLIP", WATER | SMOOTH | {"u": "0, 0.2*x"}, True),
         ("vortices with FLIP", WATER | SMOOTH, False),
         ("vortices with FLIP", WATER | {"method": "ulmpm, APIC, quadratic-spline", "u": "0, 0.2*x"},
