@@ -50,9 +50,6 @@ def _control(count: int) -> Callable:
 _CONTROL = _control(0)
 
 
-# --- nodes ------------------------------------------------------------------------------------
-
-
 def clear_held(i, fate, holders):
     for c in range(holders.shape[1]):
         holders[i, c].slot = 0
@@ -113,9 +110,6 @@ def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = k
     return visit_member
 
 
-# --- points -----------------------------------------------------------------------------------
-
-
 def clear_force(i, fate, s, block):
     force = field(block.points.fields, Force)
     if force is not None:
@@ -157,9 +151,6 @@ def take_moves(i, fate, s):
     motion = s.control.motion[0]
     motion.move = max(motion.move, fate[MOVED])
     fate[MOVED] = 0.0
-
-
-# --- functions of nodes, of points, and between loops -------------------------------------------
 
 
 def _setup(s: arrays.Setup) -> Callable:
@@ -204,9 +195,6 @@ def once(function: Callable) -> Callable:
     return do_once
 
 
-# --- totals -----------------------------------------------------------------------------------
-
-
 def clear_totals(i, fate, copies, first, count):
     limbs = copies.shape[2]
     k, rest = i // (count * limbs), i % (count * limbs)
@@ -233,9 +221,6 @@ def publish(i, fate, s, hooks, which):
     if always or is_last(s):
         for h in range(begin, end):
             hook_loop.publish_total(hooks, h, s.control)
-
-
-# --- the watch over energy --------------------------------------------------------------------
 
 
 def add_energies(i, fate, s, block, copies):

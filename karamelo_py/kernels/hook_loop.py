@@ -109,9 +109,6 @@ class HeatedPoints(NamedTuple):
     x: np.ndarray  # (w, n)
 
 
-# --- the loop ---------------------------------------------------------------------------------
-
-
 def _turns(members, k, parts):
     """Return begin, end and stride of the chunks of thread `k` of `parts`."""
     if isinstance(members, HookedNodes):
@@ -199,9 +196,6 @@ def _act_on_all(members, task, call):
         heat.hottest = max(heat.hottest, private.hottest)
 
 
-# --- formulas and totals ----------------------------------------------------------------------
-
-
 def directions(hooks):
     """Return the dimension at run time: loops are not unrolled."""
     return hooks.x0.shape[1]
@@ -262,9 +256,6 @@ def publish_total(hooks, h, control):
     first, count = _published(hooks, h)
     if count > 0:
         totals.publish(control, first, count)
-
-
-# --- nodes ------------------------------------------------------------------------------------
 
 
 def _choose_nodes(members, call, row, end, member):
@@ -610,9 +601,6 @@ def add_work(hooks, s, again):
 @add_work.on(arrays.Hooks)
 def _add_work_hooks(hooks, s, again):
     node_hooks(NONE, hooked_nodes(s, LOADS_AGAIN if again else LOADS, 0.0), hooks, s, kick(s))
-
-
-# --- points -----------------------------------------------------------------------------------
 
 
 def choose_points(members, call, p, end):

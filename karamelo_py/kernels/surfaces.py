@@ -287,9 +287,6 @@ def encloses(kin, surface, x):
     return hits & 1 != 0 if surface.odd else hits != 0
 
 
-# --- shapes: what regions are for kernels -------------------------------------------------------
-
-
 class HalfSpace(NamedTuple):
     normal: np.ndarray  # (d,) inward
     offset: float  # its product with a place on the plane
@@ -388,9 +385,6 @@ def _depth_in_parts(shape, kin, x, reach):
 @depth.on(Outside)
 def _depth_outside(shape, kin, x, reach):
     return -depth(shape.part, kin, x, reach)
-
-
-# --- many positions -----------------------------------------------------------------------------
 
 
 def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], np.ndarray]:

@@ -259,9 +259,6 @@ def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
             at_node(task, kin, nodes, index(n), dt)
 
 
-# --- threads ----------------------------------------------------------------------------------
-
-
 def context_of(s: Setup, extent: Extent) -> Context:
     step, motion, (dt, gathers, scatters, moves) = s.control.step[0], s.control.motion[0], extent
     # A little more: points are sorted whenever one did not fit (see run.tiles).
@@ -289,9 +286,6 @@ def sum_buffers(mode: Tag, quantities: tuple, s: Setup, due: bool) -> None:
 @point_function(otherwise=True)
 def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
     _visit_nodes(mode, s.ranges[0, 0], task, (s.kin, s.nodes, s.ranges), dt)
-
-
-# --- whole sweeps -----------------------------------------------------------------------------
 
 
 @point_function(otherwise=True)

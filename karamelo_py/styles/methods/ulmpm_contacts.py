@@ -89,8 +89,8 @@ class ULMPMContacts(Method):
 
     Walls of one cell contain liquids and granular materials, also in corners, inclined, and moving.
     In 1e5 steps the centres of points of water and sand reached at most 10 % of a cell into walls
-    at rest, of gel 15 %, and 26 % into moving walls. Within 100 steps after a contact at a node, they may leave a
-    wall there but not approach it.
+    at rest, of gel 15 %, and 26 % into moving walls. Within 100 steps after a contact at a node,
+    they may leave a wall there but not approach it.
 
     Both solids at a node have one normal, so momentum is conserved. It comes from the sums of m
     grad N of both, averaged over the neighbouring nodes with the weights 1/4, 1/2, 1/4 along each
