@@ -113,8 +113,7 @@ class SceneFacts(BasicFacts):
         found: tuple[list, list] = ([], [])
         for solid in self.hub.solids.values():
             at = np.floor((solid.x0 - self.hub.domain.lo[: self.d]) / self.hub.domain.h)
-            rigid = can(solid.material.law, constrained_velocity)
-            found[rigid].extend(np.unique(at, axis=0).tolist())
+            found[solid.rigid].extend(np.unique(at, axis=0).tolist())
         return not set(map(tuple, found[True])).isdisjoint(map(tuple, found[False]))
 
     @cached_property
