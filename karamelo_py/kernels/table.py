@@ -297,7 +297,7 @@ def _rows_of_scene(row, s):
 
 @in_scene.on(NodeTask)
 def _after_others(row, s):
-    return (*company_of(row.task, s).before, row) if row.at is None else (row,)
+    return (row,) if row.at or callable(row.task) else (*company_of(row.task, s).before, row)
 
 
 @in_scene.on(Sweep)
