@@ -457,3 +457,49 @@ def test_gmsh_entities_are_groups_where_there_are_no_others(tmp_path):
     text += "$EndNodes\n$Elements\n2\n1 3 2 0 8 1 2 5 4\n2 3 2 0 9 2 3 6 5\n$EndElements\n"
     (tmp_path / "a.msh").write_text(text)
     assert [volume(tmp_path / "a.msh", 2, group) for group in (None, "8", "9")] == [2, 1, 1]
+
+
+SHEET = """*NODE
+1,0,0,0
+2,1,0,0
+3,1,1,0
+4,0,1,0
+5,0,0,1
+6,1,0,1
+7,1,1,2
+8,0,1,2
+*ELEMENT, TYPE=C3D8, ELSET=BODY
+1,1,2,3,4,5,6,7,8
+*SURFACE, NAME=ROOF
+1,S2
+"""
+
+
+def test_named_faces_are_loaded_with_their_whole_area(run_interpreted, tmp_path):
+    """A roof of sqrt(2), split in two triangles, with a traction of -3 y: sums of area, and of area times y = 1/2."""
+    (tmp_path / "deck.inp").write_text(SHEET, "utf-8")
+    script = f"""
+        method(tlmpm, FLIP, linear, 1, thermo-mechanical)
+        dimension(3, -1, 2, -1, 2, -1, 3, 1)
+        region(body, mesh, {tmp_path}/deck.inp, BODY)
+        region(roof, mesh, {tmp_path}/deck.inp, ROOF)
+        material(m, linear, 1000, 1e6, 0.3, 500, 1)
+        solid(s, region, body, 2, m, 1, 300)
+        fix(q, edge_traction, all, roof, SIDE, 2, NULL, -3*y)
+        fix(sun, edge_heat_flux, all, roof, 5)
+        log_modify(custom, step, q_x, q_z, sun_s, sun_area)
+        run(1)
+    """
+    log = run_interpreted(script.replace("SIDE", "all")).log
+    area = np.sqrt(2)
+    assert log["q_x"][-1] == pytest.approx(2 * area, rel=1e-9)
+    assert log["q_z"][-1] == pytest.approx(-1.5 * area, rel=1e-9)
+    assert (log["sun_area"][-1], log["sun_s"][-1]) == pytest.approx((area, 5 * area), rel=1e-9)
+    said = run_interpreted(script.replace("SIDE", "zhi"), status=1).err
+    assert "region 'roof' is a set of faces" in said and "expected: all" in said
+    wrong = script.replace(
+        "edge_traction, all, roof, SIDE, 2, NULL, -3*y", "edge_pressure, all, roof, 5"
+    )
+    assert "edge_traction, ..., all, tx, ty" in run_interpreted(wrong, status=1).err
+    wrong = script.replace("all, roof, SIDE", "all, body, all")
+    assert "region 'body' is no set of faces" in run_interpreted(wrong, status=1).err

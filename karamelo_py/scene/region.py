@@ -71,6 +71,11 @@ class Region(Named):
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
+    def sheet(self) -> np.ndarray | None:
+        """Simplices (m, d, d) of a named set of faces, without volume."""
+        return None
+
+    @property
     def flat(self) -> bool:
         """Some part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)

@@ -94,7 +94,7 @@ class MeshRegion(Enclosed):
     group
         Name or number of a physical group; in other formats a set, an instance, a block, a property
         or a surface, and ``name:number`` for numbers of cells in VTK. Default: the whole mesh. A
-        group of lower dimension, such as a boundary, serves to select nodes.
+        group of lower dimension, such as a boundary, serves to select nodes and to load its faces.
     exterior
         The word ``exterior`` selects everything outside.
 
@@ -144,6 +144,10 @@ class MeshRegion(Enclosed):
     @property
     def flat(self) -> bool:
         return self.skin.open
+
+    @property
+    def sheet(self) -> np.ndarray | None:
+        return self.skin.faces if self.flat else None
 
 
 # Binary STL files, and most writers of other formats, have single precision.

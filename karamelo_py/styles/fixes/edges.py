@@ -14,11 +14,13 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import PointForces
 from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
+AT_ONCE = 4_000_000  # distances of faces and points
 PARTS = 4  # per direction of a box, for measuring the surface
 
 
@@ -164,6 +166,21 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     return Faces(pieces.point, none, none, area, pieces.middle)
 
 
+def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Faces:
+    """Simplices (m, d, d) of a set of faces, each taken by the nearest point; in no direction."""
+    none = np.zeros(len(sheet), np.int64)
+    if not len(ids) or not len(sheet):
+        return Faces(ids[:0], none[:0], none[:0], np.empty(0), np.empty((0, d)))
+    middle, edges = sheet.mean(axis=1), sheet[:, 1:] - sheet[:, :1]
+    size = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0)) / max(d - 1, 1)
+    x0 = places_before(hub, ids)
+    rows = [
+        np.argmin(np.linalg.norm(part[:, None] - x0, axis=2), axis=1)
+        for part in np.array_split(middle, len(middle) * len(ids) // AT_ONCE + 1)
+    ]
+    return Faces(ids[np.concatenate(rows)], none, none, size * hub.domain.depth(middle), middle)
+
+
 class OnEdge(Fix):
     """Base of fixes on the edge of a region, through the faces of points there.
 
@@ -217,7 +234,14 @@ class OnEdge(Fix):
                 by_solid[solid.id] = solid, faces
         return by_solid
 
+    @cached_property
+    def _of_sheet(self) -> Faces:
+        members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
+        return faces_of_sheet(self.hub, self.region.sheet, members, self.hub.domain.dimension)
+
     def _find(self, ids: np.ndarray) -> Faces:
+        if self.region.sheet is not None:
+            return self._of_sheet.some(np.isin(self._of_sheet.point, ids))
         whole, tables = np.ones(len(ids), np.bool_), []
         for solid, faces in self._cut.values():
             whole &= ~_of(solid, ids)
@@ -255,7 +279,8 @@ class EdgeTraction(EdgeFix):
     Parameters
     ----------
     side
-        The loaded side, by its outward direction: xlo (left), xhi (right), ylo, yhi, zlo, zhi.
+        The loaded side, by its outward direction: xlo (left), xhi (right), ylo, yhi, zlo, zhi; or
+        ``all`` faces of a set in a mesh file.
     traction
         tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z (initial
         position of the edge), time and published values. NULL leaves a component unchanged.
@@ -263,6 +288,9 @@ class EdgeTraction(EdgeFix):
     Example
     -------
     fix(pull, edge_traction, all, disk, xhi, 1e6*min(time/0.01, 1), 0, 0)
+
+    region(top, mesh, deck.inp, TOP)
+    fix(lid, edge_traction, all, top, all, 0, -1e3)
 
     Notes
     -----
@@ -273,6 +301,9 @@ class EdgeTraction(EdgeFix):
     box inside the edge, and sums exactly to traction times area on a plane side. Faces of a hole in
     this direction are loaded too: for a plate with a hole, use the region without it. In
     axisymmetry, area and force are per radian.
+
+    Each face of a set in a mesh (region mesh with a surface, side set or boundary group) loads the
+    nearest point of the group, with its whole area.
 
     See Also
     --------
@@ -286,11 +317,18 @@ class EdgeTraction(EdgeFix):
         hub: Hub,
         group: ParticleGroup,
         region: Region,
-        side: Literal[SIDES],
+        side: Literal[*SIDES, "all"],
         *traction: Expression | None,
     ):
         super().__init__(hub, group, region)
-        self.side = SIDES.index(side)
+        if (side == "all") != (region.sheet is not None):
+            kind = "is no set of faces" if side == "all" else "is a set of faces"
+            raise ScriptError(
+                f"region '{region.id}' {kind}",
+                argument="side",
+                expected=", ".join(SIDES) if side == "all" else "all",
+            )
+        self.side = None if side == "all" else SIDES.index(side)
         self.traction = per_direction(hub, "t", traction)
 
     def loads(self, faces: Faces) -> np.ndarray:
@@ -330,6 +368,13 @@ class EdgePressure(EdgeFix):
 
     def __init__(self, hub: Hub, group: ParticleGroup, region: Region, p: Expression):
         super().__init__(hub, group, region)
+        if region.sheet is not None:
+            raise ScriptError(
+                f"region '{region.id}' is a set of faces, whose outer side is not known",
+                argument="region",
+                expected="the region of the solid",
+                hint="fix edge_traction, ..., all, tx, ty loads a set of faces",
+            )
         self.p = p
 
     def loads(self, faces: Faces) -> np.ndarray:
