@@ -476,7 +476,7 @@ SHEET = """*NODE
 
 
 def test_named_faces_are_loaded_with_their_whole_area(run_interpreted, tmp_path):
-    """A roof of sqrt(2), split in two triangles, with a traction of -3 y: sums of area, and of area times y = 1/2."""
+    """A slanted roof of sqrt(2), two triangles: sums of area, and of area times y = 1/2."""
     (tmp_path / "deck.inp").write_text(SHEET, "utf-8")
     script = f"""
         method(tlmpm, FLIP, linear, 1, thermo-mechanical)

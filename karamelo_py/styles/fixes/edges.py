@@ -289,9 +289,6 @@ class EdgeTraction(EdgeFix):
     -------
     fix(pull, edge_traction, all, disk, xhi, 1e6*min(time/0.01, 1), 0, 0)
 
-    region(top, mesh, deck.inp, TOP)
-    fix(lid, edge_traction, all, top, all, 0, -1e3)
-
     Notes
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
@@ -302,8 +299,9 @@ class EdgeTraction(EdgeFix):
     this direction are loaded too: for a plate with a hole, use the region without it. In
     axisymmetry, area and force are per radian.
 
-    Each face of a set in a mesh (region mesh with a surface, side set or boundary group) loads the
-    nearest point of the group, with its whole area.
+    Each face of a set in a mesh loads the nearest point of the group, with its whole area:
+    ``region(top, mesh, deck.inp, TOP)`` with a surface, side set or boundary group, and
+    ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
 
     See Also
     --------
