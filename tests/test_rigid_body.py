@@ -1,12 +1,13 @@
 """Fix rigid_body: rigid bodies that move by the forces on them, and fix contact/rigid_body."""
 
+import re
 from math import cos, pi, radians, sin
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from conftest import INPUTS
-from going_on import goes_on, with_files
+from going_on import goes_on, same_files, with_files
 
 from karamelo_py.kernels import free_bodies as kernel
 
@@ -117,6 +118,7 @@ MISTAKES = {
     "spin=1": ("inertia=-1", "no body has", "above 0"),
     "fixed=(x)": ("fixed=(z)", "no direction 'z'", "some of x, y, rz"),
     "gravity=(0, -1)": ("gravity=(0, 0, -1)", "3 components", "2 formulas"),
+    "gravity=(0, 1)": ("pivot=(2, 3), velocity=(1, 0)", "pivot holds the body", "spin=..."),
     "motion=(1, 0)": ("motion=(1, 0), fixed=(x)", "motion prescribes it", "one of the two"),
     "turning=1": ("", "nothing acts on the body 'body'", "gravity=(...)"),
     "scheme(musl, start=half)": ("scheme(newmark)", "explicit steps", "velocity_particles"),
@@ -288,3 +290,34 @@ def test_impulses_are_found_for_light_bodies_with_much_friction():
         assert (push >= 0).all()
         rub = np.linalg.norm(p - push[:, None] * normal, axis=1)
         assert (rub <= mu * push * (1 + 1e-9) + 1e-12).all()
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_pendulum(run_interpreted, d):
+    """A box of 2 by 1 on a pivot at the middle of its left edge: small oscillations.
+
+    rate^2 = m g / I, with its centre at 1 and I = 5 + 12 about the pivot.
+    """
+    pivot, down = {2: "(2, 3.5)", 3: "(2, 3.5, 1.5)"}[d], {2: "(3, 0)", 3: "(3, 0, 0)"}[d]
+    turns = {2: "spin=0.01", 3: "spin=(0, 0, 0.01)"}[d]
+    given = f"pivot={pivot}, gravity={down}, {turns}"
+    log = run_interpreted(alone(given, "b_x, b_y, b_rz", d=d).replace("run(10)", "run(40)")).log
+    rate, dt = np.sqrt(12 * 3 / (5 + 12)), 0.1
+    leapfrog = 2 * np.arcsin(rate * dt / 2) / dt
+    swing = 0.01 * dt / np.sin(leapfrog * dt) * np.sin(leapfrog * log.Time)
+    assert log.b_rz == pytest.approx(swing, abs=1e-3 * np.abs(swing).max())
+    assert np.ptp(log.b_x) == 0
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("scene", ["in.rolling", "in.floating"])
+def test_one_thread_or_two(run_script, scene):
+    text = (INPUTS / scene).read_text("utf-8").replace("refine = 1", "refine = 0.5")
+    text = re.sub(
+        r"^run_time.*",
+        "dump(d, all, particle/bin, 50, d.*.bin, x, y, vx, vy)\nrun(100)",
+        text,
+        flags=re.M,
+    )
+    one = run_script(text, "--threads", "1", folder="one").folder
+    same_files(one, run_script(text, "--threads", "2", folder="two").folder)

@@ -63,7 +63,8 @@ STATE = 48
 # Columns of FreeBody.constants.
 OF_MASS, INERTIA, AXES, START, BOUND = 0, 1, 4, 13, 16  # AXES: principal axes, by columns
 SPEED_AT_MOST = 17  # of a point of the body, in this step
-CONSTANTS = 18
+OFFSET = 18  # of the centre of mass from X, in the frame of the start
+CONSTANTS = 21
 # Formulas of a body: prescribed velocity and spin, force and torque, acceleration.
 LED, LOADED, FALLS = 0, 6, 12
 FORMULAS = 15
@@ -431,10 +432,16 @@ def _start(body, s):
     """Find momentum and velocities without contact, in rows START_P and U."""
     state, vectors, kick = body.state, body.vectors, s.control.step[0].kick
     set_mass(body)
+    mass, c = body.constants[OF_MASS], body.constants
+    arm = _from_start(state, c[OFFSET], c[OFFSET + 1], c[OFFSET + 2])
     for k in range(3):
-        force = _value(body, s, LOADED + k) + body.constants[OF_MASS] * _value(body, s, FALLS + k)
-        vectors[START_P, k] = body.constants[OF_MASS] * state[V + k] + kick * force
+        vectors[STEP, k] = _value(body, s, LOADED + k) + mass * _value(body, s, FALLS + k)
         vectors[START_P, 3 + k] = state[L + k] + kick * _value(body, s, LOADED + 3 + k)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        vectors[START_P, k] = mass * state[V + k] + kick * vectors[STEP, k]
+        torque = arm[i] * vectors[STEP, j] - arm[j] * vectors[STEP, i]
+        vectors[START_P, 3 + k] += kick * torque
     for a in range(6):
         vectors[U, a] = 0.0 if body.dofs[a] else _value(body, s, LED + a)
     _velocities_of(body, START_P)

@@ -12,7 +12,6 @@ from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
-from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
 from karamelo_py.styles.fixes.rigid_body import ContactRigidBody, RigidBody, surfaces_of
@@ -49,10 +48,14 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
         code += [] if program is None else [program.code]
         numbers.append(constants)
         lines, values = lines + length, values + len(constants)
+    soft = np.ones(count, np.bool_)
+    for solid in hub.solids.values():
+        if can(solid.material.law, constrained_velocity):
+            soft[solid.first_id : solid.first_id + solid.count] = False
     surfaces = tuple(
         kernel.TouchingSurface(
             touch.region.outline(),
-            touch.group.has(np.arange(count)) & ~_of(fix.body, count),
+            touch.group.has(np.arange(count)) & soft,
             float(touch.mu),
             hub.values.slot(f"{touch.id}_x"),
             address_of_python(touch.refuse, CALL),
@@ -74,12 +77,6 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
         ),
         surfaces=surfaces,
     )  # fmt: skip
-
-
-def _of(solid: Solid, count: int) -> np.ndarray:
-    mask = np.zeros(count, np.bool_)
-    mask[solid.first_id : solid.first_id + solid.count] = True
-    return mask
 
 
 def _refuse(hub: Hub, moving: list[RigidBody]) -> None:

@@ -100,6 +100,8 @@ class RigidBody(Fix):
         Prescribed angular velocity: one formula in 2D, three in 3D.
     fixed
         Directions in which it does not move: of x, y, z, and rx, ry, rz for rotation.
+    pivot
+        A position that the body rotates about, as on a hinge or a ball joint; then its x, y, z.
     mass
         Mass; default: of its points. In axisymmetry, masses and forces are per radian.
     inertia
@@ -127,7 +129,7 @@ class RigidBody(Fix):
     Formulas may contain its own values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the same
     ID replaces this one, and the body continues with its velocity: to release
     it, write the line again without fixed. In axisymmetry it moves along the axis only. Rigid
-    bodies pass through each other and through rigid solids.
+    bodies pass through each other, through rigid solids and through nodes that a fix holds.
 
     See Also
     --------
@@ -136,7 +138,8 @@ class RigidBody(Fix):
 
     syntax = (
         "solid[, velocity=(vx, vy, vz)][, spin=w][, gravity=(gx, gy, gz)][, force=(fx, fy, fz)]"
-        "[, torque=t][, motion=(ux, uy, uz)][, turning=w][, fixed=(x, rz)][, mass=m][, inertia=I]"
+        "[, torque=t][, motion=(ux, uy, uz)][, turning=w][, fixed=(x, rz)][, pivot=(x, y, z)]"
+        "[, mass=m][, inertia=I]"
     )
     published = (
         "x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz",
@@ -160,6 +163,7 @@ class RigidBody(Fix):
         motion: Components | None = None,
         turning: Components | None = None,
         fixed: Ways | None = None,
+        pivot: Components | None = None,
         mass: Annotated[float, Positive] | None = None,
         inertia: Components | None = None,
     ):
@@ -189,6 +193,7 @@ class RigidBody(Fix):
         )
         self.led = self._spread(motion, range(d)) + self._spread(turning, spins, 3)
         self._hold(fixed)
+        self.pivot = self._held_at(pivot, velocity)
         free = [k for k in self.ways if self.led[k] is None]
         self.dofs = np.array([k in free for k in range(6)], np.int64)
         loads = self._spread(force, range(d)) + self._spread(torque, spins, 3)
@@ -238,6 +243,11 @@ class RigidBody(Fix):
                 hint="fixed=(...) or motion=(...) until it is released: a fix with the same ID "
                 "replaces it, and the body continues",
             )
+        if before is not None and before.pivot != self.pivot:
+            raise ScriptError(
+                f"fix '{self.id}' had another pivot", place=self.place,
+                expected="the same pivot, or none in both",
+            )  # fmt: skip
         if before is not None:
             kept, self.previous = before.state.copy(), None
             for given, at in zip(self.given, (kernel.V, kernel.W), strict=True):
@@ -310,6 +320,26 @@ class RigidBody(Fix):
                 )  # fmt: skip
             self.led[WAYS.index(name)] = Expression(0.0)
 
+    def _held_at(self, pivot: Components | None, velocity: Components | None) -> list[float]:
+        """Hold a position (3,) of the body; [] if it moves freely."""
+        if pivot is None:
+            return []
+        if max(self.ways) < 3:
+            raise ScriptError(
+                "a body that does not rotate has no pivot", place=pivot.argument.place,
+                expected="fixed=(...), or a domain in 2D or 3D",
+            )  # fmt: skip
+        d = self.hub.domain.dimension
+        given = self._spread(pivot, range(d)) if pivot.numbers() else []
+        if velocity is not None or any(self.led[k] is not None for k in range(d)):
+            raise ScriptError(
+                "the pivot holds the body, and velocity, motion or fixed moves or holds it too",
+                place=pivot.argument.place,
+                expected="spin=..., turning=... or fixed=(rx, ...)",
+            )
+        self.led[:d] = [Expression(0.0)] * d
+        return [0.0 if item is None else float(item.constant) for item in given]
+
     def _weigh(self, solid: Solid, mass: float | None, inertia: Components | None) -> None:
         kin, d, m = self.hub.domain.kin, self.hub.domain.dimension, np.asarray(solid.mass, float)
         x, total = np.zeros((solid.count, 3)), float(m.sum())
@@ -347,6 +377,11 @@ class RigidBody(Fix):
                     place=inertia.argument.place,
                     expected="moments above 0, each at most the sum of the other two",
                 )
+        if self.pivot:
+            c[kernel.START : kernel.START + 3] = self.pivot
+            c[kernel.OFFSET : kernel.OFFSET + 3] = away = centre - self.pivot
+            c[kernel.BOUND] += np.linalg.norm(away)
+            tensor = tensor + total * (away @ away * np.eye(3) - np.outer(away, away))
         if d < 3:
             moments, axes = (
                 np.array([1.0, 1.0, tensor[2, 2] if d == 2 and not kin.hoops else 1.0]),
