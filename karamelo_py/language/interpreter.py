@@ -248,11 +248,11 @@ class Interpreter:
             raise Quit
         if isinstance(node, syntax.Name) and not self.means_something(node.name):
             raise unknown.unknown_statement(self, node.name)
-        compares = isinstance(node, syntax.BinaryOperation) and node.operator == "=="
-        if compares and isinstance(node.left, syntax.Name):
-            right = statement.raw.code[node.right.start : node.right.end]
+        equal = node if isinstance(node, syntax.BinaryOperation) and node.operator == "==" else None
+        if equal and isinstance(left := equal.left, syntax.Name):
+            right = statement.raw.code[equal.right.start : equal.right.end]
             message = "this compares and does nothing with the result"
-            hint = f"an assignment has one =: {node.left.name} = {right}"
+            hint = f"an assignment has one =: {left.name} = {right}"
             raise ScriptError(message, place=statement.place, hint=hint)
         self.evaluate(node, statement.raw)
 

@@ -295,8 +295,8 @@ def kind_of(annotation: Any) -> Kind:
     if hasattr(annotation, "from_script"):
         text = getattr(annotation, "script_kind", "")
         if not text:
-            words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", annotation.__name__).lower()
-            text = f"the ID of a {words}"
+            name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", annotation.__name__).lower()
+            text = f"the ID of a {name}"
         family = annotation.family if isinstance(annotation, StyleOf) else None
         return Kind(text, annotation.from_script, family=family)
     raise TypeError(f"a signature cannot have the annotation {annotation!r}")

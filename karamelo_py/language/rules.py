@@ -86,4 +86,5 @@ def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
                 if kind != "failure" or share > 1:
                     names = {"part": part, "owner": owner, "scene": scene, **numbers}
                     place = numbers.get("place", getattr(owner or part, "place", None))
-                    yield Advice(*(text.format(**names) for text in words), share, place)
+                    name, reason, cure = (text.format(**names) for text in words)
+                    yield Advice(name, reason, cure, share, place)

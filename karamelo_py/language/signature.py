@@ -47,7 +47,7 @@ __all__ = [
 
 
 @cache
-def parameters(target: Callable) -> list[Parameter]:
+def parameters(target: Any) -> list[Parameter]:
     """Those of a command or style, without the hub.
 
     TypeError for an unsupported signature, a fault of its author.
@@ -103,7 +103,8 @@ def call(
     bound: dict[str, list[Argument]] = {}
     try:
         _bind(target, expected, arguments, name, bound)
-        values, named = [], {}
+        values: list[Any] = []
+        named: dict[str, Any] = {}
         for parameter in expected:
             for argument in bound.get(parameter.name, ()):
                 number = None if parameter.keyword else len(values) + 1

@@ -166,7 +166,7 @@ def line_below(script: Any, kind: str, ID: str) -> int | None:
 
 
 def _needs(script: Any, name: str, other: str) -> bool:
-    set_there = [s for s, kind, *_ in _ahead(script) if not kind]
+    set_there = [s for s, *_ in _ahead(script) if isinstance(s, Assignment)]
     below = {s.name: set(re.findall(r"\w+", s.right.code)) for s in reversed(set_there)}
     reached: set[str] = set()
     ahead = {name}

@@ -166,7 +166,7 @@ def _sections(
     """Lines (m, 3) that show the surface, but not a plane that cuts it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
-    heights = np.linspace(*ends, BETWEEN + 2)
+    heights = np.linspace(ends[0], ends[1], BETWEEN + 2)
     apart = (heights[1] - heights[0]) / 2 * np.eye(3)[axis]
     # At an end, sections resolve depths beyond a step.
     step = (hi - lo).max() / SECTION

@@ -218,7 +218,7 @@ class Picture:
         whole = self.figure.bbox.width - 2 * MARGIN
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
-            self.title.set_fontsize(self.title.get_fontsize() * whole / wide)
+            self.title.set_fontsize(float(self.title.get_fontsize()) * whole / wide)
         self._widest = max(self._widest, min(wide, whole))  # shorter titles stay in place
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
@@ -396,7 +396,7 @@ class PlanePicture(Picture):
         return self.axes.scatter([], [], lw=0)
 
     def _apply_limits(self, lo: float, hi: float) -> None:
-        if hi > self.norm.vmin:
+        if self.norm.vmin is not None and hi > self.norm.vmin:
             self.norm.vmax, self.norm.vmin = hi, lo
         else:
             self.norm.vmin, self.norm.vmax = lo, hi
@@ -410,7 +410,7 @@ class PlanePicture(Picture):
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
-        if not self.options.solids:
+        if self.limits and not self.options.solids:
             values = (values - self.limits[0]) / (self.limits[1] - self.limits[0])
         return np.array([*x.T[:2], values], np.float32)[:, np.argsort(ids)]
 
@@ -532,7 +532,7 @@ class SpacePicture(PlanePicture):
             nearer = at + 0.01 * np.linalg.norm(np.ptp(at, axis=0)) * self.view[2]
             *places, height = self._project(at).T
             groups.append((lines, np.transpose(places), height, tool.depth(nearer) > 0))
-        pieces = []
+        pieces: list[Any] = []
         for lines, seen, height, behind in groups:
             hidden = behind | np.any([front.hides(seen, height) for front in fronts], axis=0)
             ends = np.cumsum([len(line) for line in lines])[:-1]

@@ -67,7 +67,7 @@ def draw(curves: list[PlottedCurve], path: Path, labelled: Callable[[str], str] 
     for axes, (x_name, over_x) in zip(all_axes, by_x.items(), strict=True):
         axes.set_xlabel(labelled(x_name))
         tidy(axes)
-        lines = []
+        lines: list[Any] = []
         for side in ("left", "right"):
             chosen = [curve for curve in over_x if curve.side == side]
             lines += _over_one_axis(axes, side, chosen, len(lines), labelled) if chosen else []
@@ -129,6 +129,7 @@ def real_ticks(axis: Any) -> None:
 
     class WholeNumbers(ScalarFormatter):
         def __call__(self, x: float, pos: int | None = None) -> str:
+            assert self.axis is not None
             largest = abs(self.axis.get_view_interval()).max()
             if largest == 0 or 1e-3 <= largest < 1e5:
                 return super().__call__(x, pos)

@@ -1,6 +1,6 @@
 """Tables of points: a whole scene, a piece by id, or some of a block."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -200,8 +200,8 @@ class PointTable:
         if name in self.columns_of_laws() or name == "epdot":
             shown = partial(_column_of_laws, name)
             return self._cached(name, lambda rows: rows.computed(shown)).copy()
-        if name in (shown := declared_columns(self.hub, "point_fields")):
-            kind, k = shown[name]
+        if name in (of_fields := declared_columns(self.hub, "point_fields")):
+            kind, k = of_fields[name]
             if (array := self._rows.declared(kind)) is not None:
                 return _column(array, k)
         elif name in named_sets(self.hub):
@@ -252,7 +252,7 @@ def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
     return ((numbers >= solid.first_id) & (numbers < solid.first_id + solid.count)).astype(float)
 
 
-def absent(columns: dict[str, Callable | None], present: set[str] = frozenset()) -> list[str]:
+def absent(columns: dict[str, Callable | None], present: Set[str] = frozenset()) -> list[str]:
     return [name for name, show in columns.items() if show is None and name not in present]
 
 

@@ -27,7 +27,7 @@ class ByTime:
 
 
 class Rhythmic:
-    remembers = ("last_step", "passed")
+    remembers: tuple[str, ...] = ("last_step", "passed")
     every: int | ByTime
     last_step: int | None = None
     style = ""  # of a dump

@@ -2,7 +2,7 @@
 
 import gzip
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -26,9 +26,13 @@ class Snapshot(NamedTuple):
     units: Mapping[str, str] = {}
 
 
+Reader = Callable[[Path, int], Iterator[Snapshot]]
+
+
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
     """Snapshots from the `first` on; ScriptError if the file is no dump."""
-    reader = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}.get(path.suffix, _lammps)
+    readers: dict[str, Reader] = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
+    reader = readers.get(path.suffix, _lammps)
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"
         raise ScriptError(f"{path} is {kind}", expected="a file of dump particle, hdf5 or vtk")
@@ -72,7 +76,7 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
                     table = np.loadtxt(file, max_rows=count, ndmin=2, usecols=numbers)
                 columns = dict(zip((item[1 + k] for k in numbers), table.T, strict=True))
                 _place(path, columns, box, tilted)
-                named = (
+                named: dict[str, str] = (
                     {name: units.of_column(name) for name in (*columns, "time")} if units else {}
                 )
                 yield Snapshot(step, time, columns, *box.T, named)

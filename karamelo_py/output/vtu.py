@@ -47,7 +47,7 @@ class Column:
     def __init__(self, name: str, folder: Path):
         self.name = name
         self._kind = ""
-        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY, dir=folder)  # noqa: SIM115
+        self._file = tempfile.SpooledTemporaryFile(IN_MEMORY, dir=str(folder))  # noqa: SIM115
         self._sizes: list[int] = []
         self._rest = b""
         self._last = 0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 try:
     import resource
 except ImportError:  # Windows
-    resource = None
+    resource = None  # type: ignore[assignment]
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import ScriptError, render_message
@@ -49,7 +49,8 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     except (OSError, RuntimeError):
         return None
     left = machine.available + swap.free + SLACK * machine.total
-    limits = [MachineMemory(left, machine.total + swap.total), *_of_groups(root, swap)]
+    of_groups = _of_groups(root, MachineMemory(swap.free, swap.total))
+    limits = [MachineMemory(left, machine.total + swap.total), *of_groups]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0] if resource else -1
     if limit >= 0:
         left = (1 + SLACK) * limit - psutil.Process().memory_info().vms
@@ -72,7 +73,7 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
             if limit is None or used is None:
                 continue
             most, out = (_number(folder / f"memory.swap.{name}") for name in ("max", "current"))
-            free, whole = swap.free, swap.total
+            free, whole = swap.free, swap.whole
             if most is not None and out is not None:
                 free, whole = min(free, most - out), min(whole, most)
             stat = dict(line.split(maxsplit=1) for line in _lines(folder / "memory.stat"))

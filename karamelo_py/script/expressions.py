@@ -7,7 +7,7 @@ constants folded.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -34,14 +34,14 @@ class Expression:
     def __init__(self, value: float | terms.Term | Expression):
         if not isinstance(value, terms.Term):
             value = value._term if isinstance(value, Expression) else terms.constant(value)
-        self._term = value
+        self._term: terms.Term = value
 
     @classmethod
     def seed(cls, name: str) -> Expression:
         return cls(terms.Term("name", (), name))
 
     @classmethod
-    def from_script(cls, hub: Any, argument: Any) -> Expression:
+    def from_script(cls, hub: Any, argument: Any) -> Self:
         value = argument.value(hub)
         if isinstance(value, str):
             raise ScriptError(

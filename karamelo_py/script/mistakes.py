@@ -142,7 +142,7 @@ def _stop(parser: Any, code: str) -> _Stop:
             interactive.feed_token(token)
             before.append(token)
     except UnexpectedCharacters as error:
-        start = error.pos_in_stream
+        start = error.pos_in_stream or 0
         here = code[start]
     except UnexpectedToken as error:
         here, start = error.token, error.token.start_pos
@@ -205,12 +205,12 @@ def _equals(at: _Stop) -> Mistake:
         return at.mistake("'=' has no name on its left", expected)
     first, rest = tokens[0], at.code[at.end :].strip()
     if len(tokens) == 2 and before.type in _OPERATORS and first.type == "NAME":
-        hint = f"{first} = {first} {before} {rest}"
-        return Mistake(f"'{before}=' is not known here", before.start_pos, at.end, expected, hint)
+        longer = f"{first} = {first} {before} {rest}"
+        return Mistake(f"'{before}=' is not known here", before.start_pos, at.end, expected, longer)
     if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
-        hint = f"a formula needs no arguments: {first} = {rest}"
+        formula = f"a formula needs no arguments: {first} = {rest}"
         place = first.start_pos, before.end_pos
-        return Mistake("only a name can be left of '='", *place, expected, hint)
+        return Mistake("only a name can be left of '='", *place, expected, formula)
     hint = "compare with ==" if at.opened or len(tokens) == 1 else None
     if len(tokens) > 1 and all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
         hint = "a name begins with a letter and has letters, digits and _ only"
@@ -244,6 +244,7 @@ def _side_by_side(at: _Stop) -> Mistake:
     touching = before.type == "NUMBER" and before.end_pos == at.start
     if touching and at.kind == "NUMBER":
         number = re.match(r"[\d.]+([eE][+-]?[\d.]+)?", code[start:])
+        assert number is not None
         end = start + number.end()
         expected = "a number has one point at most"
         if "." in (number[1] or ""):

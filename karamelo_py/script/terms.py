@@ -15,7 +15,7 @@ _MAX_SIZE = 20000
 _MAX_SHOWN = 1000
 _MAX_LEVELS = 100
 
-REWRITTEN = {
+REWRITTEN: dict[str, Callable[..., "Term"]] = {
     "pow": lambda a, b: applied("^", a, b),
     "mod": lambda a, b: applied("%", a, b),
     "tgamma": lambda a: applied("gamma", a),
@@ -83,7 +83,7 @@ class Term:
         elif operands:
             self.names = frozenset().union(*(term.names for term in operands))
         # Counts shared operations repeatedly; exact only where needed.
-        self.size = 1 + sum(term.size for term in operands)
+        self.size: int = 1 + sum(term.size for term in operands)
         if self.size > _MAX_SIZE:
             self.size = len(in_order(self))
         if self.size > _MAX_SIZE:

@@ -22,7 +22,8 @@ class Further(NamedTuple):
 
 
 def chained(parts: list) -> NamedTuple:
-    return reduce(lambda rest, part: Further(part, rest), reversed(parts), Absent())
+    none: Any = Absent()
+    return reduce(lambda rest, part: Further(part, rest), reversed(parts), none)
 
 
 @point_function(otherwise=True)

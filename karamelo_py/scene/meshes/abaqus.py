@@ -518,8 +518,8 @@ class _Merged:
         for name in filter(None, self.elements.by_name):
             members = self.elements.members(name)
             sets[name] = [np.isin(of_block, members) for of_block in numbers] + none[len(cells) :]
-        for name, parts in faces.items():
-            mine = {id(cell) for cell in parts}
+        for name, of_faces in faces.items():
+            mine = {id(cell) for cell in of_faces}
             sets[name] = [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
         points = np.concatenate(self.points)
         node_sets = {name: np.zeros(len(points), bool) for name in self.nodes.by_name}

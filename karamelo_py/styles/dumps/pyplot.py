@@ -247,7 +247,7 @@ class PyPlot(Dump):
         some = volume[columns["id"] % -(-self.hub.fields.count // SAMPLE) == 0]
         return float(np.median(some)) ** (1 / domain.dimension) if len(some) else 0.0
 
-    def _label(self) -> str:
+    def _label(self) -> str | ShownColumn:
         if self.field is not None:
             return self.field
         return "vx" if self.hub.domain.dimension == 1 else "type"

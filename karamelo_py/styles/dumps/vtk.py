@@ -54,7 +54,8 @@ class VtkDump(TableDump):
         with whole(path) as file:
             names = [name for name in self.columns if name not in POSITIONS]
             arrays = arrays_of(names, self.hub.domain.dimension)
-            vtu, kept = Vtu(["id", "type", *names, *arrays], path.parent), []
+            vtu = Vtu(["id", "type", *names, *arrays], path.parent)
+            kept: list[np.ndarray] = []
             for table in self.tables():
                 columns = dict(zip(self.columns, table.columns, strict=True))
                 x = np.column_stack([columns.pop(name) for name in POSITIONS])
