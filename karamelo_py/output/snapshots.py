@@ -26,12 +26,11 @@ class Snapshot(NamedTuple):
     units: Mapping[str, str] = {}
 
 
-Reader = Callable[[Path, int], Iterator[Snapshot]]
-
-
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
     """Snapshots from the `first` on; ScriptError if the file is no dump."""
-    readers: dict[str, Reader] = {".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd}
+    readers: dict[str, Callable[[Path, int], Iterator[Snapshot]]] = {
+        ".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd,
+    }  # fmt: skip
     reader = readers.get(path.suffix, _lammps)
     if path.exists() and not path.is_file():
         kind = "a folder" if path.is_dir() else "a pipe or a device"

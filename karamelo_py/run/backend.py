@@ -14,11 +14,7 @@ from karamelo_py.run.step_size import StepSize
 
 
 class Backend(SceneState, Protocol):
-    """A scene that can be stepped; `run.loop` and `run.rollback` know no more of it.
-
-    A run calls `begin` or `go_on`, `compile`, then `advance`; `snapshot` and `restore` return to a
-    state.
-    """
+    """A scene that can be stepped: a run calls `begin` or `go_on`, `compile`, then `advance`."""
 
     steps: StepSize
     energy_watch: EnergyWatch

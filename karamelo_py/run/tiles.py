@@ -305,7 +305,6 @@ class Tiles:
         return tile - (tile - first) % along
 
     def _shares(self, s: Setup) -> np.ndarray:
-        """Return the set of each own tile, of its block's points."""
         sets = []
         for block in s.blocks:
             tiles, shares, _ = block.tiling.count

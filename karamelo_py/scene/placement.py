@@ -18,7 +18,7 @@ from karamelo_py.script.errors import ScriptError
 MAX_POINTS = 2**31 - 1
 SAMPLE = 4096
 LOOKS = 9  # doublings of the sample, to a million
-FEW = 1_000_000  # points that any machine can store
+FITS_EVERYWHERE = 1_000_000  # points that any machine can store
 # Above, points outside the domain are not counted.
 _MAX_COUNTED = 20_000_000
 
@@ -203,7 +203,7 @@ def fill(
     open_lo = np.where(np.isinf(lo) | at_side[0], ends[0] - domain.tolerance, -np.inf)
     open_hi = np.where(np.isinf(hi) | at_side[1], ends[1] + domain.tolerance, np.inf)
 
-    memory = room() if room is not None and inner > FEW else None
+    memory = room() if room is not None and inner > FITS_EVERYWHERE else None
     if memory is not None:
         least = _least(region, domain, h / ppc, memory.most)
         if least > memory.most:

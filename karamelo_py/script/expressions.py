@@ -88,7 +88,7 @@ class Expression:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
             expected = "a formula of time and of values of fixes and computes"
             raise ScriptError(message, name=self.text, expected=expected)
-        return _evaluate(self._term, values)
+        return terms.evaluated(self._term, lambda name: values.get(_published(name, values)))
 
     def program(self, values: Values) -> formula.Program:
         """Program for present values."""
@@ -155,10 +155,6 @@ def shown(value: Value) -> str:
     if isinstance(value, Expression):
         return value.text
     return terms.number_text(value)
-
-
-def _evaluate(root: terms.Term, values: Values) -> float:
-    return terms.evaluated(root, lambda name: values.get(_published(name, values)))
 
 
 def _published(name: str, values: Values) -> str:

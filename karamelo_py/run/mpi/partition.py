@@ -198,7 +198,6 @@ class SharedTiles(Tiles):
         return float(self.comm.allreduce_max(np.array([super()._reach(s, block, x)]))[0])
 
     def _boxes(self, s: Setup) -> Boxes:
-        """Return the own boxes, then others' that may contain the same nodes."""
         local, me = self.own_boxes(s), self.comm.rank
         self._looks_beyond = beyond(s.contact) > 0
         of_all = {me: local, **dict(enumerate(self.comm.allgather(local)))}
@@ -327,7 +326,6 @@ class SharedTiles(Tiles):
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the `nodes` counted by other processes: by the first that uses them."""
         count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
         place = nodes % count
         for rank, boxes in sorted(self._inner.items()):
